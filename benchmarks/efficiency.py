@@ -46,8 +46,7 @@ from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.payload import estimate_payload
 from estimator.filtering import differentiate, low_pass
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared, robot_data
-from estimator.rigid_team.start import start_bases
+from estimator.rigid_team.residual import Shared, robot_data, start_bases
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 from mocobot_sim.trial.trial_log import TrialLog

@@ -118,7 +118,7 @@ def left(where: Path) -> tuple[dict[str, str], int]:
     """Digest of every file that a command left, and how many temporary ones there are."""
     files = [path for path in sorted(where.rglob("*")) if path.is_file()]
     names = {path: path.relative_to(where).as_posix() for path in files}
-    temporary = [path for path in files if any(part.startswith(".") for part in names[path].split("/"))]
+    temporary = [path for path in files if ".tmp" in names[path] or ".old" in names[path]]
     return {
         names[path]: hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path not in temporary
     }, len(temporary)

@@ -2,6 +2,7 @@
 
 import gc
 import os
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,6 +41,20 @@ def pytest_collection_finish() -> None:
     """Modules and tests stay until the end, and are not looked through again."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Where ``SKIPPED_TO`` names a file, it gets the line that ends ``make test``: what was skipped, and why."""
+    if path := os.environ.get("SKIPPED_TO"):
+        stats = terminalreporter.stats
+        kinds = ("passed", "failed", "error", "skipped", "xfailed", "xpassed")
+        count = sum(len(stats.get(kind, ())) for kind in kinds)
+        reports = stats.get("skipped", ())
+        reasons = Counter(str(report.longrepr[2]).removeprefix("Skipped: ") for report in reports)
+        told = "; ".join(f"{many} because: {reason}" for reason, many in sorted(reasons.items()))
+        Path(path).write_text(
+            f"Skipped {len(reports)} of {count} tests{told and ', ' + told}.\n", encoding="utf-8"
+        )
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.serial.causes import CAUSES
-from mocobot.campaign.shares import interval, reliability
+from mocobot.campaign.summary import interval, reliability
 
 Item = Mapping[str, Any]
 SILENT = ("consistent", "miscalibrated")

@@ -18,7 +18,7 @@ from discrepancy.team.tolerances import read_tolerances
 from estimator.errors import InputError
 from mocobot.cli import COMMANDS
 from mocobot.comparison.compare import compare
-from mocobot.config import with_config
+from mocobot.parsing import with_config
 from mocobot_logs.joints.parse import read_joint_map
 from mocobot_sim.effects.spec import EXAMPLE, parse_effect
 from mocobot_sim.scene.as_built_file import read_units

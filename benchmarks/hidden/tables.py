@@ -11,7 +11,7 @@ import numpy as np
 
 from discrepancy.team.causes import CAUSES
 from hidden.score import Score, score
-from mocobot.campaign.shares import interval
+from mocobot.campaign.summary import interval
 
 Result = Mapping[str, Any]
 

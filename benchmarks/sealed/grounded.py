@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.team.tolerances import default_tolerances
-from mocobot.campaign.score import match
+from mocobot.campaign.summary import match
 
 Item = Mapping[str, Any]
 LARGE = 4.0

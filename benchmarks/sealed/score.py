@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from discrepancy.team.causes import CAUSES
-from mocobot.campaign.score import Score, family_of, match
+from mocobot.campaign.summary import Score, family_of, match
 from sealed.grounded import of_the_background
 
 __all__ = ["HEALTHY", "Score", "Scored", "family_of", "score"]

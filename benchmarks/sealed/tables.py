@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mocobot.campaign.shares import interval, reliability
+from mocobot.campaign.summary import interval, reliability
 from sealed.backgrounds import BACKGROUNDS
 from sealed.grounded import law_of_the_background
 from sealed.payload_table import payload_header, payload_rows

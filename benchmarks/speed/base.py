@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 
 from mocobot_sim.base.drive import BaseDrive
-from mocobot_sim.base.motion import Leg, carried, plan
-from mocobot_sim.base.planar import yaw_of
+from mocobot_sim.base.motion import Leg, carried, plan, yaw_of
 from mocobot_sim.base.solo import build_solo, compile_solo
 from mocobot_sim.control.control import ControlGains, TeamController
 from mocobot_sim.scene.models import omnid_design

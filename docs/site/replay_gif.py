@@ -15,7 +15,7 @@ import mocobot
 from mocobot.pictures import render
 from mocobot_sim.scene.models import posed
 from mocobot_view.pictures.camera import clearest, corners
-from mocobot_view.pictures.measured_team import measured_team
+from mocobot_view.pictures.shots import measured_team
 
 WIDTH, HEIGHT = 640, 360
 BEGIN_S, FRAMES, FRAME_MS = 12.0, 50, 80

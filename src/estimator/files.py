@@ -1,65 +1,184 @@
 """Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
 
-import contextlib
 import errno
-import hashlib
 import json
 import os
 import shutil
 import tempfile
-import uuid
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.inputs import file_sha256, printable
+from estimator.processes import scratch_name
+from estimator.strict import read_json
+
+LIST, FORMAT = ".mocobot-files", "mocobot-files"
+"""The list: {format, kind: of the result, files: {path in the folder: SHA-256}}."""
+
+
+def list_written(folder: Path, kind: str) -> None:
+    """Write the list of all that a new folder holds.
+
+    Args:
+        folder: which nobody else has written into yet.
+        kind: of the result, such as ``diagnosis``.
+    """
+    files = {str(path.relative_to(folder)): _digest(path) for path in _entries(folder)}
+    _write(folder, {"format": FORMAT, "kind": kind, "files": files})
+
+
+def add_written(path: Path) -> None:
+    """Add a file that was written into a folder later to the folder's list, if there is one."""
+    if values := _read(path.parent):
+        values["files"][path.name] = _digest(path)
+        _write(path.parent, values)
+
+
+def holds(kind: str) -> Callable[[Path], bool]:
+    """What says whether a folder is a result of some kind, and raises an InputError if it holds anything else."""
+
+    def is_ours(folder: Path) -> bool:
+        values = _read(folder)
+        if values.get("kind") != kind:
+            return False
+        for path in _entries(folder):
+            if not _is_written(path, folder, values):
+                raise InputError(
+                    f"{path}: was not written by mocobot, or changed since; move it elsewhere first"
+                )
+        return True
+
+    return is_ours
+
+
+def leave_others(folder: Path, new: Path) -> None:
+    """Remove from a replaced folder what its list has, and move all else to the new one, under a free name."""
+    values = _read(folder)
+    for path in _entries(folder):
+        if _is_written(path, folder, values):
+            path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+        else:
+            target = new / path.relative_to(folder)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path.rename(free_name(target))
+    if values:
+        (folder / LIST).unlink()
+    for path in sorted(folder.rglob("*"), reverse=True):
+        with suppress(OSError):
+            path.rmdir()
+    folder.rmdir()
+
+
+def free_name(path: Path) -> Path:
+    """The path, or with ``.kept`` behind it where it is taken."""
+    while os.path.lexists(path):
+        path = path.with_name(f"{path.name}.kept")
+    return path
+
+
+def _entries(folder: Path) -> list[Path]:
+    """Files, links and empty folders below a folder, but the list."""
+    found = [path for path in folder.rglob("*") if path != folder / LIST]
+    return sorted(p for p in found if p.is_symlink() or not p.is_dir() or not any(p.iterdir()))
+
+
+def _is_written(path: Path, folder: Path, values: dict[str, Any]) -> bool:
+    digest = values.get("files", {}).get(str(path.relative_to(folder)))
+    return bool(digest) and digest == _digest(path)
+
+
+def _digest(path: Path) -> str:
+    """SHA-256 of a file; a word that is none for anything else."""
+    with suppress(OSError):
+        if not path.is_symlink():
+            return "folder" if path.is_dir() else file_sha256(path)
+    return ""
+
+
+def _write(folder: Path, values: dict[str, Any]) -> None:
+    (folder / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """The list; empty if there is none that can be used."""
+    with suppress(InputError):
+        values = read_json(folder / LIST, "a list of what was written")
+        if values.get("format") == FORMAT and isinstance(values.get("files"), dict):
+            return values
+    return {}
+
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 """What a disk says that takes no more."""
+_State = tuple[int, int, int] | None
+_checked: dict[Path, _State] = {}
+"""What was at the place of a file when it was checked, before the work; None for nothing."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary name beside ``path`` for a file that takes its place when the block ends without an error.
 
-    Missing folders above it are made.
+    Missing folders above it are made. A file that somebody else has put there since the place was checked
+    (``check_target``) is kept, with ``.kept`` behind its name.
 
     Raises:
         InputError: the operating system refuses.
     """
     real = Path(os.path.realpath(path))
-    temporary = real.parent / f".{uuid.uuid4().hex}.tmp"
     with system_errors(path), _folders_above(path):
+        temporary, before = scratch_name(real.parent), _checked.pop(real, _state(real))
         try:
             yield temporary
+            if _state(real) not in (None, before):
+                real.rename(free_name(real))
             temporary.replace(real)
         finally:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
 
-@contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder that takes the place of ``path`` (with all it held) when the block ends without an error.
+def _state(path: Path) -> _State:
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
-    Missing folders above it are made. What cannot be written inside is told by its place in ``path``.
+
+@contextmanager
+def whole_folder(path: Path, kind: str) -> Iterator[Path]:
+    """A temporary folder that takes the place of ``path`` when the block ends without an error.
+
+    Missing folders above it are made. What cannot be written inside is told by its place in ``path``. The folder gets
+    a list of what is in it. Of one that it replaces, what its list has is removed; everything else is kept, and has
+    ``.kept`` behind its name where the new folder has the same one.
+
+    Args:
+        path: the folder.
+        kind: of result, for the list (``estimator.files``).
 
     Raises:
         InputError: it cannot be created or put in place.
     """
     real = Path(os.path.realpath(path))
-    mark = uuid.uuid4().hex
-    temporary, old = real.parent / f".{mark}.tmp", real.parent / f".{mark}.old"
     with _folders_above(path):
+        temporary = scratch_name(real.parent)
+        old = temporary.with_suffix(".old")
         try:
             with system_errors(path):
                 temporary.mkdir()
             yield temporary
             with system_errors(path):
+                list_written(temporary, kind)
                 if real.exists():
                     real.rename(old)
                 temporary.rename(real)
+                if old.exists():
+                    leave_others(old, real)
         except InputError as error:
             if str(temporary) not in str(error):
                 raise
@@ -70,11 +189,9 @@ def whole_folder(path: Path) -> Iterator[Path]:
             raise InputError(f"{path}: cannot be written ({error.strerror})") from error
         finally:
             if old.exists() and not real.exists():
-                with contextlib.suppress(OSError):
+                with suppress(OSError):
                     old.rename(real)
             shutil.rmtree(temporary, ignore_errors=True)
-            if real.exists():
-                shutil.rmtree(old, ignore_errors=True)
 
 
 @contextmanager
@@ -88,7 +205,7 @@ def _folders_above(path: Path) -> Iterator[None]:
         yield
     except BaseException:
         for folder in missing:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 folder.rmdir()
         raise
 
@@ -126,6 +243,8 @@ def check_target(path: Path, suffix: str = "") -> None:
             raise InputError(f"{path}: the file's name must end in {suffix}")
         if path.exists() and not path.is_file():
             raise InputError(f"{path}: is not a regular file; name another one to write")
+        real = Path(os.path.realpath(path))
+        _checked[real] = _state(real)
     check_place(path)
 
 
@@ -147,20 +266,20 @@ def file_facts(path: Path) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read.
     """
-    with system_errors(path, "read"), path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        size = os.fstat(file.fileno()).st_size
-    return {"name": path.name, "path": str(path), "bytes": size, "sha256": digest}
+    with system_errors(path, "read"):
+        return {
+            "name": path.name, "path": str(path), "bytes": path.stat().st_size, "sha256": file_sha256(path)
+        }  # fmt: skip
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text.
+    """Write UTF-8 text; in a ``.txt`` file, which terminals show, control characters are escaped.
 
     Raises:
         InputError: the target cannot be written.
     """
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(printable(text) if path.suffix == ".txt" else text, encoding="utf-8")
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
@@ -173,7 +292,7 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def system_errors(path: Path, done: str = "written") -> Iterator[None]:
+def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
     """A block in which what the operating system refuses becomes one sentence: that ``path`` cannot be ``done``.
 
     Raises:

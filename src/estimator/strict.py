@@ -9,16 +9,17 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn, TypeGuard
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, NoReturn, TypeGuard
 
 from estimator.errors import InputError
+from estimator.inputs import JSON_BYTES, TOML_BYTES, parse_toml, plain, read_input
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _LARGEST = 1e300
 
@@ -34,8 +35,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         InputError: it cannot be read, or is not TOML.
     """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        return parse_toml(read_input(Path(path), TOML_BYTES).decode("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(
             f"{path}: not a readable {what} ({getattr(error, 'strerror', None) or error})"
         ) from error
@@ -52,7 +53,7 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
         InputError: there is no such file, it cannot be read, or is not a JSON object.
     """
     try:
-        content = Path(path).read_bytes()
+        content = read_input(Path(path), JSON_BYTES)
     except FileNotFoundError as error:
         raise InputError(f"{path}: there is no such file; it would be {what}") from error
     except OSError as error:
@@ -69,7 +70,7 @@ def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
         InputError: it is not one.
     """
     try:
-        values = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant)
+        values = plain(json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where}: not valid JSON ({error})") from error
     if not isinstance(values, dict):
@@ -203,6 +204,8 @@ class Fields:
         value = self.values[key]
         if not _is_array(value, shape):
             self.refuse(key, f"{' x '.join(map(str, shape))} finite numbers")
+        import numpy as np  # of no use to those who only read texts
+
         return np.array(value, dtype=float)
 
 

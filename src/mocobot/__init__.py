@@ -6,15 +6,18 @@ The names in ``__all__`` are the public ones (docs/api.md); each is imported whe
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# The matrices are small: threads that fight over them make a diagnosis several times slower on a busy machine.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from mocobot.blas import one_thread
+
+# Results must not depend on how many there are. The matrices are small, too: threads that fight over them make a
+# diagnosis several times slower on a busy machine.
+one_thread()
 
 if TYPE_CHECKING:
     from estimator.errors import InputError as InputError
+    from estimator.inputs import set_max_unpacked as set_max_unpacked
     from estimator.recording.model import Recording as Recording
     from estimator.recording.parquet import read_recording as read_recording
     from estimator.recording.parquet import write_recording as write_recording
@@ -63,6 +66,7 @@ _NAMES = {
     "estimator.errors": "InputError",
     "estimator.recording.model": "Recording",
     "estimator.recording.parquet": "read_recording write_recording",
+    "estimator.inputs": "set_max_unpacked",
     "mocobot": "bases emps guiding pictures robots serial trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
     "mocobot.api.comparison": "Comparison compare",

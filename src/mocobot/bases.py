@@ -4,10 +4,8 @@ from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.follow import FollowingDrive
 from mocobot_sim.base.mecanum import MecanumKinematics
-from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
-from mocobot_sim.base.planar import compose, relative, yaw_of
-from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
+from mocobot_sim.base.motion import Leg, PlanarMotion, carried, compose, plan, relative, yaw_of
+from mocobot_sim.base.solo import Snapshots, build_solo, compile_solo, drive_solo
 
 __all__ = [
     "WHEELS",

@@ -2,16 +2,18 @@
 
 import io
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO, cast
 
 from estimator.errors import InputError
+from estimator.inputs import printable, set_max_unpacked
 from mocobot import options
-from mocobot.config import with_config
-from mocobot.parsing import parse
+from mocobot.parsing import parse, with_config
 from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
 
@@ -32,17 +34,43 @@ COMMANDS = {
     "effects": options.Effects,
 }
 """Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
-another, whose ``check`` refuses what it can before anything is loaded that takes time."""
+a function that refuses what it can before anything is loaded that takes time."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
+ENDING = (signal.SIGTERM, signal.SIGHUP)
+"""Signals that end the command as an interruption does: with what it began cleared away."""
+
+
+class _Shown:
+    """Standard output with what is printed escaped where it would be a command to a terminal."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+
+    def write(self, text: str) -> int:
+        """Print."""
+        return self._out.write(printable(text))
+
+    def __getattr__(self, name: str) -> Any:
+        """All else is standard output's own."""
+        return getattr(self._out, name)
+
+
+def _end(number: int, _: object) -> NoReturn:
+    for each in ENDING:
+        signal.signal(each, signal.SIG_IGN)  # once is enough
+    sys.exit(128 + number)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point: ends the process with a code of docs/commands, unless all is well.
 
     0 done; 1 done, and with ``--strict`` the answer is not good; 2 refused after one sentence on standard error;
-    130 interrupted; 141 standard output was closed before everything was printed.
+    130 interrupted; 141 standard output was closed before everything was printed; 143 terminated.
     """
+    for each in ENDING:
+        if signal.getsignal(each) == signal.SIG_DFL:  # not where nohup ignores it
+            signal.signal(each, _end)
     try:
         try:
             _run(sys.argv[1:] if arguments is None else arguments)
@@ -76,7 +104,7 @@ def _forget() -> None:
 
 
 def _exit(sentence: str, code: int) -> NoReturn:
-    print(f"mocobot: {sentence}", file=sys.stderr)
+    print(f"mocobot: {printable(sentence, keep='')}", file=sys.stderr)
     sys.exit(code)
 
 
@@ -97,10 +125,12 @@ def _run(arguments: Sequence[str]) -> None:
                 f"{error.filename}: cannot be written ({error.strerror})"
             ) from error  # a completion
         name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
-        import_module(f"mocobot.checks.{name}").check(options)
+        set_max_unpacked(getattr(options, "max_unpacked", None))
+        getattr(import_module("mocobot.checks"), f"check_{name}")(options)
         # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
-        _command(name)(options)
+        with redirect_stdout(cast("TextIO", _Shown(sys.stdout))):
+            _command(name)(options)
 
 
 def _version() -> str:

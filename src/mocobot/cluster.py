@@ -1,6 +1,5 @@
 """Processes on other machines: joblib's work goes to a Dask scheduler while a block runs."""
 
-import os
 import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -105,11 +104,7 @@ def versions() -> dict[str, str]:
     from mocobot.files.resume import code_digest
 
     found = {name: version_of(name) or "none" for name in PACKAGES}
-    return found | {
-        "python": platform.python_version(),
-        "mocobot": code_digest()[:12],
-        "OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "none"),
-    }
+    return found | {"python": platform.python_version(), "mocobot": code_digest()[:12]}
 
 
 def _line(error: object) -> str:

@@ -13,7 +13,10 @@ from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.engine.diagnose import When
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.diagnosis import diagnose_serial
+from discrepancy.serial.mechanics.motion import Motion
 from discrepancy.serial.mechanics.nominal import inverse_torque
+from discrepancy.serial.mechanics.regressor import body_regressor
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel, load_model
 from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
@@ -143,9 +146,12 @@ def inspect(
     robot = _model(model)
     log_map = map_of(robot, Path(log), map)
     source = open_joint_log(log, log_map, episode)
+    tree = Tree.of(robot.model)
     known = Robot(
         robot.joints, robot.slides, robot.lower, robot.upper, robot.torque_limit,
         partial(inverse_torque, robot.model),
+        lambda *motion: body_regressor(Motion.of(tree, *motion), int(tree.joint_body[tree.last_link])),
+        float(tree.mass[tree.links].sum()),
     )  # fmt: skip
     return public(JointInspection, inspection.inspect_joints(source, log_map, known, advance, tried))
 

@@ -14,6 +14,7 @@ from mocobot_inspect.wiring.check import Found
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit
 from mocobot_inspect.wiring.mistakes.base import listed
 from mocobot_logs.log import NS
+from mocobot_logs.readings import repeated
 
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]
 
@@ -72,6 +73,8 @@ def _of_time(found: Inspection) -> Iterator[str]:
 
 def of_stream(t: Timing) -> Iterator[str]:
     """What is wrong with the stamps of one stream."""
+    if t.repeats:
+        yield repeated(t.repeats)
     if t.rate_hz is None:
         yield f"{t.samples} samples are too few"
         return
@@ -136,13 +139,20 @@ def _of_samples(found: Inspection) -> Iterator[str]:
         duration = found.survey.timing[robot].duration_s
         for c in channels:
             who = f"omnid{robot + 1}.{c.name}"
-            if c.nans or c.infinities:
-                parts = [f"{n} {what}" for n, what in ((c.nans, "NaN"), (c.infinities, "infinite")) if n]
-                yield f"{who}: {' and '.join(parts)} of {found.survey.timing[robot].samples} samples"
+            yield from no_readings(who, c, found.survey.timing[robot].samples)
             yield from stands(who, c, duration)
     for kind in ("phi", "theta", "tau"):
         yield from _limits(kind, found)
     yield from _oscillating(found)
+
+
+def no_readings(who: str, c: Channel, samples: int) -> Iterator[str]:
+    """How many samples of a channel are no numbers, or none that a sensor reads."""
+    counts = ((c.nans, "NaN"), (c.infinities, "infinite"), (c.wild, "absurd"))
+    parts = [f"{number} {what}" for number, what in counts if number]
+    if parts:
+        extremes = f" (it reaches {c.lowest:.4g} to {c.highest:.4g})" if c.wild else ""
+        yield f"{who}: {' and '.join(parts)} of {samples} samples{extremes}"
 
 
 def stands(who: str, c: Channel, duration_s: float) -> Iterator[str]:
@@ -195,7 +205,7 @@ def _limits(kind: str, found: Inspection) -> Iterator[str]:
     beyond, extremes, spans = [], [], []
     for robot, channels in enumerate(found.survey.channels):
         for c in channels:
-            if not c.name.startswith(kind) or c.lowest is None or c.highest is None:
+            if not c.name.startswith(kind) or c.wild or c.lowest is None or c.highest is None:
                 continue
             if (c.lowest < low or c.highest > high) and (robot, c.name) not in blamed:
                 beyond.append(f"omnid{robot + 1}.{c.name}")

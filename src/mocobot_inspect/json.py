@@ -6,12 +6,13 @@
     log           name, level, robots, channels, assumed_design, calibrated (whether robots are as a calibration
                 has them), free (whether the robots hold nothing)
     streams       per robot: samples, start_s and duration_s (after the log's first stamp), rate_hz, jitter_rms_s,
-                  jitter_max_s, gaps, missing, longest_gap_s, longest_gap_at_s, duplicates, backwards,
+                  jitter_max_s, gaps, missing, longest_gap_s, longest_gap_at_s, duplicates, repeats, backwards,
                   farthest_back_s, farthest_back_at_s, recorder_s
                   (least and largest lead of the recorder's time over the stamps)
-    channels      per robot and channel: lowest, highest, nans, infinities, step, noise, stuck_count, clipped_count,
-                  stuck and clipped (start_s after the robot's first stamp, duration_s, value), oscillation
-                  (frequency_hz, amplitude, duration_s of a fast line that stands out of the noise; or null)
+    channels      per robot and channel: lowest, highest, nans, infinities, wild (samples that no sensor reads), step,
+                  noise, stuck_count, clipped_count, stuck and clipped (start_s after the robot's first stamp,
+                  duration_s, value, jumps), oscillation (frequency_hz, amplitude, duration_s of a fast line that
+                  stands out of the noise; or null)
     excerpt       part_s (of a long log, else null), stretches (start_s, duration_s), unchecked (why nothing was)
     segments      still_s, moving_s, rests (start_s, duration_s); or null
     clocks        per robot: offset_s, offset_se_s, drift, drift_se, differs, why_not; or null

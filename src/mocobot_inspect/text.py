@@ -6,11 +6,14 @@ from mocobot_inspect.findings import evidence, findings
 from mocobot_inspect.inspection import Inspection
 from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.stream.channels import UNITS, Channel
+from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.mistakes import Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
 from mocobot_logs.resample.log import MAX_GAP_S
+from mocobot_logs.resample.tally import MOST_MISSING
 
 _HIDDEN = 6
+_AS_IT_IS = "nothing as it is; with "
 
 
 def format_inspection(found: Inspection) -> str:
@@ -173,28 +176,35 @@ def hidden_words(mistakes: tuple[Mistake, ...]) -> list[str]:
 def ready_line(found: Inspection) -> str:
     """The verdict; an estimate takes all of a log, so stretches in which a channel stands spoil it."""
     line = _ready(found)
-    return (
-        line
-        if line.startswith("ready for: nothing (")
-        else line + "".join(f"; {what}" for what in _first(found))
-    )
+    if line.startswith("ready for: nothing ("):
+        return line
+    if any(c.infinities or c.wild for of_robot in found.survey.channels for c in of_robot):
+        later = line.removeprefix("ready for: ").removeprefix(_AS_IT_IS)
+        joint = " and " if _AS_IT_IS in line else ": "
+        line = f"ready for: {_AS_IT_IS}absurd values left out (convert --drop){joint}{later}"
+    return line + "".join(f"; {what}" for what in _first(found))
 
 
 def _first(found: Inspection) -> list[str]:
-    """What has to be done before, or a conversion and an estimate refuse the log."""
-    timing, channels = found.survey.timing, [c for of_robot in found.survey.channels for c in of_robot]
+    """What a conversion has to do before, or an estimate refuses the log."""
+    survey = found.survey
     return [
         what
         for what, needed in (
-            ("time that runs back to be mended", any(t.backwards for t in timing)),
-            ("infinite values to be left out (convert --drop)", any(c.infinities for c in channels)),
+            ("time that runs back to be mended", any(t.backwards for t in survey.timing)),
             (
-                "the parts between gaps to be taken (convert --split-at-gaps)",
-                any(t.rate_hz is not None and t.longest_gap_s > MAX_GAP_S + 1 / t.rate_hz for t in timing),
+                "missing values to be filled in (convert)",
+                any(c.nans for of_robot in survey.channels for c in of_robot),
             ),
+            ("the parts between gaps to be taken (convert --split-at-gaps)", any(map(_gap, survey.whole))),
         )
         if needed
     ]
+
+
+def _gap(t: Timing) -> bool:
+    """Whether samples are missing for too long to be filled in."""
+    return t.rate_hz is not None and t.longest_gap_s > MAX_GAP_S + 1 / t.rate_hz
 
 
 def _ready(found: Inspection) -> str:
@@ -205,6 +215,11 @@ def _ready(found: Inspection) -> str:
     if any(stands.mostly for stands in standing):
         names = listed([stands.channel for stands in standing if stands.mostly][:_HIDDEN])
         return f"ready for: nothing ({names} stand{'s' * (names.count('omnid') == 1)} still)"
+    for robot, t in enumerate(found.survey.whole):
+        if t.missing > MOST_MISSING * (t.samples + t.missing) and not _gap(t):
+            return (
+                f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
+            )
     out = ""
     if standing:
         worst = max(standing, key=lambda stands: stands.seconds)
@@ -212,18 +227,18 @@ def _ready(found: Inspection) -> str:
         out = f"the {worst.seconds:.2g} s left out in which {who} still"
     if found.free or found.ready is None or found.wiring is None:
         good = "mocobot calibrate --free yes, an estimate no (the robots hold nothing)"
-        return f"ready for: nothing as it is; with {out}: {good}" if out else f"ready for: {good}"
+        return f"ready for: {_AS_IT_IS}{out}: {good}" if out else f"ready for: {good}"
     if found.ready_undone is not None:
         count = len(found.wiring.found)
         what = "the mistake above" if count == 1 else f"the {count} mistakes above"
         if found.wiring.undone.suspicious:
             return f"ready for: nothing (even with {what} undone, the robots do not carry one rigid payload)"
         undone = f"{what} undone{f' and {out}' if out else ''}"
-        return f"ready for: nothing as it is; with {undone}: {verdict(found.ready_undone)}{clocks}"
+        return f"ready for: {_AS_IT_IS}{undone}: {verdict(found.ready_undone)}{clocks}"
     if found.wiring.as_is.suspicious:
         return "ready for: nothing (the channels do not fit robots that carry one rigid payload)"
     if out:
-        return f"ready for: nothing as it is; with {out}: {verdict(found.ready)}{clocks}"
+        return f"ready for: {_AS_IT_IS}{out}: {verdict(found.ready)}{clocks}"
     return f"ready for: {verdict(found.ready)}{clocks}"
 
 

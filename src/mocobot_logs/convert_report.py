@@ -8,6 +8,7 @@ import numpy as np
 from estimator.clocks.offsets import ClockEstimate
 from mocobot_logs.convert import Converted
 from mocobot_logs.cut.split import Omission
+from mocobot_logs.readings import repeated
 from mocobot_logs.resample.report import StreamReport
 
 SURE = 4.0
@@ -79,6 +80,8 @@ def format_on_the_fly(converted: Converted, name: str) -> str:
     duration_s = (len(converted.recording.time) - 1) / metadata.rate_hz
     robots = f"{metadata.robots} robot{'s' * (metadata.robots > 1)}"
     text = f"{name}: read as {robots}, {converted.level} level, {duration_s:.2f} s"
+    if repeats := sum(stream.repeats for stream in streams):
+        text += f"; {repeated(repeats)}"
     if filled := sum(stream.filled for stream in streams):
         text += f"; {filled} missing samples filled in"
     if _differ(converted.clocks.estimate):
@@ -140,6 +143,8 @@ def _blank(streams: Sequence[StreamReport]) -> list[str]:
             rows = f"{stream.blank} row{'s' * (stream.blank > 1)} of robot {stream.robot}"
             which = ", ".join(f"{name} {count}" for name, count in stream.blank_channels.items())
             lines.append(f"    {rows} without all values (NaN: {which}) count as missing")
+        if stream.repeats:
+            lines.append(f"    robot {stream.robot}: {repeated(stream.repeats)}")
     return lines
 
 

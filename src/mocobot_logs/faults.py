@@ -2,10 +2,35 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.files import system_errors
+from estimator.inputs import open_input, printable
 
 LONGEST = 200
+readable = partial(system_errors, done="read")
+"""A block in which what the operating system refuses becomes one sentence: that a file cannot be read."""
+
+
+def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
+    """All of a file that describes something.
+
+    Args:
+        path: the file.
+        most_bytes: more are not read.
+        where: what messages call the file.
+        kind: what it should be, for the message.
+
+    Raises:
+        InputError: it is larger, or cannot be read.
+    """
+    with readable(where), open_input(path) as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise InputError(f"{where}: is larger than {most_bytes >> 20} MiB, which no {kind} is")
+    return content
 
 
 def detail_of(error: BaseException) -> str:
@@ -16,20 +41,7 @@ def detail_of(error: BaseException) -> str:
 
 def shown(text: str, longest: int = 60) -> str:
     """Text of a file as a terminal may show it."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:longest])[:longest]
-
-
-@contextmanager
-def readable(where: str) -> Iterator[None]:
-    """What the operating system refuses inside the block, as one sentence.
-
-    Raises:
-        InputError: a file cannot be read.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from error
+    return printable(text[:longest], keep="")[:longest]
 
 
 @contextmanager

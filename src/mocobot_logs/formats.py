@@ -6,6 +6,31 @@ from typing import Literal
 from estimator.errors import InputError
 from mocobot_logs.faults import detail_of
 
+OutputKind = Literal["parquet", "csv", "npz", "mcap", "sqlite3", "folder"]
+SUFFIXES: dict[str, OutputKind] = {
+    ".parquet": "parquet",
+    ".csv": "csv",
+    ".npz": "npz",
+    ".mcap": "mcap",
+    ".db3": "sqlite3",
+    "": "folder",
+}
+"""What is written, by the target's suffix; a bag's folder has none."""
+
+
+def output_kind(path: Path) -> OutputKind:
+    """What a target is to hold.
+
+    Raises:
+        InputError: nothing is written under such a name.
+    """
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is None or not path.name:
+        known = ", ".join(suffix for suffix in SUFFIXES if suffix)
+        raise InputError(f"{path}: the name must end in one of {known}, or have no suffix (a bag's folder)")
+    return kind
+
+
 Kind = Literal["bag", "csv", "npz", "parquet", "lerobot"]
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 FORMATS = (

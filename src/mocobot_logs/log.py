@@ -40,11 +40,18 @@ class Samples:
         stamp_ns: when the robot says it took them [ns], shape (q,).
         values: the source's channels [SI], NaN where a message lacked one, shape (q, C).
         log_ns: when the recorder wrote them [ns], shape (q,), or None where the format does not say.
+        repeats: rows after each that repeat it and are left out, shape (q,); none if not given.
     """
 
     stamp_ns: Stamps
     values: Array
     log_ns: Stamps | None = None
+    repeats: Stamps = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        """Without word of any, no row is left out."""
+        if self.repeats is None:
+            object.__setattr__(self, "repeats", np.zeros(len(self.stamp_ns), np.int64))
 
 
 class LogSource(Protocol):
@@ -121,10 +128,11 @@ def joined(parts: Sequence[Samples], channels: int) -> Samples:
         np.concatenate([part.stamp_ns for part in parts]),
         np.concatenate([part.values for part in parts]),
         np.concatenate(logs) if len(logs) == len(parts) else None,
+        np.concatenate([part.repeats for part in parts]),
     )
 
 
-def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp]) -> Samples:
+def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Samples:
     """Some of the rows, by a mask or by their numbers."""
     log_ns = None if samples.log_ns is None else samples.log_ns[keep]
-    return Samples(samples.stamp_ns[keep], samples.values[keep], log_ns)
+    return Samples(samples.stamp_ns[keep], samples.values[keep], log_ns, samples.repeats[keep])

@@ -12,6 +12,7 @@ from mocobot_logs.formats import Kind, log_kind
 from mocobot_logs.log import LogSource
 from mocobot_logs.map.files import CsvMap, LogMap, builtin_map
 from mocobot_logs.map.parse import MAX_ROBOTS
+from mocobot_logs.readings import Readings
 from mocobot_logs.table.csv import CsvTable
 from mocobot_logs.table.lerobot import LeRobotTable
 from mocobot_logs.table.npz import NpzTable
@@ -20,7 +21,7 @@ from mocobot_logs.table.table import Table, TableSource
 
 
 def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | None = None) -> LogSource:
-    """Open a log of any format.
+    """Open a log of any format; rows that repeat the one before are left out and counted.
 
     Args:
         path: a file or a folder.
@@ -30,7 +31,10 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
     Raises:
         InputError: there is no such log, its format is not known, or the map does not suit it.
     """
-    path = Path(path)
+    return Readings(_open(Path(path), log_map, episode))
+
+
+def _open(path: Path, log_map: LogMap | None, episode: int | None) -> LogSource:
     kind = log_kind(path)
     if episode is not None and kind != "lerobot":
         raise InputError(f"{path}: is not a LeRobot dataset, so it has no episode {episode}")

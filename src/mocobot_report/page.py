@@ -1,17 +1,26 @@
 """The report of a result folder: the answer, a part for every result, provenance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
-from estimator.files import check_target, whole_file
-from mocobot_report.blocks.book import Book
-from mocobot_report.blocks.html import el, to_bytes
+from plotly.offline import get_plotlyjs
+
+from estimator.files import add_written, check_target, file_facts, whole_file
+from mocobot_report.blocks import palette
+from mocobot_report.blocks.book import Book, section
+from mocobot_report.blocks.html import Node, data_block, el, raw, to_bytes, variables, words
+from mocobot_report.blocks.numbers import size
+from mocobot_report.blocks.prose import facts, folded, paragraph
+from mocobot_report.blocks.tables import Entry, Num, table
+from mocobot_report.blocks.theme import TEMPLATES
 from mocobot_report.calibration import part as calibration_part
 from mocobot_report.campaign import part as campaign_part
 from mocobot_report.diagnosis import part as diagnosis_part
-from mocobot_report.document import document
 from mocobot_report.estimate import part as estimate_part
 from mocobot_report.folder import (
     Calibrated,
@@ -25,8 +34,155 @@ from mocobot_report.folder import (
 )
 from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
-from mocobot_report.provenance_part import provenance_part
 from mocobot_report.sought import NAME, SUFFIX
+
+
+def provenance_part(book: Book, contents: Contents, results: Iterable[tuple[str, Any]]) -> list[Node]:
+    """One section per result, by its name and provenance, and the files that this page was made from."""
+    out = [section(book, f"How {name} was made", *_one(made)) for name, made in results]
+    return [*out, section(book, "What this page was made from", _read(contents))]
+
+
+def _one(made: Any) -> list[Node]:
+    if not isinstance(made, Mapping):
+        return [paragraph("The result does not say how it was made; it is of an older mocobot.")]
+    packages = made.get("packages")
+    versions = ", ".join(f"{k} {v}" for k, v in packages.items()) if isinstance(packages, Mapping) else ""
+    commit = str(made.get("commit") or "not from a checkout")
+    entries: list[tuple[str, Node | str]] = [
+        ("command", el("code", f"mocobot {made.get('command', '')}")),
+        ("mocobot", f"{made.get('mocobot', '')}"),
+        ("commit", el("code", commit)),
+        ("Python", f"{made.get('python', '')} on {made.get('platform', '')}"),
+        ("packages", versions),
+    ]
+    options = made.get("options")
+    if isinstance(options, Mapping):
+        entries += [(f"option {name}", el("code", _text(v))) for name, v in options.items()]
+    out = [facts(entries)]
+    for key, title in (("files", "Made from"), ("written", "Written")):
+        listed = made.get(key)
+        if isinstance(listed, list) and listed:
+            shown = _files(title, [entry for entry in listed if isinstance(entry, Mapping)])
+            out.append(shown if len(listed) <= 12 else folded(f"{title}: {len(listed)} files", shown))
+    return out
+
+
+def _text(option: Any) -> str:
+    if isinstance(option, bool):
+        return "yes" if option else "no"
+    if isinstance(option, list):
+        return " ".join(map(str, option)) or "none"
+    return "none" if option is None else str(option)
+
+
+def _files(caption: str, listed: Sequence[Mapping[str, Any]]) -> Node:
+    rows: list[list[Entry]] = []
+    for entry in listed:
+        count, digest = entry.get("bytes"), el("span", str(entry.get("sha256", "")), class_="hash")
+        name = el("code", str(entry.get("path", entry.get("name", ""))))
+        rows.append([name, Num(size(count) if isinstance(count, int) else ""), digest])
+    return table(caption, ["file", "size", "SHA-256"], rows, stack=True)
+
+
+def _read(contents: Contents) -> Node:
+    listed = [
+        file_facts(path) | {"path": path.relative_to(contents.folder).as_posix()} for path in contents.files
+    ]
+    return _files("Read from the folder", listed)
+
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
+    "form-action 'none'"
+)
+"""What the page may load: nothing but itself."""
+
+
+def document(title: str, main: list[Node]) -> Node:
+    """The whole page.
+
+    Args:
+        title: of the browser's window.
+        main: sections; the first is the answer, the others have a heading and sections of their own.
+    """
+    style, script = page_assets()
+    dark = f"color-scheme:dark;{variables(palette.DARK)}"
+    colours = (
+        f":root{{{variables(palette.LIGHT)}}}"
+        f"@media (prefers-color-scheme: dark){{:root:not([data-theme=light]){{{dark}}}}}"
+        f":root[data-theme=dark]{{{dark}}}"
+        f"@media print{{:root:root:root{{color-scheme:light;{variables(palette.LIGHT)}}}}}"
+    )
+    foot = f"Made by mocobot {_version()}. This file is complete: it loads nothing from anywhere."
+    return el(
+        "html",
+        el(
+            "head",
+            el("meta", charset="utf-8"),
+            el("meta", name="generator", content="mocobot report"),
+            el("title", f"{title} | mocobot report"),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", http_equiv="Content-Security-Policy", content=POLICY),
+            el("link", rel="icon", href="data:,"),
+            raw("style", colours + style),
+        ),
+        el(
+            "body",
+            el("a", "Skip to the results", href="#main", class_="skip"),
+            el(
+                "header",
+                el("div", "mocobot ", el("span", "report"), class_="brand"),
+                el("button", "Dark theme", type="button", id="theme"),
+                class_="top",
+            ),
+            el(
+                "div",
+                _navigation(main),
+                el(
+                    "main",
+                    el("noscript", el("p", "Plots need JavaScript; everything else on this page does not.")),
+                    *main,
+                    el("p", foot, class_="foot"),
+                    id="main",
+                    tabindex="-1",
+                ),
+                class_="frame",
+            ),
+            data_block("templates", {name: theme.to_plotly_json() for name, theme in TEMPLATES.items()}),
+            raw("script", get_plotlyjs()),
+            raw("script", script),
+        ),
+        lang="en",
+    )
+
+
+def page_assets() -> tuple[str, str]:
+    """Style sheet and script of the page."""
+    assets = files("mocobot_report").joinpath("assets")
+    style, script = (assets.joinpath(name).read_text(encoding="utf-8") for name in ("style.css", "page.js"))
+    return style, script
+
+
+def _navigation(main: list[Node]) -> Node:
+    """Links to every part and its sections."""
+    entries = [el("li", el("a", "Answer", href="#answer"))]
+    for part in main[1:]:
+        inner = [el("li", _link(child, child[0])) for child in part if child.tag == "section"]
+        entries.append(el("li", _link(part, part[0]), el("ol", *inner) if inner else None))
+    return el("nav", el("p", "Contents", class_="contents"), el("ol", *entries), aria_label="Contents")
+
+
+def _link(target: Node, heading: Node) -> Node:
+    return el("a", words(heading), href=f"#{target.get('id')}")
+
+
+def _version() -> str:
+    try:
+        return version("mocobot")
+    except PackageNotFoundError:
+        return "from source"
+
 
 Say = Callable[[str], object]
 
@@ -50,6 +206,8 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     check_target(out, SUFFIX)
     with whole_file(out) as temporary:
         temporary.write_bytes(make_page(contents, say))
+    if out.parent == folder:
+        add_written(out)
     return out
 
 

@@ -1,11 +1,11 @@
 """Recordings that a result was made from, if they are still where its provenance says and have not changed."""
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.inputs import file_sha256
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 
@@ -57,8 +57,7 @@ def _found(entry: dict[str, Any], folder: Path) -> Source:
     given = entry["path"]
     for path in (Path(given), folder / given, folder / name, folder.parent / name):
         try:
-            with path.open("rb") as file:
-                same = hashlib.file_digest(file, "sha256").hexdigest() == entry.get("sha256")
+            same = file_sha256(path) == entry.get("sha256")
         except (OSError, ValueError):  # a name with a NUL
             continue
         if same:

@@ -14,9 +14,7 @@ from estimator.errors import InputError
 from invented import named, result
 from mocobot.campaign.plan import CampaignPlan, CampaignSet
 from mocobot.campaign.plots import save_plots
-from mocobot.campaign.score import match
-from mocobot.campaign.shares import interval, reliability
-from mocobot.campaign.summary import summarise
+from mocobot.campaign.summary import interval, match, reliability, summarise
 from mocobot.campaign.text import COLUMNS, csv_table, format_campaign
 from mocobot_report.page import write_report
 

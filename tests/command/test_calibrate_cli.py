@@ -13,6 +13,7 @@ import pytest
 
 import mocobot
 from command import refused, run
+from estimator.files import LIST
 from estimator.recording.parquet import read_recording, write_recording
 from mocobot.cli import main
 from mocobot_sim.extended.extended import load_extended
@@ -54,8 +55,8 @@ def test_a_team_out_of_the_box_is_found(calibrated: Path, trials: list[Path]) ->
 
 def test_folder_holds_what_is_promised(calibrated: Path, trials: list[Path]) -> None:
     assert sorted(path.name for path in calibrated.iterdir()) == [
-        "calibration.json", "deviations.png", "model", "omnid1.toml", "omnid2.toml", "omnid3.toml", "recordings.png",
-        "report.txt", "shares.png",
+        LIST, "calibration.json", "deviations.png", "model", "omnid1.toml", "omnid2.toml", "omnid3.toml",
+        "recordings.png", "report.txt", "shares.png",
     ]  # fmt: skip
     values = json.loads((calibrated / "calibration.json").read_text(encoding="utf-8"))
     assert values["format"] == "mocobot-calibration"

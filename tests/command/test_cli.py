@@ -146,11 +146,10 @@ def test_torques_of_two_robots_exchanged_are_flagged(
 def test_no_motion_gives_no_number(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Every channel frozen at its first value: a hold, so the mass is known, and nothing else."""
+    """Every channel at its first value but for a little noise: a hold, so the mass is known, and nothing else."""
     still, out = tmp_path / "still.parquet", tmp_path / "est.json"
-    pq.write_table(
-        columns(PHI + THETA + TAU, lambda v: np.full_like(v, v[0]))(pq.read_table(recording)), still
-    )
+    hold = columns(PHI + THETA, lambda v: np.full_like(v, v[0]))(pq.read_table(recording))
+    pq.write_table(columns(TAU, lambda v: v[0] + 1e-6 * np.cos(np.arange(len(v))))(hold), still)
     code, text, _ = run(capsys, "estimate", str(still), "--out", str(out))
     estimate = json.loads(out.read_text())
     assert code == 0

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from command import refused
-from mocobot.checks.paper import PARTIAL, check
+from mocobot.checks import PARTIAL, check_paper
 from mocobot.options import Paper
 from mocobot_sim.paper import experiment
 from mocobot_sim.paper.experiment import PaperPlan, run_paper
@@ -114,10 +114,10 @@ def test_an_interrupted_run_goes_on_with_the_same_bits(
         run_paper(PLAN, store=Store(tmp_path, "key", force=False))
     kept = {path.name for path in (tmp_path / FOLDER / "key").iterdir()}
     assert kept == {
-        "random-trials-0.joblib",
-        "random-trials-1.joblib",
-        "grasps-0.joblib",
-        "other-trials-0.joblib",
+        "random-trials-0.npz",
+        "random-trials-1.npz",
+        "grasps-0.npz",
+        "other-trials-0.npz",
     }
     result = run_paper(PLAN, store=(store := Store(tmp_path, "key", force=False)))
     assert json.dumps(result.scores) == reference
@@ -140,16 +140,16 @@ def test_a_run_killed_while_it_writes_its_results_goes_on_without_force(tmp_path
     """A whole experiment, and somebody's folder of another kind, need more than that."""
     out = tmp_path / "out"
     Store(out, "key", force=False).put("stage", 0, 1.5)
-    check(Paper(out=out))
+    check_paper(Paper(out=out))
     (out / "paper.json").write_text("{}")
-    check(Paper(out=out))
+    check_paper(Paper(out=out))
     Store(out, "key", force=False).drop()
     with pytest.raises(experiment.InputError, match="is an earlier experiment; give --force"):
-        check(Paper(out=out))
+        check_paper(Paper(out=out))
     (out / PARTIAL).mkdir()
     (out / "paper.json").rename(out / "mine.json")
     with pytest.raises(experiment.InputError, match="exists and is not an earlier experiment"):
-        check(Paper(out=out))
+        check_paper(Paper(out=out))
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ import pytest
 
 from command import refused
 from mocobot.cli import COMMANDS
-from mocobot.config import with_config
-from mocobot.parsing import parse
+from mocobot.parsing import parse, with_config
 
 TOML = """
 [diagnose]

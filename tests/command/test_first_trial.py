@@ -14,7 +14,7 @@ import pytest
 
 from command import refused
 from diagnosed import small_diagnosis
-from estimator.files import write_json
+from estimator.files import list_written, write_json
 from estimator.recording.parquet import write_recording
 from log_files import write_text
 from mocobot_logs.bag.write import write_bag
@@ -57,7 +57,7 @@ SIMULATE = {
     "--payload ''": f"payload '' does not exist; {PAYLOADS}",
     "--payload None": f"payload 'None' does not exist; {PAYLOADS}",
     "--payload none.xml": "none.xml: not a readable MJCF (No such file or directory)",
-    "--payload half.xml": "half.xml: not a readable MJCF (Premature end of data ...)",
+    "--payload half.xml": "half.xml: not a readable MJCF or URDF, it is not well-formed XML (no element found: ...)",
     "--preset Nominal": f"preset 'Nominal' does not exist; {PRESETS}",
     "--trajectory circle": "--trajectory is 'circle'; it must be one of random, periodic, static, free",
     "--level tool": "--level is 'tool'; it must be one of joint, wrist",
@@ -282,6 +282,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (desk / "folder").mkdir()
     write_json(desk / "paper" / "paper.json", {})
     write_json(desk / "verdict" / "diagnosis.json", small_diagnosis())
+    list_written(desk / "verdict", "diagnosis")
     for name, text in {
         "my log.txt": "t,q\n0,1\n", "text.parquet": "time,phi\n", "half.xml": "<mujoco>", "data.mat": "MATLAB 5.0",
         "lone.truth.json": "{}", "empty.json": "", "empty.toml": "", "empty.parquet": "", "old.parquet": "mine",

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from estimator.errors import InputError
-from estimator.files import check_target, make_folder, whole_file, whole_folder, write_text
+from estimator.files import LIST, check_target, holds, make_folder, whole_file, whole_folder, write_text
 from mocobot.files.targets import check_folder
 
 
 def test_a_folder_appears_when_all_is_written(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with whole_folder(out) as folder:
+    with whole_folder(out, "x") as folder:
         (folder / "a").write_text("1")
         assert not out.exists()
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -28,23 +32,26 @@ def test_an_earlier_one_is_replaced_or_kept(tmp_path: Path) -> None:
     (out / "old").write_text("old")
 
     def half() -> None:
-        with whole_folder(out) as folder:
+        with whole_folder(out, "x") as folder:
             (folder / "new").write_text("new")
             raise ValueError("stop")
 
     with pytest.raises(ValueError, match="stop"):
         half()
     assert [path.name for path in out.iterdir()] == ["old"]
-    with whole_folder(out) as folder:
+    with whole_folder(out, "x") as folder:
         (folder / "new").write_text("new")
-    assert [path.name for path in out.iterdir()] == ["new"]
+    assert sorted(path.name for path in out.iterdir()) == [LIST, "new", "old"], "nobody listed the old one"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    with whole_folder(out, "x") as folder:
+        (folder / "newer").write_text("newer")
+    assert sorted(path.name for path in out.iterdir()) == [LIST, "newer", "old"]
 
 
 def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "real")
-    with whole_folder(tmp_path / "link") as folder:
+    with whole_folder(tmp_path / "link", "x") as folder:
         (folder / "a").write_text("1")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real" / "a").exists()
@@ -62,7 +69,7 @@ def test_what_cannot_be_put_in_place_is_one_sentence(tmp_path: Path, monkeypatch
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", full)
-    with pytest.raises(InputError, match=r"out: cannot be written .No space left"), whole_folder(out):
+    with pytest.raises(InputError, match=r"out: cannot be written .No space left"), whole_folder(out, "x"):
         pass
     assert [path.name for path in out.iterdir()] == ["old"]
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
@@ -86,7 +93,7 @@ def test_inputs_inside_the_folder_are_not_lost(tmp_path: Path) -> None:
 def test_missing_folders_are_made_and_do_not_outlive_a_failure(tmp_path: Path) -> None:
     """For files as for folders; what was there before stays."""
     (tmp_path / "there").mkdir()
-    for whole in (whole_file, whole_folder):
+    for whole in (whole_file, partial(whole_folder, kind="x")):
         target = tmp_path / "there" / "a" / "b" / "out"
 
         def half(whole=whole, target=target) -> None:
@@ -99,7 +106,7 @@ def test_missing_folders_are_made_and_do_not_outlive_a_failure(tmp_path: Path) -
         with whole(target) as temporary:
             (temporary / "in" if temporary.is_dir() else temporary).write_text("1")
         assert [path.name for path in target.parent.iterdir()] == ["out"]
-        (target / "in" if target.is_dir() else target).unlink()
+        [path.unlink() for path in ([*target.iterdir()] if target.is_dir() else [target])]
         shutil.rmtree(tmp_path / "there" / "a")
 
 
@@ -138,7 +145,7 @@ def test_a_file_that_cannot_be_written_is_named_by_its_place(tmp_path: Path) -> 
     """Nobody knows the name of the folder that stands in for it until all is there."""
 
     def write() -> None:
-        with whole_folder(tmp_path / "out") as folder:
+        with whole_folder(tmp_path / "out", "x") as folder:
             (folder / "a.txt").mkdir()
             write_text(folder / "a.txt", "words")
 
@@ -152,9 +159,61 @@ def test_a_full_disk_is_one_sentence_whoever_writes(tmp_path: Path) -> None:
     """Libraries that draw pictures raise errors of the system."""
 
     def write() -> None:
-        with whole_folder(tmp_path / "out"), open("/dev/full", "w") as full:
+        with whole_folder(tmp_path / "out", "x"), open("/dev/full", "w") as full:
             full.write("words")
 
     with pytest.raises(InputError, match=r"out: cannot be written \(No space left on device\)"):
         write()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_somebody_put_into_the_folder_is_kept(tmp_path: Path) -> None:
+    """Before the run it stops it; during the run it moves into the new folder, under another name if it has to."""
+    out = tmp_path / "out"
+    with whole_folder(out, "x") as folder:
+        (folder / "deep").mkdir()
+        for name in ("same", "edited", "deep/gone"):
+            (folder / name).write_text("ours")
+    with whole_folder(out, "x") as folder:
+        (folder / "same").write_text("new")
+        (folder / "edited").write_text("new")
+        (out / "edited").write_text("mine")
+        (out / "deep" / "notes.txt").write_text("mine")
+        (out / "empty").mkdir()
+        (out / "link").symlink_to(tmp_path)
+    found = {str(path.relative_to(out)): path for path in out.rglob("*")}
+    assert found.keys() == {LIST, "same", "edited", "edited.kept", "deep", "deep/notes.txt", "empty", "link"}
+    assert [found[name].read_text() for name in ("same", "edited", "edited.kept")] == ["new", "new", "mine"]
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    with pytest.raises(InputError, match=r"notes\.txt: was not written by mocobot, or changed since"):
+        check_folder(out, [], holds("x"), "an x", force=True)
+    with pytest.raises(InputError, match="exists and is not a y"):
+        check_folder(out, [], holds("y"), "a y", force=True)
+
+
+def test_a_file_that_appears_during_the_run_is_kept(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    check_target(out)
+    out.write_text("mine")  # while the work is done
+    write_text(out, "result")
+    assert (out.read_text(), (tmp_path / "out.json.kept").read_text()) == ("result", "mine")
+    check_target(out)
+    write_text(out, "again")
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_the_next_run_removes_what_a_dead_one_left(tmp_path: Path) -> None:
+    code = (
+        "import os, sys, pathlib; from estimator.processes import scratch_name\n"
+        "name = scratch_name(pathlib.Path(sys.argv[1])); name.mkdir(); (name / 'a').touch(); print(name)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, tmp_path], capture_output=True, text=True, check=True)
+    dead = Path(done.stdout.strip())
+    alive = dead.with_name(re.sub(r"-\d+-(?=\w+\.tmp$)", f"-{os.getppid()}-", dead.name))
+    other = dead.with_name(re.sub(r"^\.mocobot-[^-]*", ".mocobot-elsewhere", dead.name))
+    theirs = tmp_path / ".thesis.tmp"
+    for path in (alive, other, theirs):
+        path.mkdir()
+    assert len({dead, alive, other, theirs}) == 4
+    write_text(tmp_path / "out", "result")
+    assert set(tmp_path.iterdir()) == {alive, other, theirs, tmp_path / "out"}

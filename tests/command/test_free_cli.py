@@ -15,7 +15,7 @@ from estimator.recording.parquet import read_recording, write_recording
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import replay_trial
-from mocobot_view.replay.summary import summary
+from mocobot_view.replay.stream import summary
 
 READY = "mocobot calibrate --free yes, an estimate no (the robots hold nothing)"
 
@@ -37,7 +37,7 @@ def test_simulate_writes_the_same_as_from_python(
     assert "s of free motion, uncalibrated sensors" in said
     assert out.read_bytes() == free.read_bytes()
     truth = json.loads(out.with_suffix(".truth.json").read_text())
-    assert set(truth) == {"as_built", "effects"}
+    assert set(truth) == {"as_built", "effects", "control"}
     carrying = mocobot.simulate(vias=1, preset="uncalibrated", seed=3).truth.to_dict()
     assert truth["as_built"] == carrying["as_built"][:2], "one seed is one team"
 

@@ -96,7 +96,7 @@ def test_replay_writes_bodies_and_series(tmp_path, capsys, log) -> None:
 REFUSED = {
     "no map": (["diagnose", "{log}", "--model", "{model}"], "no map was given (--map)", ["log.toml"]),
     "no model": (["diagnose", "{log}", "--model", "{folder}/none.xml"], "none.xml: there is no such file", []),
-    "log as model": (["diagnose", "{log}", "--model", "{log}"], "MuJoCo cannot read it", []),
+    "log as model": (["diagnose", "{log}", "--model", "{log}"], "not a readable MJCF or URDF", []),
     "no log": (["diagnose", "{folder}/none.csv", "--model", "{model}"], "none.csv: there is no such file", []),
     "log twice": (["diagnose", "{log}", "{log}", "--model", "{model}"], "is given twice, and would count twice", []),
     "log as its reference": (

@@ -10,6 +10,7 @@ import pytest
 
 import mocobot
 from command import refused, run
+from estimator.files import LIST
 from mocobot_sim.effects.catalogue import EFFECTS
 from mocobot_sim.effects.spec import allowed
 
@@ -36,7 +37,7 @@ def mocobot_main(arguments: list[object]) -> None:
 def test_every_trial_has_its_file_and_its_truth(folder: Path) -> None:
     names = ["trial1_random", "trial2_random", "trial3_periodic"]
     assert sorted(p.name for p in folder.iterdir()) == sorted(
-        f"{name}.{end}" for name in names for end in ("parquet", "truth.json")
+        [LIST, *(f"{name}.{end}" for name in names for end in ("parquet", "truth.json"))]
     )
     truths = [(folder / f"{name}.truth.json").read_bytes() for name in names]
     assert truths == truths[:1] * 3, "not one team"

@@ -12,7 +12,7 @@ import pytest
 
 from command import refused, run
 from mocobot.cli import COMMANDS
-from mocobot.options.simulation import Kind
+from mocobot.options import Kind
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = {"numpy", "scipy", "pyarrow", "mujoco", "dm_control", "numba", "matplotlib", "plotly", "joblib"}
@@ -115,6 +115,28 @@ def test_effects_are_known_without_the_simulator() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+THREADS = """
+import ctypes, sys
+import numpy.linalg._umath_linalg, scipy.linalg._fblas
+for module in (numpy.linalg._umath_linalg, scipy.linalg._fblas):
+    library = ctypes.CDLL(module.__file__)
+    names = [f"{maker}openblas_get_num_threads{bits}" for maker in ("scipy_", "") for bits in ("64_", "")]
+    found = [getattr(library, name)() for name in names if hasattr(library, name)]
+    print(module.__name__, *found)
+"""
+
+
+@pytest.mark.parametrize("first", ["mocobot", "numpy, mocobot", "numpy, scipy.special, mocobot"])
+def test_matrices_have_one_thread_whatever_is_imported_first(first: str) -> None:
+    """Of two that the environment asks for: results must not depend on how many there are."""
+    done = subprocess.run(
+        [sys.executable, "-c", f"import {first}\n{THREADS}"],
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "2"}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    found = dict(line.split() for line in done.stdout.splitlines())
+    assert found == {"numpy.linalg._umath_linalg": "1", "scipy.linalg._fblas": "1"}
 
 
 def test_kinds_of_trials_are_those_of_recordings() -> None:

@@ -11,14 +11,14 @@ import pytest
 from source_tree import SRC, module_files
 
 CEILINGS = {
-    "estimator": 6_800,
-    "mocobot_logs": 6_700,
-    "mocobot_inspect": 3_310,
-    "mocobot_sim": 6_450,
-    "discrepancy": 17_210,
-    "mocobot_view": 2_260,
-    "mocobot_report": 3_630,
-    "mocobot": 5_020,
+    "estimator": 7_060,
+    "mocobot_logs": 6_630,
+    "mocobot_inspect": 3_410,
+    "mocobot_sim": 6_640,
+    "discrepancy": 18_440,  # two engines until the small one (evidence, joints) takes the other's place
+    "mocobot_view": 2_200,
+    "mocobot_report": 3_530,
+    "mocobot": 4_860,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700
@@ -56,7 +56,7 @@ LONG_CALLS = {
     "mocobot_logs.joints.even._finish": 8,
     "mocobot_report.blocks.charts.chart": 8,
     "mocobot_report.diagnosis.evidence._rows_chart": 11,
-    "mocobot_report.diagnosis.residuals._physical": 8,
+    "mocobot_report.diagnosis.evidence._physical": 8,
     "mocobot_sim.base.drive_kernel.update_drives": 15,
     "mocobot_sim.control.control.__init__": 10,
     "mocobot_sim.control.kernel.update_team": 9,

@@ -1,10 +1,13 @@
-"""An installed wheel carries the models and the paper's tables, and works away from the repository."""
+"""An installed wheel carries the models and the paper's tables, works away from the repository, and the source archive
+builds the same one."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -13,11 +16,52 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
+def build(target: str, root: Path, out: Path) -> Path:
+    """Build without network: hatchling is asked directly."""
+    command = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(out)]
+    subprocess.run(command, cwd=root, check=True, capture_output=True)
+    (built,) = out.iterdir()
+    return built
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build("wheel", ROOT, tmp_path_factory.mktemp("wheel"))
+
+
+def contents(wheel: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_the_source_archive_builds_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+    with tarfile.open(build("sdist", ROOT, tmp_path / "sdist")) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (unpacked,) = tmp_path.glob("mocobot-*")
+    expected, found = contents(wheel), contents(build("wheel", unpacked, tmp_path / "wheel"))
+    assert sorted(found) == sorted(expected)
+    assert [name for name in expected if found[name] != expected[name]] == []
+    for name in ("LICENSE", "CITATION.cff", "CONTRIBUTING.md", "Makefile", "constraints.txt"):
+        assert (unpacked / name).is_file()
+
+
+def test_the_wheel_says_its_license(wheel: Path) -> None:
+    files = contents(wheel)
+    (metadata,) = (files[name].decode() for name in files if name.endswith(".dist-info/METADATA"))
+    (terms,) = (files[name].decode() for name in files if name.endswith(".dist-info/licenses/LICENSE"))
+    assert "License-Expression: Apache-2.0" in metadata.splitlines()
+    assert terms.split()[:4] == ["Apache", "License", "Version", "2.0,"]
+
+
+def test_the_citation_is_of_this_version() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    for name in ("version", "license"):
+        assert f"{name}: {project[name]}" in lines
+
+
 @pytest.mark.slow
-def test_wheel_simulates_on_its_own(tmp_path: Path) -> None:
-    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(tmp_path)]
-    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
-    (wheel,) = tmp_path.glob("*.whl")
+def test_wheel_simulates_on_its_own(wheel: Path, tmp_path: Path) -> None:
     site = tmp_path / "site"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(site)
@@ -27,7 +71,7 @@ def test_wheel_simulates_on_its_own(tmp_path: Path) -> None:
         "import mocobot.cli, mocobot.commands.diagnose, mocobot_sim.scene.models as m;"
         "import mocobot_sim.paper.published as t;"
         "print(m.models_dir());"
-        "import mocobot_report.document as r; r.page_assets();"
+        "import mocobot_report.page as r; r.page_assets();"
         "import mocobot_logs.map.files as l; [l.builtin_map(name) for name in l.MAPS];"
         "t.payload_truth('a'); mocobot.cli.main(['simulate', '--vias', '1', '--out', 'rec.parquet'])"
     )

@@ -200,6 +200,7 @@ def test_a_broken_log_is_reported_and_not_refused(
             "start_s": pytest.approx(9.0),
             "duration_s": pytest.approx(1.0, abs=0.02),
             "value": value,
+            "jumps": True,
         }
     ]
     last = out.splitlines()[-1]

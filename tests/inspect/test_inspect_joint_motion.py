@@ -67,7 +67,9 @@ def test_shares_and_delays() -> None:
     assert [percent(x) for x in (0.0, 0.00123, 0.0449, 0.994, 0.996, 1.0, 12.34)] == [
         "0", "0.12", "4.5", "99", "100", "100", "1234"
     ]  # fmt: skip
-    assert [later(x) for x in (0.0123, -0.0031)] == ["12.3 ms later", "3.1 ms earlier"]
+    assert [later(*x) for x in ((0.0123, 0.00021), (-0.0031, 0.0012), (np.nan, 0.1))] == [
+        "12.30 +- 0.21 ms later", "3.1 +- 1.2 ms earlier", "by a delay that noise hides",
+    ]  # fmt: skip
 
 
 def test_a_slide_in_millimetres_may_be_the_mistake_behind_a_force(tmp_path) -> None:

@@ -131,11 +131,11 @@ COLUMNS = {
     ),
     "filtered velocity": (
         lambda v: v.update({"elbow dq": np.roll(v["elbow dq"], 5)}),
-        r"dq of elbow is (19\.\d|20|20\.\d) ms later than its position: it is filtered",
+        r"dq of elbow is (19\.\d+|20\.\d+) \+- 0\.\d+ ms later than its position: it is filtered",
     ),
     "late torques": (
         lambda v: v.update({f"{j} torque": np.roll(v[f"{j} torque"], 10) for j in JOINTS}),
-        r"torques run (3\d|4\d)(\.\d)? ms behind the motion: .* left unexplained without that delay, .* with it",
+        r"torques run (3\d|4\d)\.\d+ \+- \d\.\d+ ms behind the motion: .* left unexplained without .*, .* with it",
     ),
     "coarse": (
         lambda v: v.update({"elbow q": 0.05 * np.round(v["elbow q"] / 0.05)}),

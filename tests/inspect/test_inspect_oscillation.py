@@ -10,7 +10,7 @@ from array_log import ArrayLog, stream
 from mocobot_inspect.findings import findings
 from mocobot_inspect.inspection import inspect_log
 from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.stream.oscillation import Oscillation, joined, oscillation
+from mocobot_inspect.stream.channels import Oscillation, joined, oscillation
 from omnid_design import DESIGN
 
 RATE = 100.0

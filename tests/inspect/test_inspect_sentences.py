@@ -13,11 +13,9 @@ from array_log import ArrayLog, stream
 from estimator.clocks.offsets import ClockEstimate
 from estimator.estimate.identifiability import StepReport, WeakDirection
 from mocobot_inspect.findings import evidence, findings, of_stream, stands
-from mocobot_inspect.inspection import Inspection, inspect_log
+from mocobot_inspect.inspection import Inspection, Segments, inspect_log
 from mocobot_inspect.readiness import Readiness, idle_axes
-from mocobot_inspect.segments import Segments
-from mocobot_inspect.stream.channels import Channel, Stretch
-from mocobot_inspect.stream.oscillation import Oscillation, joined, oscillation
+from mocobot_inspect.stream.channels import Channel, Oscillation, Stretch, joined, oscillation
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.text import format_inspection, verdict
 from mocobot_inspect.wiring.check import Wiring

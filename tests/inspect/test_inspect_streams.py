@@ -9,12 +9,10 @@ import pytest
 
 from array_log import ArrayLog, stream
 from estimator.quantisation import quantisation_step
-from mocobot_inspect.excerpt import clean_stream, stretches
-from mocobot_inspect.inspection import inspect_log
+from mocobot_inspect.inspection import clean_stream, inspect_log, stretches
 from mocobot_inspect.json import inspection_dict
 from mocobot_inspect.stream import survey as survey_module
-from mocobot_inspect.stream.channels import Channel
-from mocobot_inspect.stream.frozen import frozen
+from mocobot_inspect.stream.channels import Channel, frozen
 from mocobot_inspect.stream.noise import noise_level
 from mocobot_inspect.stream.survey import Survey, survey
 from mocobot_inspect.text import format_inspection

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import command
+from estimator.errors import InputError
+from estimator.files import holds, list_written
 from report_folders import diagnosis_folder, estimate_folder, paper_folder
 
 
@@ -171,10 +173,15 @@ def test_nothing_of_others_is_overwritten(tmp_path: Path, capsys: pytest.Capture
     assert json.loads((folder / "diagnosis.json").read_text())["version"] == 2
 
 
-def test_page_lies_beside_what_it_is_of_when_diagnosed_again(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("no_renderer")
+def test_page_lies_beside_what_it_is_of_when_diagnosed_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A folder that also holds a report is still a diagnosis that may be replaced."""
-    from discrepancy.result.diagnosed import is_diagnosis
-
     folder = diagnosis_folder(tmp_path / "result")
-    (folder / "report.html").write_text("")
-    assert is_diagnosis(folder)
+    list_written(folder, "diagnosis")
+    assert run(capsys, folder)[0] == 0
+    assert holds("diagnosis")(folder)
+    (folder / "report.html").write_text("mine")
+    with pytest.raises(InputError, match=r"report\.html: was not written by mocobot, or changed since"):
+        holds("diagnosis")(folder)

@@ -8,7 +8,7 @@ from typing import Any
 from discrepancy.result.text_rollouts import rollout_lines
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
-from mocobot_report.diagnosis.rollouts import rollout_section
+from mocobot_report.diagnosis.evidence import rollout_section
 
 
 def words(node: Node | None) -> str:

@@ -12,7 +12,7 @@ from estimator.arm.unit import AT
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from mocobot_view.pictures.measured_team import measured_team
+from mocobot_view.pictures.shots import measured_team
 from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
 from uncalibrated_team import knowing, uncalibrated
 

@@ -22,9 +22,16 @@ from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.pictures import render as render_module
 from mocobot_view.pictures.camera import pixels
-from mocobot_view.pictures.measured_team import MeasuredTeam, measured_team
 from mocobot_view.pictures.render import Shot, render_shots
-from mocobot_view.pictures.shots import FOVY, axis_shot, diagnosis_shot, estimate_shot, team_shot
+from mocobot_view.pictures.shots import (
+    FOVY,
+    MeasuredTeam,
+    axis_shot,
+    diagnosis_shot,
+    estimate_shot,
+    measured_team,
+    team_shot,
+)
 from mocobot_view.pictures.views import diagnosis_view, emps_view, estimate_view, team_view
 from rendering import made
 from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate

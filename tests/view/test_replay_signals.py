@@ -20,8 +20,7 @@ from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts, facts_of
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.outputs import save_replay
-from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
-from mocobot_view.replay.signals import balance
+from mocobot_view.replay.replay_trial import ReplayTrial, balance, replay_trial
 from replay_case import Replayed
 
 

@@ -23,7 +23,7 @@ from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.blueprint import blueprint
 from mocobot_view.replay.outputs import save_replay
 from mocobot_view.replay.replay_trial import distinct_names, replay_trial
-from mocobot_view.replay.summary import summary
+from mocobot_view.replay.stream import summary
 from payload_mjcf import FIVE
 from recordings import metadata
 from replay_case import Replayed, true_estimate

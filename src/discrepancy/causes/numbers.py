@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.numbers import measured
+from estimator.statistics import measured
 
 
 def number(value: float, se: float | None, unit: str, scale: float = 1.0) -> str:

@@ -13,6 +13,7 @@ from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 from estimator.arrays import Array
+from estimator.processes import ends_with_this
 
 Active = list[tuple[Candidate, Array]]
 """Candidates and the values of their parameters."""
@@ -102,7 +103,7 @@ def responses(
                 others = list(trials)
             fit, healthy = fit_to_simulate(rig, problem, free, others, whole=whole)
             tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active, healthy))
-    run = Parallel(n_jobs=jobs, return_as="generator")
+    run = Parallel(n_jobs=jobs, return_as="generator", **ends_with_this())
     done = []
     for errors, task in zip(run(delayed(rig.simulation(*task))() for task in tasks), tasks, strict=True):
         done.append(None if errors is None else _response(errors, rig.response_scale(task[0])))

@@ -1,6 +1,5 @@
 """A finished diagnosis with all that is told, drawn and written of it."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,7 +9,7 @@ from typing import Any
 from discrepancy.causes.words import Words
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.read import AS_FOUND, EXTENDED, FORMAT, NAME
+from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
@@ -20,8 +19,7 @@ from estimator.errors import InputError
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 
-REPORT, PAGE = "report.txt", "report.html"
-PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png", "law.png")
+REPORT = "report.txt"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +82,3 @@ class Diagnosed:
             save_plots(values, residuals, self.rig.channels, self.words, folder)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self}\n")
-
-
-def is_diagnosis(folder: Path) -> bool:
-    """Whether a folder holds a diagnosis and nothing that someone else put there."""
-    try:
-        ours = json.loads((folder / NAME).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
-    known = [NAME, REPORT, RESIDUALS, EXTENDED, AS_FOUND, PAGE, *PLOTS]
-    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())

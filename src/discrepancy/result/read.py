@@ -105,7 +105,8 @@ def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
 
 def _cause(values: Mapping[str, Any]) -> NamedCause:
     name, robot, joint = str(values["cause"]), values["robot"], values["joint"]
-    for what, number, most in (("robot", robot, None), ("joint", joint, 3)):
+    most_joints = None if robot is None else 3  # only robots of a team are numbered; they are Deltas
+    for what, number, most in (("robot", robot, None), ("joint", joint, most_joints)):
         if number is not None and (type(number) is not int or number < 1 or (most and number > most)):
             raise ValueError(f"{what} is {number!r:.40}")
     return NamedCause(name, robot, joint, str(values["sentence"]), kind_of(values), name_of(values))

@@ -9,9 +9,6 @@ white_before<k>, white_after<k>   whitened residuals, shape (n, C)
 quantity<k>_<j>        quantity j of trial k, shape (n,)
 """
 
-import json
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -22,14 +19,13 @@ from numpy.typing import NDArray
 
 from discrepancy.result.traces import Trace
 from discrepancy.rig import Channel
+from estimator.archive import read_archive, words, write_archive
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.files import system_errors
 
 NAME = "residuals.npz"
 FORMAT, VERSION = "mocobot-residuals", 1
-BROKEN = (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, NotImplementedError, RuntimeError,
-          SyntaxError, MemoryError, OverflowError, zipfile.BadZipFile, zlib.error)  # fmt: skip
-"""What numpy and zipfile say of a file that is no archive of arrays."""
 TABLES = ("before", "after", "sigma", "white_before", "white_after")
 
 
@@ -53,17 +49,14 @@ def save_traces(traces: Sequence[Trace], channels: Sequence[Channel], path: Path
             for t in traces
         ],
     }
-    arrays: dict[str, NDArray[Any]] = {"facts": np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)}
+    arrays: dict[str, NDArray[Any]] = {}
     for k, trace in enumerate(traces):
         arrays[f"time{k}"] = np.asarray(trace.time, dtype=float)
         tables = {f"{name}{k}": getattr(trace, name) for name in TABLES}
         tables |= {f"quantity{k}_{j}": values for j, values in enumerate(trace.quantities.values())}
         arrays |= {name: np.asarray(values, dtype=np.float32) for name, values in tables.items()}
-    try:
-        with path.open("wb") as file:
-            np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with system_errors(path):
+        write_archive(path, facts, arrays, compress=True)
 
 
 def load_traces(path: Path) -> tuple[list[Trace], list[Channel]]:
@@ -72,34 +65,17 @@ def load_traces(path: Path) -> tuple[list[Trace], list[Channel]]:
     Raises:
         InputError: there is no such file, or it is not whole.
     """
+    facts, arrays = read_archive(path, "the residuals of a diagnosis")
     try:
-        with path.open("rb") as file:
-            archive = np.load(file, allow_pickle=False)
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise ValueError("it holds one array")
-            with archive:
-                arrays = {name: archive[name] for name in archive.files}
-    except FileNotFoundError as error:
-        raise InputError(
-            f"{path}: there is no such file; it would be the residuals of a diagnosis"
-        ) from error
-    except BROKEN as error:
-        raise InputError(f"{path}: not the residuals of a diagnosis, or damaged ({_words(error)})") from error
-    try:
-        facts = json.loads(arrays["facts"].tobytes())
         if facts["format"] != FORMAT or facts["version"] != VERSION:
             raise ValueError(f"it must have format {FORMAT!r} and version {VERSION}")
         channels = [_channel(entry) for entry in facts["channels"]]
         traces = [_trace(entry, k, len(channels), arrays) for k, entry in enumerate(facts["trials"])]
     except KeyError as error:
         raise InputError(f"{path}: not the residuals of a diagnosis; {error.args[0]!r} is missing") from error
-    except (TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path}: not the residuals of a diagnosis ({_words(error)})") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise InputError(f"{path}: not the residuals of a diagnosis ({words(error)})") from error
     return traces, channels
-
-
-def _words(error: Exception) -> str:
-    return " ".join(str(error).split())[:120] or type(error).__name__
 
 
 def _channel(entry: Mapping[str, Any]) -> Channel:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.faults import shown
+from mocobot_sim.model_check import check_model
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -55,6 +56,7 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; a model is an MJCF or URDF file")
+    check_model(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError, OSError) as error:
@@ -152,6 +154,8 @@ def _check(path: Path, model: mujoco.MjModel) -> None:
         name, word = model.joint(j).name, _OTHER.get(int(model.jnt_type[j]))
         if word is not None:
             raise InputError(f"{path}: joint {name or j + 1!r} is a {word} joint; {allowed}")
+        if not name.isprintable():
+            raise InputError(f"{path}: joint {name!r:.80} must have a printable name")
         if not name:
             body = model.body(model.jnt_bodyid[j]).name
             raise InputError(

@@ -33,6 +33,7 @@ from discrepancy.serial.serial_rows import SerialRows, shaped_key
 from discrepancy.serial.servo.motor import with_torques
 from discrepancy.serial.undecidable import general, look_alikes
 from estimator.arrays import Array
+from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import Effect, write_extended
 
@@ -277,10 +278,11 @@ class SerialRig(SerialRows, Rig):
         """Write the model with the named causes in it.
 
         Raises:
-            InputError: the folder cannot be written, or MuJoCo refuses the model.
+            InputError: the folder cannot be written, MuJoCo refuses the model, or files in it are not its own.
         """
         effects = [effect for found in explanation.found for effect in self.effects(found)]
         spec = load_spec(self.model.path)
+        check_named(self.model.path, assets=False)
         write_extended(spec, effects, folder, self.trials, reference=bool(self.common))
 
     def effects(self, found: Found) -> Sequence[Effect]:

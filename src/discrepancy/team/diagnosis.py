@@ -11,7 +11,7 @@ from discrepancy.inference.odds import check_odds
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.chattering import chattering
 from discrepancy.team.checks import check_estimate, check_recordings
-from discrepancy.team.estimates import errors, estimates
+from discrepancy.team.estimates import errors, estimates, seen_by
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
 from discrepancy.team.rig import TeamRig
@@ -19,6 +19,7 @@ from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
 from discrepancy.team.words import TeamWords
 from estimator.errors import InputError
+from estimator.estimate.frames import ENCODERS, in_encoder_frames
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 
@@ -81,6 +82,9 @@ def diagnose_team(
     assert isinstance(found.rig, TeamRig)
     payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
     loops = chattering([linear.signals for linear in found.rig.linear])
+    units = recordings[0].metadata.units
+    if units is not None and in_encoder_frames(units):
+        loops = (*loops, f"The payload's centre of mass and grasps are in {ENCODERS}.")
     found = replace(found, notes=(*found.notes, *choice.notes, *notes, *loops))
     return Diagnosed(found.rig, found, TeamWords(), own, payload)
 
@@ -94,7 +98,9 @@ def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:
     """
     known = dict(found.estimates or {})
     try:
+        assert isinstance(found.rig, TeamRig)
+        truth = seen_by(found.rig.recordings[0].metadata.units, truth)
         known["errors"] = {name: errors(known[name], truth) for name in ("before", "after")}
-    except (KeyError, TypeError, ValueError, IndexError):
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         return found
     return replace(found, estimates=known)

@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.team.rig import TeamRig
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
+from estimator.estimate.frames import in_encoder_frames, seen_by_encoders
 from estimator.estimate.principal import inertia_matrix
 from estimator.rigid_team.residual import Shared
 
@@ -69,6 +71,18 @@ def errors(estimate: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, f
         "grasp_rotation_deg": max(turns),
         "grasp_position_mm": max(places),
     }
+
+
+def seen_by(units: ArmUnit | None, truth: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A truth in the frames of an estimate with these robots; raises as ``errors``."""
+    if units is None or not in_encoder_frames(units) or not truth.get("as_built"):
+        return truth
+    zeros = np.array([_three(unit, "theta_zero_rad")[2] for unit in truth["as_built"]])
+    places, turns = ([_three(one, key) for one in truth["grasps"]] for key in ("p_1i_m", "R_1i_rotvec_deg"))
+    R = Rotation.from_rotvec(turns, degrees=True).as_matrix()
+    R, p, p_1c = seen_by_encoders(zeros, R, np.array(places), _three(truth, "p_1c_m"))
+    each = zip(p, Rotation.from_matrix(R).as_rotvec(degrees=True), strict=True)
+    return {**truth, "p_1c_m": p_1c, "grasps": [{"p_1i_m": p, "R_1i_rotvec_deg": turn} for p, turn in each]}
 
 
 def _apart_mm(a: Mapping[str, Any], b: Mapping[str, Any], key: str) -> float:

@@ -42,6 +42,7 @@ from estimator.arrays import Array
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
+from mocobot_sim.scene.pymjcf import why_not_composed
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ class TeamRig(LawfulRows):
         return None if effect is None else [effect]
 
     def can_resimulate(self) -> str | None:
-        return next(filter(None, map(why_not, self.recordings)), None)
+        return next(filter(None, map(why_not, self.recordings)), None) or why_not_composed()
 
     @property
     def resimulated(self) -> Sequence[int]:

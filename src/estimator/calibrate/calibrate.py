@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
+from estimator.calibrate import rules
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
 from estimator.calibrate.equations.alone import AloneEquations
 from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Resolution, Sensing
-from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, fit
-from estimator.calibrate.held_out import held_out
-from estimator.calibrate.left_out import Given
+from estimator.calibrate.left_out import Given, contradicting
 from estimator.calibrate.outcome.shares import shares
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.prior import MASSES, Prior
 from estimator.calibrate.problem import KnownMass, Trial
-from estimator.calibrate.undecided import undecided
+from estimator.calibrate.quadratic import Quadratic, solved
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial as Processed
@@ -32,8 +33,224 @@ from estimator.estimate.statics import CONTRADICTION
 from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared, robot_data
-from estimator.rigid_team.start import start_bases
+from estimator.rigid_team.residual import Bases, Shared, robot_data, start_bases
+
+_SENSORS = (
+    ("phi_zero", "the encoder of phi{entry}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
+    ("theta_zero", "the encoder of theta_{axis}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
+    ("tau_zero", "the torque zero of tau{entry}", "moved by {size:.2g} N m", 1.0),
+)
+
+
+class Change(NamedTuple):
+    """Something that may have been otherwise in one recording than in all others.
+
+    Attributes:
+        trial: which one, from 0.
+        what: in words.
+        drop: by which chi2 falls.
+        unknowns: how many it takes.
+    """
+
+    trial: int
+    what: str
+    drop: float
+    unknowns: int
+
+
+def findings(fit: Fit, given: Given, names: Sequence[str]) -> list[str]:
+    """Sentences on what no calibration explains; none on good recordings.
+
+    Args:
+        fit: the calibration.
+        given: what it was made from.
+        names: of the recordings with a payload.
+    """
+    odd = [k for k, trial in enumerate(fit.trials) if trial.loops.misfits or trial.balance.misfits]
+    if not odd:
+        return [] if fit.converged else [_unsettled(names)]
+    if fit.converged:  # elsewhere, derivatives say nothing of what would explain it
+        enough = [c for c in _changes(fit, names) if _worth(fit, c) > 0 and _suffices(fit, c)]
+        if enough:
+            # A slip of a last gimbal turns a grasp, too: of what is enough, the simplest.
+            best = min(enough, key=lambda change: (change.unknowns, -_worth(fit, change)))
+            rest = "the other recordings" if len(names) > 2 else "the other recording"
+            return [f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again."]
+    sentence = contradicting(given, names)
+    return [sentence or _unexplained(fit, odd, names)]
+
+
+def _unsettled(names: Sequence[str]) -> str:
+    return (
+        f"The calibration did not settle within {rules.MAX_STEPS} steps, so its numbers are not to be used: "
+        f"{', '.join(names)} leave too much open. Add a recording of another motion."
+    )
+
+
+def _unexplained(fit: Fit, odd: Sequence[int], names: Sequence[str]) -> str:
+    worst = max(odd, key=lambda k: fit.trials[k].all.c)
+    parts = []
+    for k in odd:
+        loops, balance = fit.trials[k].loops.ratio, fit.trials[k].balance.ratio
+        parts.append(f"{names[k]} ({loops:.3g} in its loops, {balance:.3g} in its balance)")
+    return (
+        f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, "
+        f"and {rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not "
+        "to be trusted before mocobot diagnose has named it."
+    )
+
+
+def _suffices(fit: Fit, change: Change) -> bool:
+    """Whether nothing would be left, or next to nothing of much: what is large is not quite linear."""
+    total, count = sum(trial.all.c for trial in fit.trials), sum(trial.all.count for trial in fit.trials)
+    left = total - change.drop
+    return left < rules.MISFIT * count or left - count < (1.0 - rules.SUFFICES) * (total - count)
+
+
+def _worth(fit: Fit, change: Change) -> float:
+    """Drop in chi2 beyond what as many free numbers buy (Schwarz)."""
+    return change.drop - change.unknowns * np.log(fit.trials[change.trial].all.count)
+
+
+def _changes(fit: Fit, names: Sequence[str]) -> list[Change]:
+    """Every sensor's zero, the payload and its grasps, each otherwise in one recording."""
+    if len(names) < 2:
+        return []
+    out = []
+    layout = fit.layout
+    for k, trial in enumerate(fit.trials):
+        for robot in range(layout.robots):
+            for group, sensor, moved, scale in _SENSORS:
+                for entry in range(3):
+                    place = robot * COUNT + AT[group].start + entry
+                    drop, size = _freed(fit, trial.all, np.array([place]))
+                    words = f"{sensor} of omnid{robot + 1} {moved}".format(
+                        entry=entry + 1, axis="zyx"[entry], size=abs(float(size[0])) * scale
+                    )
+                    out.append(Change(k, words, drop, 1))
+        own = trial.all.index[layout.of_units.stop : layout.of_units.stop + layout.per_payload]
+        grasps, inertia = own[:-10], own[-10:]
+        payload = [i for i, other in enumerate(fit.trials) if other.all.index[layout.of_units.stop] == own[0]]
+        if len(payload) > 1:
+            out.append(Change(k, "it looks like another payload", _freed(fit, trial.all, inertia)[0], 10))
+            drop = _freed(fit, trial.all, own)[0]
+            out.append(Change(k, "it looks like another payload, held elsewhere", drop, len(own)))
+            drop = _freed(fit, trial.all, grasps)[0]
+            out.append(Change(k, "the robots hold the payload elsewhere", drop, len(grasps)))
+    return out
+
+
+def _freed(fit: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float, Array]:
+    """Drop in chi2 if unknowns were others in one recording and the rest refitted, and by how much they would be."""
+    own = np.searchsorted(part.index, places)
+    H_ee, H_ex, g_e = part.H[np.ix_(own, own)], part.H[own], part.g[own]
+    C = fit.covariance[np.ix_(part.index, part.index)]
+    S = H_ee - H_ex @ C @ H_ex.T
+    scale = np.sqrt(np.maximum(np.diag(H_ee), 1e-300))
+    values, vectors = np.linalg.eigh(S / np.outer(scale, scale))
+    told = values > 1e-9
+    along = vectors[:, told].T @ (g_e / scale)
+    size = -(vectors[:, told] @ (along / values[told])) / scale
+    return float(np.sum(along**2 / values[told])), size
+
+
+def held_out(fit: Fit) -> list[tuple[float, float] | None]:
+    """chi2 per number of loops and balance of every trial with a payload; None where the others do not suffice.
+
+    The problem is linear near its solution, so leaving one trial out takes one solution of normal equations. The bases
+    stood elsewhere in every trial and are fitted to the trial itself.
+    """
+    out: list[tuple[float, float] | None] = []
+    layout = fit.layout
+    payload = [int(trial.all.index[layout.of_units.stop]) for trial in fit.trials]
+    for k, trial in enumerate(fit.trials):
+        own = np.r_[layout.of_trial(k)]
+        others = [t for i, t in enumerate(fit.trials) if i != k]
+        if payload.count(payload[k]) < 2:
+            out.append(None)
+            continue
+        H, g = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
+        for part in (*(t.all for t in others), *fit.alone, *fit.known):
+            part.add_to(H, g)
+        free = ~np.isin(np.arange(layout.size), own)
+        kept = fit.basis[free].any(axis=0)
+        columns, prior, z = fit.basis[:, kept], fit.prior[kept], fit.z[kept]
+        dz, _ = solved(columns.T @ H @ columns + np.diag(prior), columns.T @ g + prior * z)
+        dx = columns @ dz
+        at = np.flatnonzero(np.isin(trial.all.index, own))
+        score = trial.all.g + trial.all.H @ dx[trial.all.index]
+        if len(at):
+            dx[own] = solved(trial.all.H[np.ix_(at, at)], score[at])[0]
+        loops = trial.loops.at(dx) / max(1, trial.loops.count)
+        out.append((loops, trial.balance.at(dx) / trial.balance.count))
+    return out
+
+
+UNKNOWN_MASSES = 0.05
+"""Relative error of arm masses that is taken for granted where nobody has weighed them."""
+
+
+def undecided(
+    fit: Fit, prior: Prior, scale_sd: float, *, alone: bool, single: list[str], parallel: bool = False
+) -> list[str]:
+    """Sentences.
+
+    Args:
+        fit: the calibration.
+        prior: what was assumed.
+        scale_sd: standard deviation of the held common spring scale; 0 if it is not held.
+        alone: whether unloaded arms were recorded.
+        single: names of payloads with one recording.
+        parallel: whether the flanges are known to be parallel.
+    """
+    out = []
+    layout = fit.layout
+    masses = []
+    for k, shared in enumerate(fit.unknowns.carried):
+        place = layout.of_inertia(k).start
+        masses.append(np.sqrt(fit.covariance[place, place]) / shared.pi[0])
+    if scale_sd:
+        out.append(
+            "The common scale of all springs is held at its design value, for a carry tells it from the mass by the "
+            f"arms' own weight alone: all masses and inertias may be off together by {100 * scale_sd:.2g} % (one "
+            f"standard error). One weighed payload (--known-mass) brings that to {100 * min(masses):.1g} %."
+        )
+    if not parallel and prior.encoder_zero_rad:
+        reach = max(float(np.max(np.linalg.norm(s.grasps.p_1i, axis=1))) for s in fit.unknowns.carried)
+        degrees = np.rad2deg(prior.encoder_zero_rad)
+        out.append(
+            "The zeros of the last gimbal axes (theta_x) only turn the grasp frames, so frames are those that the "
+            f"encoders define. Frames drawn at the flanges may be turned against them by {degrees:.2g} deg about their "
+            "x axes (one standard error), which moves positions in {1} by up to "
+            f"{1e3 * reach * prior.encoder_zero_rad:.2g} mm. Flanges known to be parallel (--parallel-flanges), or an "
+            "index mark at each, decide them."
+        )
+    if not prior.arm_mass_ratio and not alone:
+        share = max(_by_masses(fit, k) for k in range(layout.payloads))
+        out.append(
+            "The arms' masses are taken as designed but for one common factor. Where each is known to "
+            f"{100 * UNKNOWN_MASSES:.0f} % only, a payload's mass is off by {100 * share:.2g} % besides (one standard "
+            "error): free them (--arm-masses), best with a recording of the unloaded arms (--free)."
+        )
+    for name in single:
+        out.append(
+            f"{name}: with one recording none can be left out, so nothing shows how well the calibration foretells "
+            "another; record a second motion of the same payload."
+        )
+    return out
+
+
+def _by_masses(fit: Fit, payload: int) -> float:
+    """Relative error of a payload's mass from errors of ``UNKNOWN_MASSES`` in every arm mass alone."""
+    layout = fit.layout
+    H = np.zeros((layout.size, layout.size))
+    g = np.zeros(layout.size)
+    for part in (*(trial.all for trial in fit.trials), *fit.alone, *fit.known):
+        part.add_to(H, g)
+    places = (np.arange(layout.robots)[:, None] * COUNT + MASSES).ravel()
+    at = layout.of_inertia(payload).start
+    by_mass = -(fit.covariance[at] @ H[:, places])
+    return float(UNKNOWN_MASSES * np.linalg.norm(by_mass) / fit.unknowns.carried[payload].pi[0])
 
 
 def calibrate(

@@ -12,13 +12,14 @@ from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.prior import Prior
+from estimator.estimate.frames import in_encoder_frames
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.rigid_team.residual import Bases
 
 
 @dataclass(frozen=True, eq=False)
 class CalibratedPayload:
-    """One payload, in the frames that the encoders define: each {i} turned about its x axis by that theta_x's zero.
+    """One payload, in the frames that ``Calibration.zero_sd_rad`` speaks of.
 
     Attributes:
         label: its name, or None.
@@ -104,6 +105,11 @@ class Calibration:
     def robots(self) -> int:
         """Number of robots N."""
         return len(self.units.x)
+
+    @property
+    def zero_sd_rad(self) -> float:
+        """Standard deviation of the theta_x zeros that the payloads' frames are off by; 0 in the drawing's frames."""
+        return self.prior.encoder_zero_rad if in_encoder_frames(self.units) else 0.0
 
     @cached_property
     def prior_sd(self) -> Array:

@@ -37,8 +37,10 @@ steps                      Gauss-Newton steps
 findings                   sentences: what to know before trusting the numbers
 open                       sentences: what these recordings do not decide, and what would
 
-All is in the frames that the encoders define: {i} turned about its x axis by the zero of that theta_x. Files add
-``provenance`` (``mocobot.files.provenance``); readers ignore it and any other key at the top.
+frames                     {defined_by, theta_x_zero_sd_deg}: "encoders", each {i} turned about its x axis by the zero
+                           of that theta_x, of which a standard deviation is assumed; or "drawing", and 0
+
+Files add ``provenance`` (``mocobot.files.provenance``); readers ignore it, ``frames`` and any other key at the top.
 """
 
 from __future__ import annotations
@@ -48,17 +50,195 @@ from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
 from estimator.arm.units_json import key_of
 from estimator.arrays import Array
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.payload_json import payload_from_dict, payload_to_dict
-from estimator.calibrate.outcome.trial_json import trial_from_dict, trial_to_dict
+from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
+from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.rigid_team.residual import Bases
 from estimator.strict import Fields
+
+
+def by_robot(
+    read: Fields, key: str, N: int, keys: tuple[str, ...], more: tuple[str, ...] = ()
+) -> list[Fields]:
+    """Entries for robots 2 to N, in order.
+
+    Args:
+        read: the object with the list.
+        key: of the list.
+        N: number of robots.
+        keys: of an entry, ``i`` among them.
+        more: keys that it may have besides.
+
+    Raises:
+        InputError: there are not so many, or one is of another robot.
+    """
+    out = []
+    for k, entry in enumerate(read.list(key, N - 1), 1):
+        one = Fields(entry, keys, f"{read.where}: {key}[{k}]", more)
+        if one.values["i"] != k + 1:
+            one.refuse("i", f"{k + 1}")
+        out.append(one)
+    return out
+
+
+PAYLOAD_KEYS = ("label", "grasps", "parameters", "covariance", "by_scale")
+DERIVED = (
+    "m_kg", "m_se_kg", "p_1c_m", "p_1c_se_m", "I_b_kgm2", "I_b_se_kgm2", "principal_kgm2", "principal_se_kgm2",
+)  # fmt: skip
+GRASP, PARAMETERS = ("i", "R_axis_angle_deg", "p_m"), ("m_kg", "mp_1c_kgm", "J_1_kgm2")
+
+
+def payload_to_dict(payload: CalibratedPayload, scale_sd: float) -> dict[str, Any]:
+    """Plain values of a payload; standard errors include that of a held spring scale."""
+    grasps, whole, about = grasps_of(payload, scale_sd), carried(payload, scale_sd), payload.parameters
+    pairs = [grasps.pair(1, j) for j in range(2, grasps.robots + 1)]
+    return {
+        "label": payload.label,
+        "grasps": [
+            {
+                "i": pair.j,
+                "R_axis_angle_deg": np.rad2deg(pair.axis_angle_rad).tolist(),
+                "R_se_deg": np.rad2deg(pair.axis_angle_se_rad).tolist(),
+                "p_m": pair.p_ij.tolist(),
+                "p_se_m": pair.p_se_m.tolist(),
+            }
+            for pair in pairs
+        ],
+        "m_kg": whole.mass_kg,
+        "m_se_kg": whole.mass_se_kg,
+        "p_1c_m": whole.p_1c.tolist(),
+        "p_1c_se_m": whole.p_1c_se_m.tolist(),
+        "I_b_kgm2": whole.inertia.tolist(),
+        "I_b_se_kgm2": whole.inertia_se.tolist(),
+        "principal_kgm2": whole.principal.moments.tolist(),
+        "principal_se_kgm2": whole.principal.moments_se.tolist(),
+        "parameters": {
+            "m_kg": float(about[0]),
+            "mp_1c_kgm": about[1:4].tolist(),
+            "J_1_kgm2": about[4:].tolist(),
+        },
+        "covariance": payload.covariance.tolist(),
+        "by_scale": payload.by_scale.tolist(),
+    }
+
+
+def payload_from_dict(entry: Any, N: int, where: str) -> CalibratedPayload:
+    """Inverse of ``payload_to_dict``, for N robots; ``where`` is how messages call it.
+
+    Raises:
+        InputError: something is missing or not allowed.
+    """
+    read = Fields(entry, PAYLOAD_KEYS, where, DERIVED)
+    label = None if read.values["label"] is None else read.words("label")
+    R, p, count = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3)), 6 * (N - 1)
+    for i, one in enumerate(by_robot(read, "grasps", N, GRASP, ("R_se_deg", "p_se_m")), 1):
+        R[i] = Rotation.from_rotvec(one.array("R_axis_angle_deg", (3,)), degrees=True).as_matrix()
+        p[i] = one.array("p_m", (3,))
+    inner = read.within("parameters", PARAMETERS)
+    parameters = np.concatenate(
+        [[inner.number("m_kg", above=0.0)], inner.array("mp_1c_kgm", (3,)), inner.array("J_1_kgm2", (6,))]
+    )
+    covariance = read.array("covariance", (count + 10, count + 10))
+    pairs, each = np.full((N, N), np.nan), np.full(N, np.nan)  # a calibration has no residuals of twists
+    grasps = GraspEstimate(R, p, covariance[:count, :count], pairs, pairs, each, each)
+    return CalibratedPayload(label, grasps, parameters, covariance, read.array("by_scale", (count + 10,)))
+
+
+TRIAL_KEYS = ("name", "kind", "payload", "duration_s", "count", "chi2_per_n", "bases")
+BASE, FITS, PAIR = ("i", "yaw_deg", "p_m"), ("before", "after", "held_out"), ("loops", "balance")
+SHARED = (*(group.name for group in GROUPS), "grasps", "inertial_parameters")
+KINDS = ("random", "periodic", "static", "free")
+
+
+def trial_to_dict(trial: CalibratedTrial) -> dict[str, Any]:
+    """Plain values of a trial."""
+    bases = trial.bases
+    return {
+        "name": trial.name,
+        "kind": trial.kind,
+        "payload": trial.payload,
+        "duration_s": float(trial.duration_s),
+        "count": dict(zip(PAIR, trial.count, strict=True)),
+        "chi2_per_n": {
+            "before": _fit(trial.before, trial.count),
+            "after": _fit(trial.after, trial.count),
+            "held_out": _fit(trial.held_out, trial.count),
+        },
+        "bases": bases
+        and [
+            {"i": i + 1, "yaw_deg": float(np.rad2deg(np.arctan2(R[1, 0], R[0, 0]))), "p_m": p.tolist()}
+            for i, (R, p) in enumerate(zip(bases.R, bases.p, strict=True))
+            if i
+        ],
+        "shares": {name: float(share) for name, share in trial.shares.items()},
+    }
+
+
+def _fit(pair: tuple[float, float] | None, count: tuple[int, int]) -> dict[str, float | None] | None:
+    if pair is None:
+        return None
+    return {name: float(v) if n else None for name, v, n in zip(PAIR, pair, count, strict=True)}
+
+
+def trial_from_dict(entry: Any, N: int, payloads: int, where: str) -> CalibratedTrial:
+    """Inverse of ``trial_to_dict``, for N robots and so many payloads; ``where`` is how messages call it.
+
+    Raises:
+        InputError: something is missing or not allowed.
+    """
+    read = Fields(entry, TRIAL_KEYS, where, ("shares",))
+    payload = None if read.values["payload"] is None else read.whole("payload", 0)
+    if payload is not None and payload >= payloads:
+        read.refuse("payload", f"the index, from 0, of one of {payloads} payloads")
+    count = read.within("count", PAIR)
+    fits = read.within("chi2_per_n", FITS)
+    after = _read_fit(fits, "after")
+    if after is None:
+        fits.refuse("after", "an object")
+    return CalibratedTrial(
+        name=read.words("name"),
+        kind=read.one_of("kind", KINDS),
+        payload=payload,
+        duration_s=read.number("duration_s", 0.0),
+        count=(count.whole("loops", 0), count.whole("balance", 0)),
+        before=_read_fit(fits, "before"),
+        after=after,
+        held_out=_read_fit(fits, "held_out"),
+        bases=None if read.values["bases"] is None else _read_bases(read, N),
+        shares=_read_shares(read),
+    )
+
+
+def _read_fit(fits: Fields, key: str) -> tuple[float, float] | None:
+    if fits.values[key] is None:
+        return None
+    inner = fits.within(key, PAIR)
+    loops, balance = (None if inner.values[name] is None else inner.number(name, 0.0) for name in PAIR)
+    return loops or 0.0, balance or 0.0
+
+
+def _read_shares(read: Fields) -> dict[str, float]:
+    if "shares" not in read:
+        return {}
+    inner = Fields(read.object("shares"), (), f"{read.where}: shares", SHARED)
+    return {name: inner.number(name, 0.0) for name in inner.values}
+
+
+def _read_bases(read: Fields, N: int) -> Bases:
+    R, p = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3))
+    for i, one in enumerate(by_robot(read, "bases", N, BASE), 1):
+        R[i] = Rotation.from_euler("z", one.number("yaw_deg"), degrees=True).as_matrix()
+        p[i] = one.array("p_m", (3,))
+    return Bases(R, p)
+
 
 FORMAT, VERSION = "mocobot-calibration", 1
 KEYS = (
@@ -99,6 +279,10 @@ def calibration_to_dict(calibration: Calibration) -> dict[str, Any]:
         "steps": int(calibration.steps),
         "findings": list(calibration.findings),
         "open": list(calibration.open),
+        "frames": {
+            "defined_by": "encoders" if calibration.zero_sd_rad else "drawing",
+            "theta_x_zero_sd_deg": float(np.rad2deg(calibration.zero_sd_rad)),
+        },
     }
 
 

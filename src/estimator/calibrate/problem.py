@@ -118,15 +118,19 @@ class Problem:
         """On every so-and-so-many-th row, ``rules.COARSE_ROWS`` in all; ``held`` as ``fit`` has it."""
         self.layout, self.basis, self.prior = layout, basis, information
         self._trials, self._alone, self._known = trials, alone, known_mass
-        self._spread, self._held = prior, held
+        self._held = held
+        # A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
+        # derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way. And
+        # where robots are held, motion may be so weak that those errors exceed what it shows of the inertia.
+        self._averaged = prior.arm_mass_ratio > 0.0 or not information.any()
         every = max(1, sum(len(trial.rows.time) for trial in trials) // rules.COARSE_ROWS)
         self.complete = every == 1
-        self._blocks = _blocks(trials, prior, every, held=held)
+        self._blocks = _blocks(trials, self._averaged, every, held=held)
 
     def on_all_rows(self, point: Point, dz: Array) -> Point:
         """A step, and every row from there on."""
         self.complete = True
-        self._blocks = _blocks(self._trials, self._spread, 1, held=self._held)
+        self._blocks = _blocks(self._trials, self._averaged, 1, held=self._held)
         return self.moved(point, dz)
 
     def at(self, unknowns: Unknowns, z: Array, *, split: bool = False) -> Point:
@@ -195,21 +199,19 @@ class _Block:
 
     def at(self, units: ArmUnit, shared: Shared, bases: Bases) -> Rowed:
         """The rows at some unknowns; what is found of them is kept."""
-        if self.averaged and self.curvature is None:
-            self.curvature = self.equations.curvature(units, shared, bases)
+        if self.averaged:
+            self.curvature = self.equations.curvature(units, shared, bases, self.curvature)
         rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature)
         self.adjustment = rowed.adjustment
         return rowed
 
 
-def _blocks(trials: Sequence[Trial], prior: Prior, every: int, *, held: bool) -> list[list[_Block]]:
-    """Rows of all trials.
-
-    A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
-    derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way.
-    """
-    averaged = every == 1 and prior.arm_mass_ratio > 0.0
-    return [[_Block(equations, averaged) for equations in trial.blocks(every, held=held)] for trial in trials]
+def _blocks(trials: Sequence[Trial], averaged: bool, every: int, *, held: bool) -> list[list[_Block]]:
+    """Rows of all trials; derivatives of the balance are ``averaged`` where every row counts."""
+    return [
+        [_Block(equations, averaged and every == 1) for equations in trial.blocks(every, held=held)]
+        for trial in trials
+    ]
 
 
 def _trial_fit(

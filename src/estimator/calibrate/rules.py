@@ -35,6 +35,10 @@ filter's passband ends at 0.18."""
 DITHER = 0.35
 """White noise, in steps, from which on rounding errors of neighbouring samples are independent. Derived: their
 correlation is exp(-4 pi^2 0.35^2), below one percent."""
+TO_AND_FRO, NOISE_TO_AND_FRO, LEAST_SLOW = 0.1, 1.77, 50
+"""Share of slow readings that go a step to and fro below which it tells the noise, in steps: sqrt(pi) times that share.
+Derived: a reading between two values takes one with chance p and the other with q, and the mean of p q over a step is
+sigma / sqrt(pi) where sigma is small; of 50 readings a noise of ``DITHER`` moves ten."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TORQUE_FLOOR_NM = 4e-6, 8e-7, 3e-4
 """What the model itself leaves in motion at 100 Hz beside any sensor: soft rods and welds shift a wrist by micrometres
 and hardly turn it. Measured on trials with ideal sensors and with encoders of 19 and 20 bits: loops of random trials
@@ -63,9 +67,9 @@ FLAT = 0.01
 robots than the rest's leave a valley whose floor falls by a thousandth a step."""
 COARSE = 0.5
 """Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
-CONVERGED = 0.005
-"""The same that ends all. Measured: at 0.02, signals were adjusted to unknowns a step back, and what held robots'
-errors do to the payload was foretold up to 5 % off; at 0.005 and at 0.00001 alike, 2.4 %."""
+CONVERGED = 0.001
+"""The same that ends all. Measured: at 0.02, signals were adjusted to unknowns a step back; at 0.002, what held robots'
+errors do to the payload was foretold up to 3.4 % off, at 0.001 and at 0.0001 less than 3 %."""
 MISFIT = 1.3
 """chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
 teams with nothing else wrong; what noise adds to it is 0.03."""

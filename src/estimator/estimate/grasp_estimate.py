@@ -131,6 +131,12 @@ class GraspEstimate:
             R[1:], p[1:] = Rotation.from_rotvec(x[:, :3]).as_matrix() @ R[1:], p[1:] + x[:, 3:]
         return replace(self, R_1i=R, p_1i=p)
 
+    def rounded(self, still_rad2: Array) -> GraspEstimate:
+        """The same with errors of every robot's tilt that last, of so much variance about every axis, shape (N,)."""
+        own = np.kron(still_rad2[1:], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        first = np.reshape([[np.eye(3), -so3.skew(p)] for p in self.p_1i[1:]], (-1, 3))
+        return replace(self, covariance=self.covariance + np.diag(own) + still_rad2[0] * first @ first.T)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain types; see ``estimator.estimate.result``."""
         return {

@@ -144,7 +144,7 @@ def judge(
         if value > limit:
             continue
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-        direction = f"{words} {_axis(vector)} of {frame}" if words else combination(vector, parameters)
+        direction = f"{words} {axis(vector)} of {frame}" if words else combination(vector, parameters)
         sentence = f"{reason} (signal {value:.2g} {unit}, noise {noise:.2g} {unit})"
         weak.append(WeakDirection(step, direction, tuple(float(x) for x in vector), sentence))
     return StepReport(
@@ -162,7 +162,8 @@ def cross_information(vectors: Array) -> Array:
     return np.trace(moment) * np.eye(3) - moment
 
 
-def _axis(vector: Array) -> str:
+def axis(vector: Array) -> str:
+    """A direction of space in words: an axis, or its components."""
     k = int(np.argmax(np.abs(vector)))
     if abs(vector[k]) > np.cos(np.deg2rad(10)):
         return "xyz"[k]

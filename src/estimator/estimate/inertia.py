@@ -16,7 +16,7 @@ from estimator import so3
 from estimator.arrays import Array
 from estimator.estimate.fusion import acceleration_noise, fuse, fusion_changes
 from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, WeakDirection, combination, judge
+from estimator.estimate.identifiability import StepReport, WeakDirection, axis, combination, judge
 from estimator.estimate.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
 from estimator.estimate.uncertainty import (
     WINDOW_S,
@@ -32,6 +32,7 @@ from estimator.statistics import rms
 PARAMETERS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 SE_LIMIT = 1 / 3
 """Largest standard error of a determined direction, relative to the payload's typical inertia."""
+UNCERTAIN = "its standard error is as large as a third of the inertia"
 _JACOBIAN_SAMPLES = 1000  # carrying the covariance of grasps and CoM forward needs no more
 
 
@@ -63,6 +64,10 @@ class InertiaEstimate:
         inertia, projected = project_positive(inertia_matrix(parameters))
         principal = principal_inertia(inertia, covariance)
         return cls(inertia, covariance, principal, projected, residual_rms, moment_rms)
+
+    def judged(self, report: StepReport) -> StepReport:
+        """The report with the directions added that are too uncertain for a body of this size."""
+        return refuse_uncertain(report, self.covariance, SE_LIMIT * float(np.trace(self.inertia)) / 3)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types; see ``estimator.estimate.result``."""
@@ -146,7 +151,7 @@ def estimate_inertia(
 
     covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
     moment_scale, alpha_scale = rms(y), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
-    report = refuse_uncertain(report, covariance, moment_scale / alpha_scale)
+    report = refuse_uncertain(report, covariance, SE_LIMIT * moment_scale / alpha_scale)
     if not report.determined:
         return None, report
 
@@ -180,18 +185,18 @@ def rotational_excitation(X: Array, alpha_noise: float, step: str) -> StepReport
 
 def refuse(report: StepReport, directions: Array, why: str) -> StepReport:
     """The report with the given directions (K, parameters) added as not determined."""
-    weak = tuple(
-        WeakDirection(report.step, combination(d, report.parameters), tuple(float(v) for v in d), why)
-        for d in directions
-    )
-    return replace(report, weak=report.weak + weak)
+    weak = []
+    for d in directions:
+        d = d * np.sign(d[np.argmax(np.abs(d))])
+        words = f"along {axis(d)} of {{1}}" if len(d) == 3 else combination(d, report.parameters)
+        weak.append(WeakDirection(report.step, words, tuple(float(v) for v in d), why))
+    return replace(report, weak=(*report.weak, *weak))
 
 
-def refuse_uncertain(report: StepReport, covariance: Array, typical: float) -> StepReport:
-    """The report with the directions added whose standard error is too large for a typical inertia [kg m^2]."""
+def refuse_uncertain(report: StepReport, covariance: Array, limit: float, why: str = UNCERTAIN) -> StepReport:
+    """The report with the directions added whose standard error is above a limit."""
     values, vectors = np.linalg.eigh(covariance)
-    uncertain = vectors[:, np.sqrt(np.maximum(values, 0.0)) > SE_LIMIT * typical]
-    return refuse(report, uncertain.T, "its standard error is as large as a third of the inertia")
+    return refuse(report, vectors[:, np.sqrt(np.maximum(values, 0.0)) > limit].T, why)
 
 
 def _equations(trial: GraspData, grasps: GraspEstimate, p_1c: Array) -> tuple[Array, Array]:

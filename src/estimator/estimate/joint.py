@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag, null_space
 
 from estimator import so3
 from estimator.arrays import Array
@@ -34,6 +33,11 @@ from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_
 from estimator.signals.grasp_data import GraspData
 from estimator.statistics import rms
 
+COM_SE_LIMIT_M = 0.3
+"""Largest standard error of a centre of mass that is reported [m]. Chosen: a third of what a payload measures."""
+_RANK = 1e-13  # share of the normal matrix below which a direction is rounding error
+_OPEN = 1e12  # variance of what the data do not show, in rms of regressors
+
 
 @dataclass(frozen=True)
 class JointEstimate:
@@ -41,13 +45,15 @@ class JointEstimate:
 
     Attributes:
         mass, com, inertia: as the staged scheme gives them; None where not determined.
-        covariance: of (m, p_1c, inertia parameters in {b}), shape (K, K) with K = 1, 4 or 10.
+        covariance: of (m, p_1c, inertia parameters in {b}), shape (K, K) with K = 1, 4 or 10 determined.
+        parameters: (m, m c, J about {1}), what is not determined among them, shape (10,).
     """
 
     mass: MassEstimate
     com: ComEstimate | None
     inertia: InertiaEstimate | None
     covariance: Array
+    parameters: Array
 
 
 def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) -> Array:
@@ -72,7 +78,7 @@ def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) ->
 def estimate_joint(
     trials: Sequence[GraspData], grasps: GraspEstimate, window_s: float = WINDOW_S, step: str = "inertia"
 ) -> tuple[JointEstimate, tuple[StepReport, ...]]:
-    """Ten inertial parameters from any motion; fewer when the motion is poor.
+    """Ten inertial parameters from any motion; fewer are reported when the motion is poor.
 
     Args:
         trials: one or several trials of the same payload and N >= 1 robots, holds included.
@@ -91,59 +97,62 @@ def estimate_joint(
     gravity = trials[0].gravity_mps2
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
     inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
-    # Directions without excitation leave the fit, the others of an open inertia stay: they explain moments.
-    turning = _excited(inertia_report)
-    basis = _blocks(np.eye(4), turning)
-    theta, weights = _weighted_solve(_spanned(Y, basis), w)
+    theta, weights = _weighted_solve(Y, w)
     check_lifted(theta[0])
-    residual = w - _spanned(Y, basis) @ theta
+    residual = w - Y @ theta
     force_rms, moment_rms = (rms(part) for part in (residual[:, :3], residual[:, 3:]))
     com_report = judge_com(
         cross_information(Y[:, :3, 0]) / gravity**2, moment_rms, theta[0] * gravity, _tilt_noise(trials, grasps),
         "the payload hardly tilts about any axis across it",
     )  # fmt: skip
-    if not com_report.determined:
-        basis = _blocks(np.eye(1), _excited(com_report), turning)
-        theta, weights = _weighted_solve(_spanned(Y, basis), w)
-        residual = w - _spanned(Y, basis) @ theta
-        if inertia_report.determined:
-            inertia_report = refuse(inertia_report, np.eye(6), "it needs the centre of mass")
-    # How many of (m, p_1c, inertia) are reported.
-    K = 1 if not com_report.determined else 4 if not inertia_report.determined else 10
-    Y_b = _spanned(Y, basis)
 
-    scale = np.sqrt(np.einsum("qrk,qrk->k", Y_b, Y_b) / used)
+    scale = np.sqrt(np.einsum("qrk,qrk->k", Y, Y) / used)
+    scale[scale == 0] = 1.0
     parts = trial_windows(trials, window_s)
-    J_weighted = weights[:, None] * Y_b
+    J_weighted = weights[:, None] * Y
     J_weighted /= scale  # in place: these arrays are the largest of an estimate
     normals, scores = window_normals(J_weighted, weights * residual, parts)
     del J_weighted
-    covariance = window_covariance(normals, scores) / np.outer(scale, scale)
+    covariance = _open_covariance(normals, scores) / np.outer(scale, scale)
 
     def moved(x: Array) -> Array:
         equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
-        return _centred(_solve(_spanned(equations[0], basis), equations[1], weights), K)
+        return _centred(_solve(equations[0], equations[1], weights))
 
+    # All ten stay in the fit, however weak: what is not reported is an uncertainty of what is.
     thin = thinned(trials)
-    J_own = numerical_jacobian(lambda x: _centred(x, K), theta)
+    J_own = numerical_jacobian(_centred, theta)
     J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
     own_covariance = J_own @ covariance @ J_own.T
     covariance = own_covariance + J @ grasps.covariance @ J.T
 
-    values = _centred(theta, K)
+    values = _centred(theta)
     mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), force_rms)
+    if com_report.determined:
+        why = "its part cannot be told from the inertia's"
+        com_report = refuse_uncertain(com_report, covariance[1:4, 1:4], COM_SE_LIMIT_M, why)
     com = inertia = None
-    if K >= 4:
+    if com_report.determined:
         com = ComEstimate(
             float(values[0]), values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], moment_rms
         )
-    if K == 10:
+    elif inertia_report.determined:
+        inertia_report = refuse(inertia_report, np.eye(6), "it needs the centre of mass")
+    if inertia_report.determined:
         explained = rms(Y[:, 3:, 4:] @ theta[4:])
         inertia = InertiaEstimate.of(values[4:], covariance[4:, 4:], moment_rms, explained)
-        typical = float(np.trace(inertia.inertia)) / 3
-        inertia_report = refuse_uncertain(inertia_report, inertia.covariance, typical)
+        inertia_report = inertia.judged(inertia_report)
         inertia = inertia if inertia_report.determined else None
-    return JointEstimate(mass, com, inertia, covariance), (com_report, inertia_report)
+    K = 1 if com is None else 4 if inertia is None else 10
+    return JointEstimate(mass, com, inertia, covariance[:K, :K], theta), (com_report, inertia_report)
+
+
+def _open_covariance(normals: Array, scores: Array) -> Array:
+    """``window_covariance`` that gives a great variance to directions that the data do not show at all."""
+    values, axes = np.linalg.eigh(normals.sum(axis=0))
+    told, open_ = axes[:, values > _RANK * values[-1]], axes[:, values <= _RANK * values[-1]]
+    open_ = np.where(np.abs(open_) > 1e-6, open_, 0.0)
+    return told @ window_covariance(told.T @ normals @ told, scores @ told) @ told.T + _OPEN * open_ @ open_.T
 
 
 def _equations(motions: Sequence[BodyMotion], trials: Sequence[GraspData]) -> tuple[Array, Array, int]:
@@ -158,23 +167,6 @@ def _equations(motions: Sequence[BodyMotion], trials: Sequence[GraspData]) -> tu
     return Y, w, len(w)
 
 
-def _excited(report: StepReport) -> Array:
-    """Orthonormal basis of the directions that are not weak, shape (parameters, directions)."""
-    if report.determined:
-        return np.eye(len(report.parameters))
-    return np.asarray(null_space(np.array([direction.vector for direction in report.weak])), dtype=float)
-
-
-def _spanned(Y: Array, basis: Array) -> Array:
-    """Y @ basis, without a copy where nothing is left out."""
-    complete = basis.shape[0] == basis.shape[1] and bool(np.all(basis == np.eye(len(basis))))
-    return Y if complete else Y @ basis
-
-
-def _blocks(*blocks: Array) -> Array:
-    return np.asarray(block_diag(*blocks), dtype=float)
-
-
 def _solve(Y: Array, w: Array, weights: Array) -> Array:
     """Least squares with weights (6,) of the rows."""
     A = (weights[:, None] * Y).reshape(-1, Y.shape[-1])
@@ -182,7 +174,7 @@ def _solve(Y: Array, w: Array, weights: Array) -> Array:
     scale[scale == 0] = 1.0
     normal = (A.T @ A) / np.outer(scale, scale)
     right = A.T @ (weights * w).ravel() / scale
-    return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-14)[0] / scale, dtype=float)
+    return np.asarray(np.linalg.lstsq(normal, right, rcond=_RANK)[0] / scale, dtype=float)
 
 
 def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
@@ -197,17 +189,12 @@ def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
     return _solve(Y, w, weights), weights
 
 
-def _centred(parameters: Array, count: int) -> Array:
-    """(m, m c, J about {1}, ...) -> the first 1, 4 or 10 of (m, c, inertia about c)."""
+def _centred(parameters: Array) -> Array:
+    """(m, m c, J about {1}) -> (m, c, inertia about c)."""
     m = parameters[0]
-    if count == 1:
-        return parameters[:1]
     c = parameters[1:4] / m
-    out = np.concatenate([[m], c])
-    if count == 4:
-        return out
     shift = m * (c @ c * np.eye(3) - np.outer(c, c))
-    return np.concatenate([out, parameters[4:] - inertia_parameters(shift)])
+    return np.concatenate([[m], c, parameters[4:] - inertia_parameters(shift)])
 
 
 def _tilt_noise(trials: Sequence[GraspData], grasps: GraspEstimate) -> float:

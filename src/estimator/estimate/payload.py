@@ -23,9 +23,14 @@ from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.identifiability import StepReport
 from estimator.estimate.inertia import InertiaEstimate, estimate_inertia
 from estimator.estimate.joint import estimate_joint
-from estimator.estimate.one_payload import check_one_payload, mass_alone
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
-from estimator.estimate.statics import CONTRADICTION, ComEstimate, estimate_from_holds
+from estimator.estimate.statics import (
+    CONTRADICTION,
+    ComEstimate,
+    MassEstimate,
+    estimate_from_holds,
+    rounding_kg,
+)
 from estimator.estimate.uncertainty import WINDOW_S
 from estimator.estimate.withheld import withheld
 from estimator.leftover.contradiction import contradiction
@@ -33,8 +38,52 @@ from estimator.leftover.leftover import left_over
 from estimator.leftover.steps import steps_of
 from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
+from estimator.signals.grasp_data import GraspData
 from estimator.signals.holds import Hold, find_holds
 from estimator.signals.process import process_recording
+
+MASS_TOLERANCE = 0.05
+"""Recordings whose masses differ by more than this share are not of one payload, if beyond ``MASS_SIGMAS`` as well.
+Chosen: no calibration error explains more."""
+MASS_SIGMAS = 6.0
+"""The same in sums of both standard errors. Chosen."""
+
+
+def mass_alone(
+    data: GraspData, holds: Sequence[Hold], grasps: GraspEstimate | None, window_s: float = WINDOW_S
+) -> MassEstimate | None:
+    """The mass by one recording alone, as ``estimate_payload`` has it; None where it does not tell.
+
+    Args:
+        data: the recording.
+        holds: its static holds.
+        grasps: grasp frames from this recording alone, or None where it does not determine them.
+        window_s: length of the windows for standard errors [s].
+    """
+    try:
+        mass, com, _ = estimate_from_holds(holds, grasps, data.gravity_mps2)
+        if com is None and grasps is not None:
+            return estimate_joint([data], grasps, window_s)[0].mass
+    except (InputError, FloatingPointError, np.linalg.LinAlgError):
+        return None
+    return mass
+
+
+def check_one_payload(masses: Iterable[tuple[str, MassEstimate | None]]) -> None:
+    """Compare what recordings say of the mass, each by its name.
+
+    Raises:
+        InputError: two of them differ by more than their errors and any calibration explain.
+    """
+    found = [(mass.mass, mass.se, name) for name, mass in masses if mass is not None]
+    if not found:
+        return
+    (low, low_se, light), (high, high_se, heavy) = min(found), max(found)
+    if high - low > max(MASS_TOLERANCE * high, MASS_SIGMAS * (low_se + high_se)):
+        raise InputError(
+            f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
+        )
+
 
 Method = Literal["auto", "staged", "joint"]
 
@@ -131,7 +180,7 @@ def estimate_from_trials(
     names = _distinct([trial.name for trial in trials])
     trials = [replace(trial, name=name) for trial, name in zip(trials, names, strict=True)]
     say("static holds")
-    holds = [find_holds(trial.data) for trial in trials]
+    holds = [_holds(trial) for trial in trials]
     records = [
         RecordingEstimate(t.name, t.kind, t.data.samples / t.data.rate_hz, len(h))
         for t, h in zip(trials, holds, strict=True)
@@ -161,7 +210,8 @@ def estimate_from_trials(
             raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
         say("mass, centre of mass and inertia")
         joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
-        mass, com, inertia = joint.mass, joint.com, joint.inertia
+        least = rounding_kg(every_hold, trials[0].data.gravity_mps2)
+        mass, com, inertia = replace(joint.mass, se=max(joint.mass.se, least)), joint.com, joint.inertia
         steps += joint_steps
     else:
         steps += [com_step] if com_step else []
@@ -210,6 +260,12 @@ def estimate_from_trials(
     return withheld(estimate, max(trial.team for trial in trials)) if withhold else estimate
 
 
+def _holds(trial: Trial) -> list[Hold]:
+    """Static holds, with what rounding leaves of their forces."""
+    holds = find_holds(trial.data)
+    return holds if trial.steps is None else [trial.steps.of_hold(hold) for hold in holds]
+
+
 def _units(trials: Sequence[Trial]) -> ArmUnit | None:
     """The robots as they are, if all recordings say the same of them."""
     first = trials[0].units
@@ -224,7 +280,7 @@ def _grasps(
 ) -> tuple[GraspEstimate | None, list[StepReport]]:
     """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
     for k, trial in enumerate(trials):
-        alone, steps = estimate_grasps([trial.data], window_s)
+        alone, steps = _grasps_of([trial], window_s)
         records[k] = replace(records[k], grasps=alone)
         if alone is not None:
             flags += check_rigid(trial.name, alone)
@@ -232,8 +288,17 @@ def _grasps(
             check_disagreement_is_noise(trial.name, steps)
     found = [(record.name, record.grasps) for record in records if record.grasps is not None]
     check_agreement([name for name, _ in found], [grasps for _, grasps in found])
-    pooled, steps = estimate_grasps([trial.data for trial in trials], window_s)
+    pooled, steps = _grasps_of(trials, window_s)
     return pooled, list(steps)
+
+
+def _grasps_of(
+    trials: Sequence[Trial], window_s: float
+) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
+    """Grasps, with what rounding leaves of joints that rest."""
+    grasps, reports = estimate_grasps([trial.data for trial in trials], window_s)
+    told = [trial.steps.still_rad2 / len(trials) ** 2 for trial in trials if trial.steps is not None]
+    return (grasps.rounded(np.sum(told, axis=0)) if grasps and told else grasps), reports
 
 
 def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[int]:

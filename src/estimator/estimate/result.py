@@ -32,6 +32,8 @@ recordings                 list of {name, trial, duration_s, holds, grasps, iner
 contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
 flags                      list of sentences
 open                       only where there are any: sentences on what the robots' calibration does not decide
+frames                     only where the encoders define the frames {i}, turned about x against a drawing's by the
+                           zeros of theta_x: {defined_by: "encoders", theta_x_zero_sd_deg}; no standard error has it in
 why_not_fit                only where one fit was wanted and could not be made: a sentence on why
 calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
 
@@ -131,8 +133,11 @@ class PayloadEstimate:
         recordings: per-recording results, in the order given.
         flags: what a reader should know before trusting the numbers, one sentence each.
         units: the robots as they were taken to be, or None for robots as designed.
-        open: what the robots' calibration does not decide, one sentence each; the standard errors have it in them.
+        open: what the robots' calibration does not decide, one sentence each; standard errors have no more of it in
+            them than the springs' common scale.
         why_not_fit: why it is another method, where one fit was wanted and could not be made; else empty.
+        zero_sd_rad: standard deviation of the zeros of theta_x, which turn the drawing's frames {i} about x against
+            those of the encoders, in which all numbers are then [rad]; 0 where numbers are in the drawing's frames.
     """
 
     payload: str | None
@@ -149,6 +154,7 @@ class PayloadEstimate:
     units: ArmUnit | None = None
     open: tuple[str, ...] = ()
     why_not_fit: str = ""
+    zero_sd_rad: float = 0.0
 
     @property
     def p_1c_se_m(self) -> Array | None:
@@ -187,6 +193,9 @@ class PayloadEstimate:
         more: dict[str, Any] = {} if self.units is None else {"calibrated": _calibrated(self.units)}
         if self.open:
             more["open"] = list(self.open)
+        if self.zero_sd_rad:
+            degrees = float(np.rad2deg(self.zero_sd_rad))
+            more["frames"] = {"defined_by": "encoders", "theta_x_zero_sd_deg": degrees}
         if self.why_not_fit:
             more["why_not_fit"] = self.why_not_fit
         return {
@@ -232,6 +241,8 @@ class PayloadEstimate:
                 units=_if_given(values.get("calibrated"), _units),
                 open=tuple(values.get("open", ())),
                 why_not_fit=str(values.get("why_not_fit", "")),
+                zero_sd_rad=_if_given(values.get("frames"), lambda f: np.deg2rad(f["theta_x_zero_sd_deg"]))
+                or 0.0,
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"not a complete estimate ({type(error).__name__}: {error})") from error

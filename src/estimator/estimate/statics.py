@@ -7,7 +7,8 @@ components across gravity are seen, hence two or more tilts.
 Errors of a hold: the noise of its mean, from batch means, and errors that differ from hold to hold but not
 within one (torque rounding, friction, geometry), a variance estimated from the residuals between holds and
 added to every hold: a random-effects model, scaled once for forces and once for moments. Its shape is that of
-equal, independent errors in every robot's force, so moments take it through the grasps' levers.
+equal, independent errors in every robot's force, so moments take it through the grasps' levers. It is no less than what
+rounding of the torques leaves of a mean (``Hold.rounding_N2``), which does not average out where noise is below a step.
 """
 
 from collections.abc import Sequence
@@ -81,7 +82,13 @@ def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
     residual = vertical - vertical.mean()
     between = _between(residual @ residual, len(holds) - 1, float(np.mean(within)))
     se = np.sqrt(np.mean(within) + between) / np.sqrt(len(holds)) / gravity_mps2
-    return MassEstimate(mass, float(se), rms(residual))
+    return MassEstimate(mass, max(float(se), rounding_kg(holds, gravity_mps2)), rms(residual))
+
+
+def rounding_kg(holds: Sequence[Hold], gravity_mps2: float) -> float:
+    """Standard error of the mass that rounding leaves of holds, 0 of none [kg]."""
+    variances = [hold.robots * hold.rounding_N2 for hold in holds]
+    return float(np.sqrt(sum(variances))) / max(1, len(holds)) / gravity_mps2
 
 
 def estimate_com(
@@ -120,7 +127,8 @@ def estimate_com(
     known = np.asarray(block_diag(*[S[1:, 1:] for S in within]), dtype=float)
     known += J_residual @ grasps.covariance @ J_residual.T
     shape = np.asarray(block_diag(*[S[1:, 1:] for S in shapes]), dtype=float)
-    between = np.sqrt(_excess_variance(residual.ravel(), A, known, shape))
+    rounding = float(np.mean([hold.rounding_N2 for hold in holds]))
+    between = np.sqrt(max(_excess_variance(residual.ravel(), A, known, shape), rounding))
     vertical_within = float(np.mean([S[0, 0] for S in within]))
     between_force = np.sqrt(max(0.0, (mass.se * gravity_mps2) ** 2 * H - vertical_within) / grasps.robots)
     scale = np.diag([between_force, between, between, between])

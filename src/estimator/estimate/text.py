@@ -5,11 +5,12 @@ from itertools import combinations
 
 import numpy as np
 
+from estimator.estimate.frames import frames_said
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import ORDER
 from estimator.estimate.result import PayloadEstimate
 from estimator.leftover.contradiction import beyond_noise
-from estimator.numbers import measured
+from estimator.statistics import measured
 
 _ZERO_SIGMAS = 2.0
 HOW = {"calibrated": "self-calibrated", "fit": "one-fit"}
@@ -26,6 +27,7 @@ def format_estimate(estimate: PayloadEstimate) -> str:
         f"{len(estimate.recordings)} recording{'s' * (len(estimate.recordings) > 1)}"
     ]
     lines += [f"    {estimate.why_not_fit}"] if estimate.why_not_fit else []
+    lines += [f"    {frames_said(estimate.zero_sd_rad)}"] if estimate.zero_sd_rad else []
     lines += _grasps(estimate)
     lines += ["[[Mass and centre of mass in {1}]]"]
     mass = estimate.mass

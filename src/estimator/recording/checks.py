@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from estimator.arm.delta import stretches
 from estimator.arrays import Array
-from estimator.errors import InputError
+from estimator.errors import InputError, RepeatedRowsError
 from estimator.filtering import MIN_SAMPLES, trim_slice
+from estimator.quantisation import Repeats
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 
@@ -16,11 +17,13 @@ SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so m
 TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike
 RATE_TOLERANCE = 1e-3  # of rate_hz: enters accelerations, and so inertia, twice
 
+MOST_REPEATED = 8
+"""Rows that may repeat the one before: so few change no estimate."""
 _MOST = 0.9  # of the rows: the few that a filter drew through a jump by a full turn lie anywhere
 
 
 def check_recording(recording: Recording) -> None:
-    """Check number of rows, finiteness, time axis, joint ranges, torques and leg geometry of a recording.
+    """Check number of rows, finiteness, time axis, repeats, joint ranges, torques and legs of a recording.
 
     Raises:
         InputError: names the recording, the column, the row (counted from 0), the value and what is allowed.
@@ -30,6 +33,7 @@ def check_recording(recording: Recording) -> None:
         raise InputError(f"{recording.name}: {rows} rows are too few; at least {MIN_SAMPLES} are needed")
     check_finite(recording.name, recording.columns())
     _check_time(recording)
+    _check_repeats(recording)
     design = recording.metadata.design
     _check_range(recording, ("phi1", "phi2", "phi3"), design.phi_min_rad, design.phi_max_rad)
     limit = design.gimbal_limit_rad
@@ -117,6 +121,18 @@ def _check_time(recording: Recording) -> None:
             f"{name}: samples come at {intervals / duration:.6g} Hz on average, but rate_hz is {rate_hz:g}; "
             f"they must agree within {100 * RATE_TOLERANCE:g} %"
         )
+
+
+def _check_repeats(recording: Recording) -> None:
+    """Rows that repeat the one before are one reading, and would count as many."""
+    for robot in range(recording.metadata.robots):
+        read = (recording.phi, recording.theta, recording.tau)
+        repeats = Repeats(range(6, 9)).of(np.concatenate([field[:, robot] for field in read], axis=1))
+        if repeats.sum() > MOST_REPEATED:
+            raise RepeatedRowsError(
+                f"{recording.name}: {repeats.sum()} of {len(repeats)} rows of omnid{robot + 1} repeat the one before, "
+                f"first row {np.argmax(repeats)}; a reading counts once (mocobot convert counts the others as missing)"
+            )
 
 
 def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, high: float) -> None:

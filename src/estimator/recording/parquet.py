@@ -13,9 +13,11 @@ from estimator.arm.wrist_level import joints_of, wrist_fault
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import whole_file
+from estimator.inputs import Unpacked
 from estimator.recording.checks import check_finite, check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import CHANNELS, Recording
+from estimator.recording.parquet_claims import claimed_bytes
 
 METADATA_KEY = b"mocobot"
 
@@ -62,6 +64,10 @@ def read_recording(path: Path | str) -> Recording:
             raise InputError(f"{path}: the file has no rows")
         for field in schema:
             _check_type(field, path)
+        claimed = claimed_bytes(path, schema.names, schema.names)
+        Unpacked(str(path), path.stat().st_size).add(
+            max(claimed, 8 * file.metadata.num_rows * len(schema.names))
+        )
         time, arrays = _read_columns(file, metadata)
     if metadata.level == "wrist":
         named = {

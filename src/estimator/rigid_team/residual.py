@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator import so3
 from estimator.arm.arms import Arms, levelled
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.gimbal import rotation
@@ -115,3 +116,20 @@ def grasp_data(s: Array, arms: Arms, rate_hz: float) -> GraspData:
     """Data points of all robots from true signals s, shape (Q, N, 21); time is not needed here."""
     R, h, twist, twist_dot, wrench = robot_data(s, arms)
     return GraspData(np.zeros(len(s)), R, h, twist, twist_dot, wrench, rate_hz, arms.gravity_mps2)
+
+
+def start_bases(R: Array, h: Array, shared: Shared) -> Bases:
+    """Bases of one trial, in which all robots agree on average about where the payload is.
+
+    Args:
+        R: orientations R_bi, shape (Q, N, 3, 3).
+        h: wrist positions in {b} [m], shape (Q, N, 3).
+        shared: how the payload is held.
+    """
+    turns, places = [np.eye(3)], [np.zeros(3)]
+    for i in range(1, h.shape[1]):
+        mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
+        yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
+        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
+        places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
+    return Bases(np.array(turns), np.array(places))

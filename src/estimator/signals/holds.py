@@ -34,7 +34,7 @@ _SIGMAS = 5.0
 _SLOW_SIGMAS = 4.0  # fewer independent values in a window, and drift should not hide
 _LAG_S = 0.1  # noise below 5 Hz has forgotten itself after this time
 _SMOOTH_S = 1.0
-_BATCH_S = 0.5
+BATCH_S = 0.5
 _MARGIN_S = 0.5
 
 
@@ -48,6 +48,7 @@ class Hold:
         wrench: mean wrench (m_i, f_i) in {i} [N m, N], shape (N, 6).
         batches: means of the wrench over consecutive half seconds, shape (batches, N, 6); their scatter is
             the measurement noise within the hold.
+        rounding_N2: variance of every component of a robot's mean force that rounding leaves [N^2].
     """
 
     start_s: float
@@ -55,6 +56,7 @@ class Hold:
     R_bi: Array
     wrench: Array
     batches: Array
+    rounding_N2: float = 0.0
 
     @property
     def robots(self) -> int:
@@ -115,7 +117,7 @@ def _hold(data: GraspData, first: int, last: int) -> Hold:
     margin = min(round(_MARGIN_S * data.rate_hz), (last - first) // 4)
     inside = slice(first + margin, last - margin)
     wrench = data.wrench[inside]
-    count = max(2, int(len(wrench) / (_BATCH_S * data.rate_hz)))
+    count = max(2, int(len(wrench) / (BATCH_S * data.rate_hz)))
     batches = np.array([part.mean(axis=0) for part in np.array_split(wrench, count)])
     R_bi = so3.chordal_mean(data.R_bi[inside])
     return Hold(float(data.time[first]), float(data.time[last - 1]), R_bi, wrench.mean(axis=0), batches)
@@ -126,7 +128,7 @@ def _noise_variance(force: Array, rate_hz: float, window: int) -> Array:
     lag = max(1, min(round(_LAG_S * rate_hz), (window - 1) // 2))
     second = force[2 * lag :] - 2 * force[lag:-lag] + force[: -2 * lag]
     length = window - 2 * lag
-    piece = min(length, max(1, round(_BATCH_S * rate_hz)))
+    piece = min(length, max(1, round(BATCH_S * rate_hz)))
     means = _window_mean(second**2, piece) / 6  # var(a - 2b + c) = 6 var
     starts = np.arange(0, length - piece + 1, piece)
     count = len(second) - length + 1

@@ -13,11 +13,10 @@ from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
 from estimator.calibrate.json import calibration_to_dict
 from estimator.calibrate.outcome.flanges import in_drawing_frames
-from estimator.calibrate.outcome.prior_file import read_prior
 from estimator.calibrate.outcome.text import format_calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.prior import Prior, read_prior
 from estimator.errors import InputError
-from estimator.files import whole_folder
+from estimator.files import holds, whole_folder
 from estimator.recording.model import Recording
 from mocobot.api.given import Given, recordings_of
 from mocobot.api.public import public
@@ -63,8 +62,8 @@ class Calibration(Below):
         Raises:
             InputError: the folder holds something else, or cannot be written.
         """
-        check_folder(Path(folder), [], calibrations.is_calibration, "an earlier calibration", force=True)
-        with whole_folder(Path(folder)) as whole:
+        check_folder(Path(folder), [], holds("calibration"), "an earlier calibration", force=True)
+        with whole_folder(Path(folder), "calibration") as whole:
             calibrations.write_into(whole, self)
 
 

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimator.files import whole_folder
+from estimator.files import holds, whole_folder
 from mocobot.api.public import public
 from mocobot.comparison import comparison as below
 from mocobot.comparison.compare import Written
 from mocobot.comparison.compare import compare as compare_below
-from mocobot.comparison.files import is_comparison, write_into
-from mocobot.comparison.text import format_comparison
+from mocobot.comparison.text import format_comparison, write_into
 from mocobot.files.targets import check_folder
 
 
@@ -35,8 +34,8 @@ class Comparison(below.Comparison):
         Raises:
             InputError: the folder holds something else, or cannot be written.
         """
-        check_folder(Path(folder), [], is_comparison, "an earlier comparison", force=True)
-        with whole_folder(Path(folder)) as whole:
+        check_folder(Path(folder), [], holds("comparison"), "an earlier comparison", force=True)
+        with whole_folder(Path(folder), "comparison") as whole:
             write_into(whole, self)
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.engine.diagnose import Verdict, When
-from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
+from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import read_tolerances
-from estimator.files import whole_folder
+from estimator.files import holds, whole_folder
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot.api.public import public
 from mocobot.files.targets import check_folder
@@ -76,8 +76,8 @@ class Diagnosis(Diagnosed):
         Raises:
             InputError: the folder holds something else, or cannot be written.
         """
-        check_folder(Path(folder), [], is_diagnosis, "an earlier diagnosis", force=True)
-        with whole_folder(Path(folder)) as whole:
+        check_folder(Path(folder), [], holds("diagnosis"), "an earlier diagnosis", force=True)
+        with whole_folder(Path(folder), "diagnosis") as whole:
             self.write_into(whole)
 
 

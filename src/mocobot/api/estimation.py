@@ -68,8 +68,8 @@ def estimate(
             carry from the same fit.
         method: ``"fit"``, one least squares of closed loops and balance of wrenches; ``"staged"``, the paper's
             sequence; ``"joint"``, its grasps and one least squares for the rest; ``"auto"``, the fit where the
-            recordings determine everything and noise is all that it leaves, else staged where static holds determine
-            the centre of mass, else joint (``why_not_fit`` says why). With a calibration, its robots are held.
+            recordings determine the centre of mass and noise is all that it leaves, else staged where static holds
+            determine it, else joint (``why_not_fit`` says why). With a calibration, its robots are held.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         say: takes the name of the stage that begins.
 

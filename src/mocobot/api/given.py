@@ -1,6 +1,7 @@
 """Recordings as a caller may give them: in memory, as files, or as logs that are converted when their turn comes."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import ArmUnit
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.apply import calibrated, units_for
-from estimator.errors import InputError
+from estimator.errors import InputError, RepeatedRowsError
 from estimator.recording.model import Recording
 from mocobot.files.calibrations import read_calibration
 from mocobot.files.recordings import read
@@ -17,6 +18,7 @@ from mocobot_logs.formats import log_kind
 from mocobot_logs.log import LogSource
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
+from mocobot_logs.resample.log import RATE_HZ
 from mocobot_logs.table.parquet import is_recording
 
 GivenCalibration = Calibration | Path | str
@@ -112,13 +114,16 @@ class Logs:
         Raises:
             InputError: the file cannot be read, or is not a plausible recording.
         """
-        if not _is_log(path):
-            return read(path)
+        is_log = _is_log(path)
+        with suppress(RepeatedRowsError):
+            if not is_log:
+                return read(path)
         from mocobot_sim.scene.models import omnid_design  # needs MuJoCo; a recording does not
 
-        source = open_log(path, self._map)
-        trial = None if self._map is None else self._map.trial
-        self.converted[path] = done = convert(source, Labels(trial=trial), omnid_design())
+        log_map = self._map if is_log else None
+        source, trial = open_log(path, log_map), None if log_map is None else log_map.trial
+        rate_hz = RATE_HZ if is_log or source.metadata is None else source.metadata.rate_hz
+        self.converted[path] = done = convert(source, Labels(trial=trial), omnid_design(), rate_hz=rate_hz)
         return done.recording
 
     def check_map(self) -> None:

@@ -7,12 +7,22 @@ from xml.etree import ElementTree
 from discrepancy.result.read import name_of
 from discrepancy.result.remains import remains, remedy
 from estimator.calibrate.calibration import Calibration
+from estimator.estimate.frames import frames_said
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain
-from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.prose import bullets, tidy
-from mocobot_report.blocks.tables import Entry, Num, measurement, quantity, table
+from mocobot_report.blocks.tables import (
+    Entry,
+    Num,
+    distance,
+    mass,
+    measurement,
+    moment,
+    place,
+    quantity,
+    table,
+)
 from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
 from mocobot_report.diagnosis.keys import cause_name, chance_of
 
@@ -34,6 +44,7 @@ def estimate_html(estimate: PayloadEstimate) -> str:
     title = f"Payload ({e.payload})" if e.payload is not None else "Payload"
     said = f"{len(e.recordings)} recording{'s' * (len(e.recordings) != 1)}, {e.method}; p in {{1}}"
     why = [e.why_not_fit] if e.why_not_fit else []
+    why += [f"Values are in {frames_said(e.zero_sd_rad)}."] if e.zero_sd_rad else []
     doubts = [*why, *e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]
     return _whole(
         table(title, ["", "value ± standard error", "unit"], rows, note=said),

@@ -6,9 +6,11 @@ from pathlib import Path
 
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
+from estimator.estimate.frames import seen_by_encoders
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import check_target
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
+from mocobot_sim.scene.as_built import theta_x_zeros
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
@@ -55,7 +57,7 @@ def replay(
     found = read_diagnosis(Path(diagnosis)) if diagnosis is not None else None
     each = list(recordings_of(recordings, robots=Robots(calibration)))
     names = distinct_names([Path(recording.name) for recording in each])
-    facts = None if truth is None else facts_of_truth(truth)
+    facts = None if truth is None else facts_of_truth(truth, estimate)
     trials = [
         replay_trial(recording, name, estimate, facts, found, payload)
         for recording, name in zip(each, names, strict=True)
@@ -64,10 +66,13 @@ def replay(
     return [f"{trial.name}: {note}" for trial in trials for note in trial.notes]
 
 
-def facts_of_truth(truth: GroundTruth) -> BodyFacts:
-    """The drawable part of a truth."""
-    grasps = Grasps(truth.R_1i, truth.p_1i)
-    return BodyFacts(grasps, truth.mass_kg, truth.p_1c, truth.R_1c, truth.principal_kgm2)
+def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | None) -> BodyFacts:
+    """The drawable part of a truth, in the frames of an estimate, if there is one."""
+    parts = [truth.R_1i, truth.p_1i, truth.p_1c, truth.R_1c]
+    if estimate is not None and estimate.zero_sd_rad:
+        parts = seen_by_encoders(theta_x_zeros(truth.units, len(truth.p_1i)), *parts)
+    R, p, p_1c, R_1c = parts
+    return BodyFacts(Grasps(R, p), truth.mass_kg, p_1c, R_1c, truth.principal_kgm2)
 
 
 def check_rerun() -> None:

@@ -9,8 +9,8 @@ from estimator.errors import InputError
 from estimator.recording.metadata import FREE, Level
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot.api.fits import check_fits
 from mocobot.api.public import public
+from mocobot.checks import check_fits
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import load_extended

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from estimator.files import whole_file
 from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.campaign.words import background_words
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 COLOURS = {"calibrated": LIGHT["after"], "uncalibrated": LIGHT["before"], "units": LIGHT["after"]}
 APART = 1.03
@@ -21,6 +22,7 @@ MARKERS = {"calibrated": "o", "uncalibrated": "s", "units": "o"}
 Json = Mapping[str, Any]
 
 
+@plain_words()
 def save_plots(summary: Json, folder: Path) -> list[Path]:
     """Draw what there is something to draw of, and say where.
 
@@ -74,6 +76,7 @@ def _limits(axis: Axes, summary: Json) -> None:
     for background in backgrounds:
         axis.plot([], [], MARKERS[background], color=COLOURS[background], label=background_words(background))
     axis.set_xscale("log")
+    plain_numbers(axis.xaxis)
     axis.set_yticks(range(len(rows)), [f"{cause} {name}" for cause, name in rows], fontsize=8)
     axis.set_ylim(len(rows) - 0.5, -0.5)
     axis.set_xlabel("detection limit, in the parameter's unit: median and range over teams and places")
@@ -93,6 +96,7 @@ def _found(axis: Axes, summary: Json) -> None:
         )  # fmt: skip
     sizes = sorted({entry["factor"] for entry in summary["found"]})
     axis.set_xscale("log")
+    plain_numbers(axis.xaxis)
     axis.set_xticks(sizes, [f"{size:g}" for size in sizes])
     axis.minorticks_off()
     axis.set_ylim(-3.0, 103.0)

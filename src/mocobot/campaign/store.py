@@ -5,7 +5,6 @@ sets/KEY.json      the result of a set (``campaign.run``); it appears whole or n
 """
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -42,7 +41,12 @@ class CampaignStore:
                 raise InputError(
                     f"{out}: holds a campaign with {what}; give --force to drop it, or name a new folder"
                 )
-            shutil.rmtree(out / SETS, ignore_errors=True)
+            for result in (out / SETS).glob("*.json"):
+                if (
+                    read_json(result, "the result of a campaign's set").get("set", {}).get("key")
+                    == result.stem
+                ):
+                    result.unlink()
             file.unlink()
         make_folder(out / SETS)
         if not file.is_file():

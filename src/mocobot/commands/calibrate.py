@@ -29,7 +29,10 @@ def run(options: Calibrate) -> None:
     labels, masses = _labels(options.payload_of, options.rec), _masses(options.known_mass)
     inputs = [*files, *([options.prior] if options.prior else []), *map_file(options.map)]
     logs, notes = Logs(options.map), []
-    with whole_folder(options.out) if options.out else nullcontext() as folder, stages() as (say, _):
+    with (
+        whole_folder(options.out, "calibration") if options.out else nullcontext() as folder,
+        stages() as (say, _),
+    ):
         read = []
         for path in files:
             say(f"reading {path.name}")

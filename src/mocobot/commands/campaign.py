@@ -17,7 +17,7 @@ from mocobot.campaign.run import run_campaign
 from mocobot.campaign.store import CampaignStore
 from mocobot.campaign.summary import summarise
 from mocobot.campaign.text import csv_table, format_campaign
-from mocobot.checks.campaign import inputs_of, kinds_of
+from mocobot.checks import campaign_kinds, inputs_of
 from mocobot.cluster import workers_of
 from mocobot.files.calibrations import read_calibration
 from mocobot.files.provenance import NAME, folder_provenance, provenance
@@ -80,7 +80,7 @@ def plan_of(options: Campaign) -> CampaignPlan:
             f"{options.units}: has {len(units)} robots; the payload {options.payload} is carried by {robots}"
         )
     return CampaignPlan(
-        payload=options.payload, trials=kinds_of(options), vias=options.vias, duration_s=options.duration,
+        payload=options.payload, trials=campaign_kinds(options), vias=options.vias, duration_s=options.duration,
         preset=options.preset, backgrounds=("units",) if units else options.background, units=units,
         calibration=None if options.calibration is None else read_calibration(options.calibration),
         tolerances=read_tolerances(options.tolerances), exclude=options.exclude, closed_loop=options.closed_loop,

@@ -5,8 +5,7 @@ from dataclasses import asdict
 
 from estimator.files import whole_folder
 from mocobot.api.comparison import compare
-from mocobot.comparison.files import write_into
-from mocobot.comparison.text import what_changed
+from mocobot.comparison.text import what_changed, write_into
 from mocobot.files.provenance import provenance
 from mocobot.options import Compare
 from mocobot.strict import NotGood
@@ -20,7 +19,7 @@ def run(options: Compare) -> None:
         NotGood: with ``strict``, something changed.
     """
     found = compare(options.a, options.b)
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
+    with whole_folder(options.out, "comparison") if options.out else nullcontext() as folder:
         if folder is not None:
             inputs = [path for path in (options.a, options.b) if path.is_file()]
             write_into(folder, found, provenance("compare", asdict(options), inputs))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from estimator.arm.design import load_design
 from estimator.files import write_json
-from mocobot.checks.convert import check_target, targets
+from mocobot.checks import check_target, targets
 from mocobot.options import Convert
 from mocobot.progress import bar
 from mocobot_logs.convert import Converted, Labels, convert, convert_parts, write_converted

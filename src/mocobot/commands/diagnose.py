@@ -1,6 +1,5 @@
 """``mocobot diagnose``: read recordings, find out what the simulation gets wrong, report and write it."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass
@@ -14,9 +13,12 @@ from discrepancy.emps.recording.reader import read_emps
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import default_tolerances
+from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
+from estimator.strict import read_json
 from mocobot.api.given import Logs, Robots
+from mocobot.checks import TRUTH
 from mocobot.cluster import workers_of
 from mocobot.commands import diagnose_joints
 from mocobot.files.provenance import file_facts, provenance
@@ -52,7 +54,7 @@ def run(options: Diagnose) -> None:
     inputs += calibration_file(options.calibration)
     logs, robots = Logs(options.map), Robots(options.calibration)
     tolerances = read_tolerances(options.tolerances, rig.tolerances())
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
+    with whole_folder(options.out, "diagnosis") if options.out else nullcontext() as folder:
         data = rig.read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with workers_of(options.scheduler), stages() as (say, simulated):
@@ -95,9 +97,9 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
     found = []
     for path in paths:
         try:
-            values = json.loads(truth_path(path).read_text(encoding="utf-8"))
-            found.append({key: values[key] for key in keys})
-        except (OSError, ValueError, KeyError, TypeError):
+            values = read_json(truth_path(path), TRUTH)
+            found.append({key: values[key] for key in keys} | {"as_built": values.get("as_built")})
+        except (InputError, KeyError):
             return None
     return found[0] if all(values == found[0] for values in found) else None
 

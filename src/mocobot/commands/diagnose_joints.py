@@ -30,7 +30,7 @@ def run(options: Diagnose, model: Path) -> None:
     inputs = [model, *sorted(maps), *options.rec, *options.reference]
     inputs += [options.tolerances] if options.tolerances else []
     tolerances = serial.serial_tolerances(options.tolerances)
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
+    with whole_folder(options.out, "diagnosis") if options.out else nullcontext() as folder:
         with bar(len(options.rec) + len(options.reference), "reading", "file") as advance:
             logs = serial.read_logs(options.rec, robot, map=options.map, advance=advance)
             reference = serial.read_logs(options.reference, robot, map=options.map, advance=advance)

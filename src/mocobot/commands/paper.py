@@ -8,7 +8,7 @@ from estimator.calibrate.json import calibration_to_dict
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
-from mocobot.checks.paper import SCORES
+from mocobot.checks import SCORES
 from mocobot.cluster import workers_of
 from mocobot.files.provenance import NAME, folder_provenance, provenance
 from mocobot.files.resume import run_key
@@ -54,12 +54,14 @@ def run(options: Paper) -> None:
 
 def _summary(result: PaperResult) -> str:
     trials = result.trials
+    damping = min((t.damping_ratio for t in trials if t.damping_ratio is not None), default=0.0)
     return (
         f"{len(trials)} trials: payload rotation at most {max(t.rotation_deg for t in trials):.1f} deg, "
         f"SEA torque {max(t.torque_Nm for t in trials):.1f} N m, "
         f"rod error {1e3 * max(t.rod_error_m for t in trials):.4f} mm, "
         f"weld error {1e3 * max(t.weld_error_m for t in trials):.4f} mm "
-        f"and {max(t.weld_error_deg for t in trials):.5f} deg."
+        f"and {max(t.weld_error_deg for t in trials):.5f} deg; control "
+        f"{'stable' if damping > 0 else 'UNSTABLE'} (damping ratio at least {damping:.2g})."
     )
 
 

@@ -75,7 +75,7 @@ def _trials(options: Replay) -> list[ReplayTrial]:
         for path, name in zip(options.rec, distinct_names(options.rec), strict=True):
             recording = robots.of(read(path))
             held = recording.metadata.trial != FREE
-            truth = read_truth(path, recording.metadata.robots) if options.truth and held else None
+            truth = read_truth(path, recording.metadata.robots, estimate) if options.truth and held else None
             trials.append(
                 replay_trial(recording, name, estimate, truth, diagnosis, _payload(options.payload))
             )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from estimator.files import whole_folder
 from mocobot.api.simulation import SimulatedRecording, simulate_trials
-from mocobot.checks.simulate import kinds_of
+from mocobot.checks import simulate_kinds
 from mocobot.options import Simulate
 from mocobot.progress import share_bar
 from mocobot_sim.effects.spec import parse_effect
@@ -19,7 +19,7 @@ def run(options: Simulate) -> None:
         InputError: an option that cannot be met, or an output that cannot be written.
         TrialError: the physics of a trial cannot be trusted.
     """
-    kinds = kinds_of(options)
+    kinds = simulate_kinds(options)
     effects = [parse_effect(text) for text in options.effect]
     length = f"{len(kinds)} trials" if len(kinds) > 1 else f"{kinds[0]} trial"
     with share_bar(length, "trial" if len(kinds) > 1 else "s") as tell:
@@ -34,7 +34,7 @@ def run(options: Simulate) -> None:
         print(_line(options.out, done[0], options))
     elif options.out_dir is not None:
         names = _names(kinds)
-        with whole_folder(options.out_dir) as folder:
+        with whole_folder(options.out_dir, "simulation") as folder:
             for recording, name in zip(done, names, strict=True):
                 recording.write(folder / name)
         for recording, name in zip(done, names, strict=True):
@@ -61,4 +61,6 @@ def _progress(
 
 
 def _line(path: Path, done: SimulatedRecording, options: Simulate) -> str:
-    return f"{path}: {done.time[-1]:.1f} s of {done.metadata.trial} motion, {options.preset} sensors"
+    warning = done.log.stability and done.log.stability.warning
+    line = f"{path}: {done.time[-1]:.1f} s of {done.metadata.trial} motion, {options.preset} sensors"
+    return f"{line}\n{warning}" if warning else line

@@ -11,17 +11,18 @@ from typing import Any
 from estimator.arm.unit import AT
 from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from estimator.errors import InputError
+from estimator.estimate.frames import frames_said
 from estimator.files import whole_folder, write_json, write_text
-from estimator.numbers import measured
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
+from estimator.statistics import measured
 from mocobot.api.calibration import Calibration, calibrate
 from mocobot.api.conversion import convert, convert_parts
 from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
-from mocobot.checks.watch import PAGE, VERDICT
+from mocobot.checks import PAGE, VERDICT
 from mocobot.files.calibrations import NAME as CALIBRATION
 from mocobot.files.calibrations import write_calibration
 from mocobot.files.calibrations import write_into as write_calibration_into
@@ -88,7 +89,7 @@ def run(options: Watch) -> None:
         _conclude(seen, options.jobs, say, simulated)
         if out is not None:
             say("write")
-            with whole_folder(out) as folder:
+            with whole_folder(out, "watch") as folder:
                 _write(seen, folder, made_with)
             if seen.estimate or seen.diagnosis:
                 write_report(out, out / PAGE, say)
@@ -187,7 +188,8 @@ def _payload(found: Estimate) -> str:
     if found.p_1c is not None and found.p_1c_se_m is not None:
         each = (measured(float(x), float(se)) for x, se in zip(found.p_1c, found.p_1c_se_m, strict=True))
         com = f"centre of mass ({', '.join(f'{x} +- {se}' for x, se in each)}) m in {{1}}"
-    return f"Payload: {mass}, {com}."
+    frames = f", in {frames_said(found.zero_sd_rad)}" if found.zero_sd_rad else ""
+    return f"Payload: {mass}, {com}{frames}."
 
 
 def _robots(found: Calibration | None) -> str:

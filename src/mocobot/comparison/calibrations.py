@@ -1,7 +1,6 @@
 """What two calibrations both give: the robots, and what they carry."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,13 +10,11 @@ from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.calibrate.outcome.carried import carried
 from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from estimator.errors import InputError
+from estimator.estimate.frames import MIXED, in_encoder_frames
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import inertia_parameters
 from mocobot.comparison.difference import Group
 from mocobot.comparison.estimates import XYZ, grasp_groups
-
-STEP = 1e-6
-"""Of the common spring scale, for derivatives: the numbers are nearly straight in it."""
 
 
 def groups_of(a: Calibration, b: Calibration) -> list[Group]:
@@ -40,7 +37,8 @@ def groups_of(a: Calibration, b: Calibration) -> list[Group]:
         if (group := _deviations(a, b, robot, kind.name)) is not None
     ]
     for one, other in _pairs(a, b):
-        groups += _payload(one, other, a.scale_sd, b.scale_sd)
+        mixed = in_encoder_frames(a.units) != in_encoder_frames(b.units)
+        groups += _payload(one, other, a.scale_sd, b.scale_sd)[: 1 if mixed else None]
     return groups
 
 
@@ -55,6 +53,8 @@ def notes_of(a: Calibration, b: Calibration) -> list[str]:
             "Neither knows a weight: the robots are taken to have the same springs, whose common scale is then one "
             "error of both, and leaves the differences."
         )
+    if in_encoder_frames(a.units) != in_encoder_frames(b.units):
+        notes.append(MIXED)
     missing = [
         f"payload {one.label or 'without a name'} is in {name} alone"
         for name, here, there in (("A", a, b), ("B", b, a))
@@ -100,7 +100,7 @@ def _deviations(a: Calibration, b: Calibration, robot: int, kind: str) -> Group 
 
 
 def _payload(a: CalibratedPayload, b: CalibratedPayload, a_scale_sd: float, b_scale_sd: float) -> list[Group]:
-    """Mass, centre of mass, inertia and grasps."""
+    """Mass, first of all, centre of mass, inertia and grasps."""
     name = f"payload {a.label}, " if a.label else ""
     (x, x_covariance, by_x), (y, y_covariance, by_y) = _about_com(a), _about_com(b)
     groups = []
@@ -118,11 +118,6 @@ def _payload(a: CalibratedPayload, b: CalibratedPayload, a_scale_sd: float, b_sc
 
 def _about_com(payload: CalibratedPayload) -> tuple[Array, Array, Array]:
     """Mass, centre of mass and inertia, their covariance with the spring scale held, and their derivative by it."""
-
-    def values(parameters: Array) -> Array:
-        found = carried(replace(payload, parameters=parameters), 0.0)
-        return np.concatenate([[found.mass_kg], found.p_1c, inertia_parameters(found.inertia)])
-
-    at, along = payload.parameters, payload.by_scale[-10:]
-    slope = (values(at + STEP * along) - values(at - STEP * along)) / (2.0 * STEP)
-    return values(at), carried(payload, 0.0).covariance, slope
+    found = carried(payload, 0.0)
+    values = np.concatenate([[found.mass_kg], found.p_1c, inertia_parameters(found.inertia)])
+    return values, found.covariance, found.by_scale

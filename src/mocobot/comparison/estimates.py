@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from estimator import so3
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.estimate.frames import MIXED, in_encoder_frames
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import inertia_parameters
@@ -31,6 +32,8 @@ def groups_of(a: PayloadEstimate, b: PayloadEstimate) -> list[Group]:
     if a.mass and b.mass:
         mass = [(np.array([one.mass]), np.array([[one.se**2]])) for one in (a.mass, b.mass)]
         groups.append(Group.of("mass", "kg", ("",), *mass))
+    if in_encoder_frames(a.units) != in_encoder_frames(b.units):
+        return groups
     if a.p_1c is not None and b.p_1c is not None:
         assert a.p_1c_covariance is not None
         assert b.p_1c_covariance is not None
@@ -86,6 +89,8 @@ def _turned(x: Array, covariance: Array, by: Array) -> tuple[Array, Array, Array
 def notes_of(a: PayloadEstimate, b: PayloadEstimate) -> list[str]:
     """What a reader must know of both."""
     notes = _one_sided(a, b)
+    if in_encoder_frames(a.units) != in_encoder_frames(b.units):
+        notes.append(MIXED)
     if a.payload != b.payload:
         notes.append(f"The payloads go by different names: {a.payload or 'none'} and {b.payload or 'none'}.")
     doubtful = [name for name, one in (("A", a), ("B", b)) if one.contradicts]

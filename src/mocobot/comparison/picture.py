@@ -8,11 +8,13 @@ from matplotlib.figure import Figure
 
 from mocobot.comparison.comparison import Comparison
 from mocobot_report.blocks.palette import LIGHT
+from mocobot_sim.plots_plain import plain_words
 
 FARTHEST = 30.0
 """Standard errors at which the picture ends; what is farther off is drawn there as an arrow. Chosen."""
 
 
+@plain_words()
 def save_picture(found: Comparison, path: Path) -> None:
     """Draw a row for each number, with a band of two standard errors; changed groups are in another colour."""
     rows = [(group, k) for group in found.groups for k in range(len(group.entries))]

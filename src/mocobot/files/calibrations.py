@@ -8,13 +8,12 @@ deviations.png, recordings.png, shares.png
                            parameters against priors, what recordings leave over, what each of them contributes
 """
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.json import FORMAT, calibration_from_dict, calibration_to_dict
+from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
 from estimator.calibrate.outcome.text import format_calibration
 from estimator.calibrate.outcome.unit_toml import unit_toml
 from estimator.errors import InputError
@@ -23,8 +22,7 @@ from estimator.files import write_json, write_text
 from estimator.strict import read_json
 from mocobot.files.targets import CALIBRATION as NAME
 
-REPORT, MODEL, PAGE = "report.txt", "model", "report.html"
-PLOTS = ("deviations.png", "recordings.png", "shares.png")
+REPORT, MODEL = "report.txt", "model"
 
 
 def read_calibration(path: Path | str) -> Calibration:
@@ -88,13 +86,3 @@ def write_into(
     write_calibration(folder / NAME, calibration, made_with)
     write_text(folder / REPORT, f"{format_calibration(calibration)}\n")
     return notes
-
-
-def is_calibration(folder: Path) -> bool:
-    """Whether a folder holds a calibration and nothing that someone else put there."""
-    try:
-        ours = json.loads((folder / NAME).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
-    known = [NAME, REPORT, MODEL, f"{MODEL}-*", PAGE, "omnid*.toml", *PLOTS]
-    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())

@@ -10,8 +10,33 @@ from pathlib import Path
 
 from estimator.errors import InputError
 from estimator.files import check_place, check_target, system_errors
-from mocobot.files.parquet import check_parquet
+from mocobot_logs.formats import PARQUET as MAGIC
 from mocobot_logs.formats import log_kind
+
+LEAST_BYTES = 12
+"""Both, and the length of the footer between them."""
+
+
+def check_parquet(path: Path) -> None:
+    """Find out that a file is an empty or a cut Parquet file; whatever does not look like one is let pass.
+
+    Raises:
+        InputError: it is.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(MAGIC))
+            size = file.seek(0, os.SEEK_END)
+            file.seek(-min(size, len(MAGIC)), os.SEEK_END)
+            end = file.read()
+    except (OSError, ValueError):
+        return  # a folder, or what may not be read: reading tells
+    if head != MAGIC and (size or path.suffix.lower() != ".parquet"):
+        return
+    if size < LEAST_BYTES or end != MAGIC:
+        what = f"Parquet file size is {size} bytes" if size < LEAST_BYTES else "its end is missing"
+        raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({what})")
+
 
 CALIBRATION = "calibration.json"
 """The file in the folder of ``mocobot calibrate --out``."""

@@ -7,19 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocobot_inspect.findings import Finding, Topic, of_stream, stands
+from mocobot_inspect.findings import Finding, Topic, no_readings, of_stream, stands
 from mocobot_inspect.joints.inspection import JointInspection
-from mocobot_inspect.joints.numbers import percent
+from mocobot_inspect.joints.lags import SIGMAS
+from mocobot_inspect.joints.numbers import milliseconds, percent
 from mocobot_inspect.joints.samples import beyond_range, coarse, of_velocities, saturated, unit_of
 from mocobot_inspect.joints.wiring import SUSPICIOUS, Found, Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
-from mocobot_logs.joints.quantities import POSITIONS
 
-WRONG_SCALE = 8.0
-"""Gains of the model's torque beyond this, or below its inverse, are no wrong mass."""
 LATE = 1.1
 """So much more of the torques must be left without a delay than with it."""
-_NEVER = 1e-3  # of its largest value may a torque be negative that never is
+_NEVER, _NEAR = (
+    1e-3,
+    0.02,
+)  # of its largest value may a torque be negative that never is; so near it comes to zero
 
 
 def joint_findings(found: JointInspection) -> list[Finding]:
@@ -41,14 +42,9 @@ def _of_stamps(found: JointInspection) -> Iterator[str]:
 
 
 def _of_samples(found: JointInspection) -> Iterator[str]:
-    keys = list(found.log_map.channels)
-    for (quantity, joint), c in zip(keys, found.channels, strict=True):
-        if c.nans or c.infinities:
-            parts = [f"{n} {what}" for n, what in ((c.nans, "NaN"), (c.infinities, "infinite")) if n]
-            yield f"{c.name}: {' and '.join(parts)} of {found.timing.samples} samples"
-        rests = quantity in POSITIONS and c.lowest == c.highest and not _is_driven(found, joint)
-        if not rests:
-            yield from stands(c.name, c, found.timing.duration_s)
+    for c in found.channels:
+        yield from no_readings(c.name, c, found.timing.samples)
+        yield from stands(c.name, c, found.timing.duration_s)
     yield from found.signs_lost
     for log in found.logs[:1]:
         yield from coarse(log, found.moves)
@@ -59,17 +55,6 @@ def _of_samples(found: JointInspection) -> Iterator[str]:
         if not known:
             yield from beyond_range(log, found.robot)
         yield from saturated(log, found.robot)
-
-
-def _is_driven(found: JointInspection, joint: str) -> bool:
-    """Whether a joint has a velocity or a command that does not stand."""
-    keys = list(found.log_map.channels)
-    moving = ("dq", "motor_velocity", "command", "motor_command")
-    return any(
-        c.lowest != c.highest
-        for (quantity, of), c in zip(keys, found.channels, strict=True)
-        if of == joint and quantity in moving
-    )
 
 
 def _of_wiring(found: JointInspection) -> Iterator[str]:
@@ -90,7 +75,7 @@ def _of_wiring(found: JointInspection) -> Iterator[str]:
     for mistake in wiring.found:
         yield mistake_sentence(mistake, joints)
     yield from _magnitudes(found)
-    bad = np.flatnonzero(wiring.undone > 0.5) if found.moves.any() else []
+    bad = np.flatnonzero((wiring.undone > 0.5 + wiring.noise) & found.moves)
     if len(bad):
         names = listed([joints[j] for j in bad])
         even = "even then torques" if wiring.found else "torques"
@@ -111,23 +96,22 @@ def _magnitudes(found: JointInspection) -> Iterator[str]:
         if (
             not torques
             or found.wiring is None
-            or not (found.wiring.undone[j] > SUSPICIOUS and found.moves.any())
+            or not (found.wiring.undone[j] > SUSPICIOUS and found.moves[j])
         ):
             continue
         torque = np.concatenate(torques)
-        if np.isfinite(torque).all() and torque.max() > 0 and torque.min() > -_NEVER * torque.max():
+        if np.isfinite(torque).all() and -_NEVER < torque.min() / max(torque.max(), 1e-300) < _NEAR:
             yield f"torque of {name} is never negative: has it lost its sign?"
 
 
 def wrong_scales(found: JointInspection) -> dict[int, float]:
     """Joints whose torque is so many times what the model asks for that no mass explains it."""
     log = found.logs[0] if found.logs else None
-    if found.gains is None or log is None or log.torque is None:
+    if found.wiring is None or found.wiring.found or log is None or log.torque is None:
         return {}
     known = ~np.isnan(log.drive.torque_constant) & np.isfinite(log.torque).any(axis=0)
-    told = np.flatnonzero(known & np.isfinite(found.gains))
-    gains = {int(j): float(found.gains[j]) for j in told}
-    return {j: gain for j, gain in gains.items() if not 1.0 / WRONG_SCALE <= gain <= WRONG_SCALE}
+    odd = np.flatnonzero(known & found.moves & found.wiring.odd_gains)
+    return {int(j): float(found.wiring.gains[j]) for j in odd}
 
 
 def _scales(found: JointInspection) -> Iterator[str]:
@@ -172,9 +156,10 @@ def _of_delays(found: JointInspection) -> Iterator[str]:
     if late is None or not found.logs:
         return
     period_s = 1.0 / found.logs[0].rate_hz
-    if abs(late.delay_s) > period_s and late.before > LATE * late.after:
+    least = max(period_s, SIGMAS * late.delay_se_s)
+    if abs(late.delay_s) > least and late.before > LATE * late.after:
         way = "behind" if late.delay_s > 0 else "ahead of"
         yield (
-            f"torques run {1e3 * abs(late.delay_s):.3g} ms {way} the motion: {percent(late.before)} % of them is left "
-            f"unexplained without that delay, {percent(late.after)} % with it"
+            f"torques run {milliseconds(late.delay_s, late.delay_se_s)} {way} the motion: {percent(late.before)} % of "
+            f"them is left unexplained without that delay, {percent(late.after)} % with it"
         )

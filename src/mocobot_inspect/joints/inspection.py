@@ -20,17 +20,19 @@ from mocobot_inspect.joints.lags import (
 from mocobot_inspect.joints.motion import Motion, motion_of
 from mocobot_inspect.joints.robot import Robot
 from mocobot_inspect.joints.samples import wrapped
-from mocobot_inspect.joints.wiring import Wiring, check_wiring, fit
-from mocobot_inspect.stream.channels import Channel, ChannelTally, seconds
+from mocobot_inspect.joints.wiring import Wiring, check_wiring
+from mocobot_inspect.stream.channels import Channel, ChannelTally, Stretch, seconds
+from mocobot_inspect.stream.noise import wild
 from mocobot_inspect.stream.timing import Timing, TimingTally
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
-from mocobot_logs.joints.quantities import EFFORTS, POSITIONS, VELOCITIES
+from mocobot_logs.joints.quantities import COMMANDS, EFFORTS, POSITIONS, VELOCITIES
 from mocobot_logs.joints.read import joint_logs_of
 from mocobot_logs.log import LogSource, Samples, collect
 
 LEAST_ROWS = 50
 """Fewer samples of smooth motion tell nothing."""
+_NOISES, _MOVES = 4.0, 0.05  # a velocity is one beyond so much of its noise, and of its rms
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,12 @@ class TorqueDelay:
     """How torques lag behind the motion.
 
     Attributes:
-        delay_s: of all torques [s].
+        delay_s, delay_se_s: of all torques, and its standard error [s].
         before, after: share of their variance that model and friction leave, without and with it.
     """
 
     delay_s: float
+    delay_se_s: float
     before: float
     after: float
 
@@ -62,7 +65,6 @@ class JointInspection:
         unchecked: why motion and torques could not be looked at, or None.
         moves: whether each joint moves, shape (J,).
         wiring: signs, order and units against the model, or None without torques.
-        gains: of the model's torque in each joint's, NaN where it does not show, shape (J,).
         velocities, commands: how they follow the motion, part by part.
         crossed: pairs of joints whose commands are exchanged, from 0.
         delay: of the torques, or None.
@@ -78,7 +80,6 @@ class JointInspection:
     unchecked: str | None
     moves: NDArray[np.bool_]
     wiring: Wiring | None = None
-    gains: Array | None = None
     velocities: tuple[Follows, ...] = ()
     commands: tuple[Follows, ...] = ()
     crossed: tuple[tuple[int, int], ...] = ()
@@ -106,7 +107,7 @@ def inspect_joints(
     """
     samples = collect(source, advance).streams[0]
     timing = TimingTally()
-    timing.add(samples.stamp_ns, samples.log_ns)
+    timing.add(samples)
     keys = list(log_map.channels)
     found = JointInspection(
         name=source.name,
@@ -119,6 +120,9 @@ def inspect_joints(
         unchecked=None,
         moves=np.zeros(len(robot.joints), dtype=bool),
     )
+    # Refused, or taken for readings otherwise: they count as missing.
+    odd = np.apply_along_axis(wild, 0, samples.values)
+    samples = replace(samples, values=np.where(odd, np.nan, samples.values))
     try:
         logs = joint_logs_of(source.name, samples, log_map)
     except InputError as error:
@@ -145,7 +149,41 @@ def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
         with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
             tally.add(time_s, samples.values[:, order], rate_hz)
     told = dict(zip(order, tally.finish(), strict=True))
-    return tuple(told[k] for k in range(len(keys)))
+    return tuple(_without_rests(k, told, log_map, samples) for k in range(len(keys)))
+
+
+def _rms(x: Array) -> float:
+    """Of what is known."""
+    return float(np.sqrt(np.nansum(x**2) / max(len(x), 1)))
+
+
+def _without_rests(k: int, told: dict[int, Channel], log_map: JointMap, samples: Samples) -> Channel:
+    """A channel, without stretches in which a position stands because its joint's velocity or command does, too."""
+    c, (quantity, joint) = told[k], list(log_map.channels)[k]
+    if quantity not in POSITIONS or not (c.stuck or c.clipped):
+        return c
+    time_s = seconds(samples.stamp_ns, int(samples.stamp_ns[0]))
+    moving = (*VELOCITIES, *(COMMANDS if log_map.control.command == "position" else ()))
+    of_joint = [i for i, (other, of) in enumerate(log_map.channels) if of == joint and other in moving]
+    speeds = []
+    for i in of_joint:
+        x = np.where(wild(samples.values[:, i]), np.nan, samples.values[:, i])
+        speed = np.diff(x, prepend=x[:1]) if list(log_map.channels)[i][0] in COMMANDS else x
+        speeds.append((speed, max(_NOISES * told[i].noise, _MOVES * _rms(speed))))
+
+    def stays(s: Stretch) -> bool:
+        inside = (time_s > s.start_s) & (time_s < s.start_s + s.duration_s)
+        moves = [_rms(speed[inside]) > least for speed, least in speeds]
+        return any(moves) or s.jumps or (not moves and c.lowest != c.highest)
+
+    stuck, clipped = tuple(filter(stays, c.stuck)), tuple(filter(stays, c.clipped))
+    return replace(
+        c,
+        stuck=stuck,
+        clipped=clipped,
+        stuck_count=c.stuck_count - len(c.stuck) + len(stuck),
+        clipped_count=c.clipped_count - len(c.clipped) + len(clipped),
+    )
 
 
 def _with_motion(
@@ -157,36 +195,16 @@ def _with_motion(
     log, motion = max(whole, key=lambda part: len(part[1].q))
     moves = np.any([part.moves for _, part in whole], axis=0)
     wiring = check_wiring([part for _, part in whole], robot, advance)
-    gains, delay = None, None
+    delay = None
     if wiring is not None and not wiring.found:
-        asked = robot.inverse(motion.q, motion.dq, motion.ddq)
-        gains = _gains(motion, asked)
-        late = torque_delay(log, motion, asked)
+        late = torque_delay(log, motion, robot.asked(motion.q, motion.dq, motion.ddq, wiring.payload))
         delay = None if late is None else TorqueDelay(*late)
     return replace(
         found,
         moves=moves,
         wiring=wiring,
-        gains=gains,
         velocities=tuple(velocity_follows(log, motion)),
         commands=tuple(command_follows(log, motion)),
         crossed=tuple(exchanged_commands(log, motion)),
         delay=delay,
     )
-
-
-SHOWS = 0.3
-"""Share of a torque's variance that the model's must make up for its gain to be known."""
-
-
-def _gains(motion: Motion, asked: Array) -> Array:
-    """Gain of the model's torque in each joint's, NaN where friction hides it, shape (J,)."""
-    out = np.full(asked.shape[1], np.nan)
-    for j in range(asked.shape[1]):
-        torque = motion.torque[:, j]
-        if not np.isfinite(torque).all() or np.std(torque) == 0 or not motion.moves[j]:
-            continue
-        values, _ = fit(asked[:, j], motion.dq[:, j], motion.ddq[:, j], torque)
-        if np.var(values[0] * asked[:, j]) > SHOWS * np.var(torque):
-            out[j] = values[0]
-    return out

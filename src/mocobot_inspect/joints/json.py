@@ -5,14 +5,16 @@
     format "mocobot-joint-inspection", version 1
     log           name, map, joints, columns
     stamps        samples, duration_s, rate_hz, jitter_rms_s, jitter_max_s, gaps, missing, longest_gap_s,
-                  longest_gap_at_s, duplicates, backwards, farthest_back_s, farthest_back_at_s, recorder_s
+                  longest_gap_at_s, duplicates, repeats, backwards, farthest_back_s, farthest_back_at_s, recorder_s
     channels      by column ("q of joint1"): as in an inspection of a team's log
     parts         start_s, duration_s, samples, rate_hz, resampled, notes
     unchecked     why motion and torques were not looked at, or null
     joints        by joint: moves, misfit and misfit_undone (share of the torque that neither model nor friction
                   explains), gain (of the model's torque), position_step
-    velocity, command     by joint: gain, delay_s, correlation
-    torque_delay  delay_s, before, after; or null
+    velocity, command     by joint: gain, gain_se, delay_s (null where noise hides it), delay_se_s, correlation,
+                  possible (correlation that noise leaves)
+    torque_delay  delay_s, delay_se_s, before, after; or null
+    payload       whether the torques are those of a robot that carries something that the model lacks
     mistakes      kind, joints, sentence, alternatives, misfit_before, misfit_after
     findings      topic and sentence of all that is wrong
     ready         the last line of the text
@@ -57,7 +59,7 @@ def joint_inspection_dict(found: JointInspection) -> dict[str, Any]:
                 "moves": bool(found.moves[j]),
                 "misfit": None if w is None else float(w.misfit[j]),
                 "misfit_undone": None if w is None else float(w.undone[j]),
-                "gain": None if found.gains is None else float(found.gains[j]),
+                "gain": None if w is None else float(w.gains[j]),
                 "position_step": None if first is None else float(first.position_step[j]),
             }
             for j, joint in enumerate(joints)
@@ -65,6 +67,7 @@ def joint_inspection_dict(found: JointInspection) -> dict[str, Any]:
         "velocity": _follows(found.velocities, joints),
         "command": _follows(found.commands, joints),
         "torque_delay": found.delay,
+        "payload": w is not None and w.payload is not None,
         "mistakes": [
             {
                 "kind": f.mistake.kind,

@@ -46,9 +46,7 @@ class Motion:
     @property
     def moves(self) -> NDArray[np.bool_]:
         """Whether each joint moves, shape (J,)."""
-        rate = self.log.rate_hz
-        # What the low-pass takes off is noise, and as much of white noise is left as its band is of the whole.
-        noise = np.std(self.log.q[self.at] - self.q, axis=0) * np.sqrt(2.0 * cutoff_hz(self.log) / rate)
+        noise = passed_noise(self.log, self.log.q[self.at], self.q)
         least = np.maximum(np.maximum(MOVES, 3.0 * self.log.position_step), NOISES * noise)
         return np.ptp(self.q, axis=0) > least
 
@@ -62,6 +60,14 @@ def smooth(log: JointLog, values: Array) -> Array:
     """A signal of the log through the low-pass, shape (Q, ...); joints without one stay NaN."""
     known = np.isfinite(values)
     return np.where(known, low_pass(np.where(known, values, 0.0), log.rate_hz, cutoff_hz(log)), np.nan)
+
+
+def passed_noise(log: JointLog, raw: Array, smoothed: Array) -> Array:
+    """Noise that the low-pass lets through, shape (J,).
+
+    What it takes off is noise, and as much of white noise is left as its band is of the whole.
+    """
+    return np.std(raw - smoothed, axis=0) * np.sqrt(2.0 * cutoff_hz(log) / log.rate_hz)
 
 
 def effort(log: JointLog) -> Array:

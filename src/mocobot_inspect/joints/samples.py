@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arrays import Array
-from mocobot_inspect.joints.lags import Follows
-from mocobot_inspect.joints.numbers import percent
+from mocobot_inspect.joints.lags import SIGMAS, Follows, pooled
+from mocobot_inspect.joints.numbers import milliseconds, percent
 from mocobot_inspect.joints.robot import Robot
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
@@ -129,21 +129,24 @@ def of_velocities(found: Sequence[Follows], log: JointLog) -> Iterator[str]:
     """What measured velocities are, beside differentiated positions."""
     for one in found:
         joint = log.joints[one.joint]
-        if one.correlation < 0.8:
+        if one.strays:
             yield (
                 f"dq of {joint} does not follow its position (correlation {one.correlation:.2g}): is it another "
                 "joint's?"
             )
-            continue
-        if one.gain < 0:
-            yield f"dq of {joint} runs against its position: one of them has the wrong sign"
-        elif (words := unit_of(one.gain)) is not None:
-            yield f"dq of {joint} is {one.gain:.4g} times the derivative of its position: one of them is {words}"
-        elif abs(one.gain - 1.0) > CLOSE:
-            yield f"dq of {joint} is {one.gain:.4g} times the derivative of its position"
-        if abs(one.delay_s) > 1.0 / log.rate_hz:
-            late = "later than" if one.delay_s > 0 else "ahead of"
+        elif abs(one.gain - 1.0) > CLOSE + SIGMAS * one.gain_se:
+            words = unit_of(one.gain)
+            if one.gain < 0:
+                yield f"dq of {joint} runs against its position: one of them has the wrong sign"
+            else:
+                hint = "" if words is None else f": one of them is {words}"
+                yield f"dq of {joint} is {one.gain:.4g} times the derivative of its position{hint}"
+    shared = pooled(found)
+    each = [(log.joints[one.joint], one.delay_s, one.delay_se_s) for one in found if not one.strays]
+    for joint, delay_s, se_s in each if shared is None else [("every joint", *shared)]:
+        if abs(delay_s) > max(log.period_s, SIGMAS * se_s):
+            late = "later than" if delay_s > 0 else "ahead of"
             yield (
-                f"dq of {joint} is {1e3 * abs(one.delay_s):.3g} ms {late} its position: it is filtered"
-                + ("" if one.delay_s > 0 else ", or the position is")
+                f"dq of {joint} is {milliseconds(delay_s, se_s)} {late} its position: it is filtered"
+                + ("" if delay_s > 0 else ", or the position is")
             )

@@ -6,6 +6,7 @@ import numpy as np
 
 from mocobot_inspect.joints.findings import joint_findings, wrong_scales
 from mocobot_inspect.joints.inspection import JointInspection
+from mocobot_inspect.joints.lags import pooled
 from mocobot_inspect.joints.numbers import later, percent
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.wiring.mistakes.base import listed
@@ -104,15 +105,20 @@ def _motion(found: JointInspection) -> list[str]:
     else:
         told = [f"{joints[j]} {percent(w.misfit[j])} %" for j in np.flatnonzero(np.isfinite(w.misfit))]
         lines.append("    neither model nor friction explains, of each torque or duty: " + ", ".join(told))
+        if w.payload is not None:
+            lines.append("    the robot seems to carry something at its last link that the model lacks")
         lines.append(f"    mistakes of signs, order and units that were tried: {w.tried}")
     for what, all_of in (("dq follows q", found.velocities), ("q follows its command", found.commands)):
         for one in all_of:
             lines.append(
-                f"    {joints[one.joint]}: {what} with gain {one.gain:.4g}, {later(one.delay_s)}, "
-                f"correlation {one.correlation:.4g}"
+                f"    {joints[one.joint]}: {what} with gain {one.gain:.4g} +- {one.gain_se:.2g}, "
+                f"{later(one.delay_s, one.delay_se_s)}, correlation {one.correlation:.4g}"
             )
+        shared = pooled(all_of)
+        if shared is not None:
+            lines.append(f"    {what} alike at all joints, {later(*shared)}")
     if found.delay is not None:
-        lines.append(f"    torques follow the motion {later(found.delay.delay_s)}")
+        lines.append(f"    torques follow the motion {later(found.delay.delay_s, found.delay.delay_se_s)}")
     return lines
 
 
@@ -133,9 +139,12 @@ def joint_ready_line(found: JointInspection) -> str:
         good.append(f"one from {what}" if good else f"a diagnosis from {what}")
     if not good:
         return "ready for: nothing (no joint that moves has a torque, a command or a duty)"
-    mistakes = 0 if found.wiring is None else len(found.wiring.found)
-    lost = bool(found.signs_lost or found.crossed or wrong_scales(found))
-    if mistakes or lost:
-        what = "the mistake above" if mistakes + lost == 1 else "the mistakes above"
-        return f"ready for: nothing as it is; with {what} undone in the map: {' and '.join(good)}"
-    return f"ready for: {' and '.join(good)}"
+    wrong = 0 if found.wiring is None else len(found.wiring.found)
+    wrong += bool(found.signs_lost or found.crossed or wrong_scales(found))
+    undone = [f"the mistake{'s' * (wrong > 1)} above undone in the map"] if wrong else []
+    if any(c.wild or c.infinities for c in found.channels):
+        undone.append("the absurd values left out of the log")
+    lacking = "; rows that lack a value are left out" if any(c.nans for c in found.channels) else ""
+    if undone:
+        return f"ready for: nothing as it is; with {' and '.join(undone)}: {' and '.join(good)}{lacking}"
+    return f"ready for: {' and '.join(good)}{lacking}"

@@ -24,6 +24,7 @@ class Survey:
 
     Attributes:
         timing, channels: per robot.
+        whole: stamps of the samples that lack no value, per robot.
         excerpt: samples of every robot, those of the whole log or of a part.
         excerpt_s: beginning and end of the part after the log's first stamp [s], or None for the whole log.
     """
@@ -32,6 +33,7 @@ class Survey:
     channels: tuple[tuple[Channel, ...], ...]
     excerpt: tuple[Samples, ...]
     excerpt_s: tuple[float, float] | None
+    whole: tuple[Timing, ...]
 
     @property
     def origin_ns(self) -> int:
@@ -51,10 +53,10 @@ def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None)
     rows = EXCERPT_ROWS // max(source.robots, 1)
     for robot, samples in source.chunks(advance):
         robots[robot].push(samples, rows)
-    timing = tuple(robot.finish() for robot in robots)
+    timing, whole = tuple(robot.finish() for robot in robots), tuple(robot.whole.finish() for robot in robots)
     channels = tuple(_as_read(robot.channels.finish(), source, i) for i, robot in enumerate(robots))
     if all(robot.complete for robot in robots):
-        return Survey(timing, channels, tuple(robot.excerpt() for robot in robots), None)
+        return Survey(timing, channels, tuple(robot.excerpt() for robot in robots), None, whole)
     for robot in robots:
         robot.kept.clear()
     start_ns, stop_ns = _liveliest(robots, rows)
@@ -65,7 +67,7 @@ def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None)
             parts[robot].append(Samples(samples.stamp_ns[inside], samples.values[inside]))
     origin = min(robot.first_ns for robot in robots if robot.first_ns is not None)
     bounds = float(seconds(np.array(start_ns), origin)), float(seconds(np.array(stop_ns), origin))
-    return Survey(timing, channels, tuple(joined(p, len(source.channels)) for p in parts), bounds)
+    return Survey(timing, channels, tuple(joined(p, len(source.channels)) for p in parts), bounds, whole)
 
 
 def _as_read(channels: tuple[Channel, ...], source: LogSource, robot: int) -> tuple[Channel, ...]:
@@ -89,7 +91,7 @@ class _Robot:
         self.complete, self.first_ns = True, None
         self.lively: dict[int, float] = {}  # motion of the gimbal by time bin
         self.rows_per_bin = 0
-        self._names, self._timing = source.channels, TimingTally()
+        self._names, self._timing, self.whole = source.channels, TimingTally(), TimingTally()
         self._theta = CHANNELS[source.level].index("theta_z")
         self._waiting: list[Samples] = []
         self._kept_rows = self._waiting_rows = 0
@@ -100,7 +102,9 @@ class _Robot:
             return
         if self.first_ns is None:
             self.first_ns = int(samples.stamp_ns[0])
-        self._timing.add(samples.stamp_ns, samples.log_ns)
+        self._timing.add(samples)
+        full = ~np.isnan(samples.values).any(axis=1)
+        self.whole.add(Samples(samples.stamp_ns[full], samples.values[full]))
         plain = Samples(samples.stamp_ns, samples.values)
         self._waiting.append(plain)
         self._waiting_rows += len(plain.stamp_ns)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_logs.log import NS, Stamps
+from mocobot_logs.log import NS, Samples
 
 GAP = 1.5
 """Intervals longer than this many periods lack samples."""
@@ -17,7 +17,7 @@ class Timing:
     """Stamps of one robot.
 
     Attributes:
-        samples: rows of the log.
+        samples: rows of the log, without those that repeat the one before.
         first_ns, last_ns: first and last stamp in the log's order [ns], None without rows.
         rate_hz: samples per second between gaps [Hz], or None.
         jitter_rms_s, jitter_max_s: how far intervals are from the period, gaps left out [s].
@@ -25,6 +25,7 @@ class Timing:
         missing: samples that they lack.
         longest_gap_s, longest_gap_at_s: longest such interval, and when it begins after the first stamp [s].
         duplicates: stamps that repeat the one before.
+        repeats: rows that repeat the one before but for the stamp; they are no samples.
         backwards: stamps earlier than the one before.
         farthest_back_s, farthest_back_at_s: by how much at most, and when the one before is, after the first [s].
         recorder_s: smallest and largest lead of the recorder's time over the stamps [s], or None.
@@ -41,6 +42,7 @@ class Timing:
     longest_gap_s: float
     longest_gap_at_s: float
     duplicates: int
+    repeats: int
     backwards: int
     farthest_back_s: float
     farthest_back_at_s: float
@@ -57,7 +59,9 @@ class TimingTally:
 
     def __init__(self) -> None:
         """Start without any."""
-        self._samples = self._gaps = self._missing = self._duplicates = self._backwards = self._regular = 0
+        self._samples = self._repeats = self._gaps = self._missing = self._duplicates = self._backwards = (
+            self._regular
+        ) = 0
         self._first_ns: int | None = None
         self._last_ns: int | None = None
         self._period_s: float | None = None
@@ -66,10 +70,12 @@ class TimingTally:
         self._early: list[NDArray] = []
         self._recorder: tuple[float, float] | None = None
 
-    def add(self, stamp_ns: Stamps, log_ns: Stamps | None) -> None:
-        """Count the stamps of a chunk [ns], shape (q,), and the recorder's times where there are."""
+    def add(self, samples: Samples) -> None:
+        """Count the stamps of a chunk, and the recorder's times where there are."""
+        stamp_ns, log_ns = samples.stamp_ns, samples.log_ns
         if not len(stamp_ns):
             return
+        self._repeats += int(samples.repeats.sum())
         if log_ns is not None:
             lead = (log_ns - stamp_ns) * NS
             low, high = float(lead.min()), float(lead.max())
@@ -132,6 +138,7 @@ class TimingTally:
             longest_gap_s=self._longest,
             longest_gap_at_s=self._longest_at,
             duplicates=self._duplicates,
+            repeats=self._repeats,
             backwards=self._backwards,
             farthest_back_s=self._back,
             farthest_back_at_s=self._back_at,

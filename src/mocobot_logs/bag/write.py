@@ -15,13 +15,16 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from numpy.typing import NDArray
 from rosbags.interfaces import (
     Connection,
+    ConnectionExtRosbag2,
+    MessageDefinitionFormat,
     Qos,
     QosDurability,
     QosHistory,
@@ -31,20 +34,68 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2 import StoragePlugin, WriterError
 from rosbags.rosbag2 import Writer as BagWriter
+from rosbags.rosbag2.enums import CompressionMode
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
-from estimator.files import check_place, whole_file, whole_folder
+from estimator.files import check_place, holds, whole_file, whole_folder
+from estimator.processes import scratch_folder
 from estimator.recording.model import Recording
-from mocobot_logs.bag.mcap_writer import ChecksummedMcap
 from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC
 from mocobot_logs.bag.types import JOINT_STATE, STRING, message_type
 from mocobot_logs.bag.walk import Walk
 from mocobot_logs.log import Array, Level, Stamps
+
+
+class ChecksummedMcap:
+    """The storage that ``rosbags.rosbag2.Writer`` calls; its own writes no checksums, so that damage goes unseen."""
+
+    def __init__(self, path: Path, compression: CompressionMode) -> None:
+        """Create ``<folder>/<folder's name>.mcap``; ``compression`` is that of the bag around it."""
+        del compression
+        self.path = path / f"{path.name}.mcap"
+        self._file = self.path.open("xb")
+        self._writer = McapWriter(self._file, compression=CompressionType.ZSTD)
+        self._writer.start(profile="ros2", library="mocobot")
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[int, int] = {}
+
+    def add_msgtype(self, connection: Connection) -> None:
+        """Write the definition of a message type."""
+        definition = connection.msgdef
+        encoding = "ros2msg" if definition.format == MessageDefinitionFormat.MSG else "ros2idl"
+        self._schemas[connection.msgtype] = self._writer.register_schema(
+            connection.msgtype, encoding, definition.data.encode()
+        )
+
+    def add_connection(self, connection: Connection, offered_qos_profiles: str) -> None:
+        """Write a topic."""
+        self._channels[connection.id] = self._writer.register_channel(
+            connection.topic,
+            cast(ConnectionExtRosbag2, connection.ext).serialization_format,
+            self._schemas[connection.msgtype],
+            {"offered_qos_profiles": offered_qos_profiles},
+        )
+
+    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
+        """Write a message, logged when it was stamped [ns]."""
+        self._writer.add_message(self._channels[connection.id], timestamp, bytes(data), timestamp)
+
+    def close(self, version: int, metadata: str) -> None:
+        """Write the bag's metadata and the index."""
+        del version
+        self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata})
+        self._writer.finish()
+        self._file.close()
+
+    def abort(self) -> None:
+        """Close without an index."""
+        self._file.close()
+
 
 Storage = Literal["mcap", "sqlite3"]
 
@@ -90,7 +141,7 @@ def write_bag(
         level: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
         storage: "mcap" or "sqlite3".
         advance: takes the number of samples written since the last call.
-        replace_bag: whether a folder that ``is_written_bag`` may be replaced, once the new one is complete.
+        replace_bag: whether a bag in a folder that this program wrote may be replaced, once the new one is complete.
 
     Raises:
         InputError: the target exists or cannot be written, times are not within [0, 2^31) s, or level or storage is
@@ -106,10 +157,10 @@ def write_bag(
     plugin = StoragePlugin[storage.upper()]
     try:
         with (
-            whole_file(path) if single else whole_folder(path) as target,
-            TemporaryDirectory(dir=path.parent, prefix=".", suffix=".tmp") as scratch,
+            whole_file(path) if single else whole_folder(path, "bag") as target,
+            scratch_folder(path.parent) as scratch,
         ):
-            folder = Path(scratch) / name  # a bag's files are named like its folder
+            folder = scratch / name  # a bag's files are named like its folder
             with _Writer(folder, version=_VERSION, storage_plugin=plugin) as bag:
                 _write(recording, stamps, level, bag, advance)
             for file in folder.iterdir():
@@ -122,17 +173,6 @@ def write_bag(
     except (OSError, ValueError, sqlite3.Error, WriterError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be written ({detail})") from error
-
-
-def is_written_bag(folder: Path) -> bool:
-    """Whether a folder holds a bag that ``write_bag`` wrote, and nothing else."""
-    names = {path.name for path in folder.iterdir()}
-    stored = sum(Path(name).suffix in SUFFIXES.values() for name in names)
-    try:
-        told = (folder / "metadata.yaml").read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return False
-    return len(names) == 2 and stored == 1 and METADATA_TOPIC in told
 
 
 def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
@@ -149,7 +189,7 @@ def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
         if (
             not single
             and path.exists()
-            and not (path.is_dir() and (not any(path.iterdir()) or (replace_bag and is_written_bag(path))))
+            and not (path.is_dir() and (not any(path.iterdir()) or (replace_bag and holds("bag")(path))))
         ):
             what = "is a folder that holds something" if path.is_dir() else "is a file"
             raise InputError(f"{path}: {what}; name a new folder for the bag, or a {SUFFIXES[storage]} file")

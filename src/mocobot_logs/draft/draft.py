@@ -9,8 +9,7 @@ import numpy as np
 from mocobot_logs.draft.candidates import Candidate
 from mocobot_logs.draft.channels import Found
 from mocobot_logs.draft.robots import HOLE, Robots, Templates
-from mocobot_logs.draft.text import DOUBTFUL, printable
-from mocobot_logs.draft.values import doubt_unit, guess_unit
+from mocobot_logs.draft.values import DOUBTFUL, doubt_unit, guess_unit, printable
 from mocobot_logs.log import CHANNELS, REF
 from mocobot_logs.map.units import COUNTS
 

@@ -8,8 +8,7 @@ import numpy as np
 from estimator.errors import InputError
 from mocobot_logs.draft.candidates import Candidate
 from mocobot_logs.draft.robots import HOLE, Robots, templates_of
-from mocobot_logs.draft.text import DOUBTFUL, printable
-from mocobot_logs.draft.values import guess_time
+from mocobot_logs.draft.values import DOUBTFUL, guess_time, printable
 from mocobot_logs.map.units import DATES
 from mocobot_logs.table.table import Table, Wanted
 

@@ -5,6 +5,15 @@ import numpy as np
 from estimator.arrays import Array
 from mocobot_logs.map.units import COUNTS, kind_of, si_factor
 
+DOUBTFUL = "doubtful: "
+"""Begins what a line that needs a look says."""
+
+
+def printable(text: str) -> str:
+    """Text as a comment may hold it: in one line, without control characters."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
 _PLAUSIBLE = {"angle": 3.2, "torque": 60.0, "length": 1.5, "force": 600.0}
 """No arm's angle, torque, reach or force is larger [rad, N m, m, N]."""
 _SURE = {"angle": (1.8, 10.0), "torque": (30.0, 200.0), "length": (1.0, 10.0), "force": (300.0, 2000.0)}

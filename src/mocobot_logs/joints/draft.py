@@ -13,8 +13,8 @@ import numpy as np
 from estimator.arrays import Array
 from mocobot_logs.draft.of_log import opened
 from mocobot_logs.draft.robots import Robots
-from mocobot_logs.draft.text import DOUBTFUL, printable
 from mocobot_logs.draft.time import time_lines
+from mocobot_logs.draft.values import DOUBTFUL, printable
 from mocobot_logs.formats import log_kind
 from mocobot_logs.joints.quantities import QUANTITIES, Kind, units_of
 from mocobot_logs.table.table import Table, Wanted

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.log import NS, Samples, Stamps
+from mocobot_logs.readings import repeated
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
 from mocobot_logs.resample.grid import TOLERANCE_NS, Grid, Interpolator, fitted_rows
@@ -75,7 +76,8 @@ def even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz: 
     screen = Screen(name, channels)
     time_ns, values = screen.keep(samples)
     if len(time_ns) < LEAST_ROWS:
-        raise InputError(f"{name}: has {len(time_ns)} samples; at least {LEAST_ROWS} are needed")
+        again = f" ({repeated(screen.repeats)})" if screen.repeats else ""
+        raise InputError(f"{name}: has {len(time_ns)} samples{again}; at least {LEAST_ROWS} are needed")
     period_ns = _period_ns(np.diff(time_ns))
     native_hz = 1.0 / (period_ns * NS)
     if not LEAST_HZ <= native_hz <= MOST_HZ:
@@ -249,7 +251,9 @@ def _check_values(name: str, channels: tuple[str, ...], values: Array) -> None:
 def _notes(screen: Screen) -> list[str]:
     notes = []
     if screen.duplicates:
-        notes.append(f"{screen.duplicates} rows repeat the row before and were dropped.")
+        notes.append(f"{screen.duplicates} rows repeat the row before, stamp included, and were dropped.")
+    if screen.repeats:
+        notes.append(f"{repeated(screen.repeats)}.")
     if screen.blank:
         worst = max(screen.blank_channels, key=lambda channel: screen.blank_channels[channel])
         notes.append(f"{screen.blank} rows lack a value ({worst} first) and count as missing.")

@@ -1,13 +1,12 @@
 """Maps by file or by name: where a log has each channel, and in which unit, sign and zero (docs/measured-data.md)."""
 
-import tomllib
 from functools import cache
 from importlib import resources
 from pathlib import Path
 
 from estimator.errors import InputError
-from mocobot_logs.claims import read_small
-from mocobot_logs.faults import detail_of
+from estimator.inputs import parse_toml
+from mocobot_logs.faults import detail_of, read_small
 from mocobot_logs.map.log_map import ChannelMap, CsvMap, LogMap, TimeMap
 from mocobot_logs.map.parse import parse_map
 
@@ -85,6 +84,6 @@ def _read(path: Path) -> str:
 
 def _values(text: str, where: str) -> dict[str, object]:
     try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        return parse_toml(text)
+    except (RecursionError, ValueError) as error:
         raise InputError(f"{where}: is not TOML ({detail_of(error)})") from error

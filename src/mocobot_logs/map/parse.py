@@ -39,6 +39,10 @@ def parse_map(values: Values, name: str) -> LogMap:
     version = values.get("version", VERSION)
     if type(version) is not int or version != VERSION:  # before all else: other versions may have other keys
         raise InputError(f"{where}: version is {version!r:.40}; this program reads version {VERSION}")
+    if "joints" in values and "level" not in values:
+        raise InputError(
+            f"{where}: is of one robot's joints, not of a team; inspect, diagnose and replay read its log with --model"
+        )
     top = Fields(values, _REQUIRED, where, _OPTIONAL)
     level: Level = top.one_of("level", get_args(Level))
     robots = values.get("robots")

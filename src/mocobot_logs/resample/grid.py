@@ -27,12 +27,14 @@ class Grid:
         fits: whether the samples lie on the grid, with ``period_ns`` equal to ``spacing_ns``.
         fitted_rows: so many nearest samples, to which a polynomial is fitted at every instant; 0 for a spline through
             all samples. A spline through samples of which some are a moment apart would swing with their noise.
+        uneven: whether intervals scatter so that none tells how many samples are missing.
     """
 
     spacing_ns: float
     period_ns: float
     fits: bool = False
     fitted_rows: int = 0
+    uneven: bool = False
 
     @property
     def method(self) -> Method:

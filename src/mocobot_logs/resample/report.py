@@ -12,7 +12,7 @@ class StreamReport:
 
     Attributes:
         robot: number of the robot, from 1.
-        samples: rows of the log, duplicates included.
+        samples: rows of the log, duplicates and repeats included.
         first_ns, last_ns: its first and its last stamp [ns].
         native_hz: rate of its samples [Hz], dropped ones counted in.
         jitter_rms_s, jitter_max_s: how far intervals between stamps are from whole periods [s].
@@ -22,6 +22,8 @@ class StreamReport:
         blank: rows in which a channel is NaN: dropped, so that they are among the missing samples.
         blank_channels: the channels that are NaN there, by the number of rows.
         duplicates: rows that repeat the row before, stamp and values; dropped.
+        repeats: rows that repeat the row before but for the stamp: one reading; dropped, so that they are among the
+            missing samples where the rate is theirs.
         merged: rows closer than a quarter of a period to the row before; averaged with it.
         method: what was done.
         steps: rounding step of every sensor's channel, 0 for none [SI].
@@ -40,6 +42,7 @@ class StreamReport:
     blank: int
     blank_channels: dict[str, int]
     duplicates: int
+    repeats: int
     merged: int
     method: Method
     steps: tuple[float, ...]
@@ -47,7 +50,7 @@ class StreamReport:
     @property
     def filled_share(self) -> float:
         """Missing samples over all that there should be."""
-        return self.filled / max(1, self.filled + self.samples - self.blank - self.duplicates)
+        return self.filled / max(1, self.filled + self.samples - self.blank - self.duplicates - self.repeats)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values by name."""

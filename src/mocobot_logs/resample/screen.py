@@ -19,7 +19,8 @@ class Screen:
 
     Attributes:
         rows: rows seen.
-        duplicates: rows dropped because they repeat the one before.
+        repeats: rows among them that repeat the one before but for the stamp: samples that are missing.
+        duplicates: rows dropped because they repeat the one before, stamp and values.
         blank: rows dropped because a channel is NaN: samples that are missing.
         blank_channels: how many of them by channel that is.
         first_ns, last_ns: first and last stamp [ns], None before the first row.
@@ -28,7 +29,7 @@ class Screen:
 
     def __init__(self, where: str, channels: tuple[str, ...]) -> None:
         """Take the names that messages need: of the log (and its robot), and of the channels."""
-        self.rows = self.duplicates = self.blank = 0
+        self.rows = self.repeats = self.duplicates = self.blank = 0
         self.blank_channels: Counter[str] = Counter()
         self.first_ns: int | None = None
         self.last_ns: int | None = None
@@ -45,8 +46,10 @@ class Screen:
         """
         lacking = np.isnan(samples.values)
         whole = np.flatnonzero(~lacking.any(axis=1))
-        row = self.rows + whole
-        self.rows += len(lacking)
+        left_out = int(samples.repeats.sum())
+        row = (self.rows + np.arange(len(lacking)) + np.cumsum(samples.repeats) - samples.repeats)[whole]
+        self.rows += len(lacking) + left_out
+        self.repeats += left_out
         self.blank += len(lacking) - len(row)
         for k in np.flatnonzero(lacking.any(axis=0)):
             self.blank_channels[self._channels[k]] += int(lacking[:, k].sum())

@@ -6,15 +6,55 @@ import numpy as np
 
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
-from estimator.recording.sampling import Method
+from estimator.quantisation import rounding_step
+from estimator.recording.sampling import SENSORS, Method
 from mocobot_logs.log import NS, Array, Samples, Stamps, joined
+from mocobot_logs.readings import repeated
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
 from mocobot_logs.resample.grid import Grid, Interpolator, fitted_rows
 from mocobot_logs.resample.report import StreamReport
 from mocobot_logs.resample.screen import Screen
-from mocobot_logs.resample.steps import StepFinder
-from mocobot_logs.resample.tally import Tally
+from mocobot_logs.resample.tally import MOST_MISSING, Tally, is_hole
+
+BLOCK = 4096
+BLOCKS = 16
+"""So many blocks of ``BLOCK`` rows are looked at, from the first on: a minute at 1 kHz."""
+
+
+class StepFinder:
+    """Looks at blocks of rows, wherever the pieces end in which they come.
+
+    A block that rests shows no step, and one that moves fast repeats no value; the median of those that tell is taken.
+    """
+
+    def __init__(self) -> None:
+        """Start without any rows."""
+        self._waiting: list[Array] = []
+        self._rows = 0
+        self._votes: list[list[float]] = []
+
+    def add(self, values: Array) -> None:
+        """Look at the next rows, shape (q, C)."""
+        while len(values) and len(self._votes) < BLOCKS:
+            part, values = np.split(values[:, :SENSORS], [BLOCK - self._rows])
+            self._waiting.append(part.copy())  # the piece that it is cut from may be large
+            self._rows += len(part)
+            if self._rows == BLOCK:
+                self._vote()
+
+    def steps(self) -> tuple[float, ...]:
+        """Step of each of the sensors' channels, 0 for none [SI]."""
+        if self._waiting:
+            self._vote()
+        told = [[step for step in votes if step > 0] for votes in zip(*self._votes, strict=True)]
+        return tuple(float(np.median(steps)) if steps else 0.0 for steps in told)
+
+    def _vote(self) -> None:
+        values = np.concatenate(self._waiting)
+        self._votes.append([rounding_step(channel) for channel in values.T])
+        self._waiting, self._rows = [], 0
+
 
 SLOWEST, FASTEST_HZ = 0.25, 20e3
 """Slowest native rate over the output rate: signals up to 5 Hz need 25 Hz; and the fastest [Hz]."""
@@ -79,9 +119,10 @@ class RobotStream:
         """
         self._flush()
         screen = self.screen
-        rows = screen.rows - screen.duplicates - screen.blank
+        rows = screen.rows - screen.duplicates - screen.blank - screen.repeats
         if screen.first_ns is None or screen.last_ns is None or rows < MIN_SAMPLES:
             blank = f" ({screen.blank} rows lack a value)" if screen.blank else ""
+            blank += f" ({repeated(screen.repeats)})" if screen.repeats else ""
             raise InputError(f"{self._where} has {rows} samples{blank}; at least {MIN_SAMPLES} are needed")
         pipe = self._pipe or self._begin()
         values = pipe.finish(rows)
@@ -106,6 +147,7 @@ class RobotStream:
             blank=screen.blank,
             blank_channels=dict(screen.blank_channels),
             duplicates=screen.duplicates,
+            repeats=screen.repeats,
             merged=pipe.merged,
             method=pipe.method,
             steps=self._steps.steps(),
@@ -155,19 +197,24 @@ class RobotStream:
         k = max(1, round(native_hz / self._rate_hz))
         spacing_ns = 1.0 / (k * self._rate_hz) / NS
         fitting = Grid(spacing_ns, spacing_ns, fits=True)
-        if self._may_fit and abs(period_ns / spacing_ns - 1.0) < _SAME_RATE and fitting.holds(time_ns):
-            return fitting, k
         interval = np.diff(time_ns)
+        short = ~is_hole(interval, period_ns, self._max_gap_s)
+        lost = np.sum(np.rint(interval[short] / period_ns)) - np.sum(short)
+        # A logger that is faster than its messages stamps each with the time of its own next row.
+        again = self.screen.repeats > 0 and lost > MOST_MISSING * len(time_ns)
+        fits = self._may_fit and not again and abs(period_ns / spacing_ns - 1.0) < _SAME_RATE
+        if fits and fitting.holds(time_ns):
+            return fitting, k
         jitter_ns = interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns
         uneven = (
             native_hz >= MANY * self._rate_hz and float(np.sqrt(np.mean(jitter_ns**2))) > UNEVEN * period_ns
         )
-        if uneven:  # most intervals are shorter than the mean one, and none is told from a gap
-            period_ns = float(np.mean(interval))
+        if uneven or again:  # most intervals are shorter than the mean one, and none is told from a gap
+            period_ns = float(np.mean(interval[short]))
         native_hz = 1.0 / (period_ns * NS)
         k = fineness(native_hz, self._rate_hz, fitted=uneven)
         rows = fitted_rows(native_hz, self._rate_hz) if uneven else 0
-        return Grid(1.0 / (k * self._rate_hz) / NS, period_ns, fitted_rows=rows), k
+        return Grid(1.0 / (k * self._rate_hz) / NS, period_ns, fitted_rows=rows, uneven=uneven or again), k
 
 
 class _Pipe:

@@ -34,7 +34,7 @@ class Tally:
 
         Where samples are many and uneven, no interval tells how many are missing, and none counts as missing.
         """
-        self._uneven = grid.fitted_rows > 0
+        self._uneven = grid.uneven
         self.gaps = self.filled = 0
         self.longest_gap_s = self.jitter_max_s = 0.0
         self._where, self._period_ns, self._max_gap_s = where, grid.period_ns, max_gap_s
@@ -63,8 +63,8 @@ class Tally:
                 f"{self._where}: no samples for {interval[bad[0]] * NS:.6g} s, from "
                 f"{time_ns[bad[0]] * NS:.9g} s after its first sample on; they usually come "
                 f"{self._period_ns * NS:.6g} s apart, and at most {self._max_gap_s:g} s more may pass; "
-                "rows with NaN count as missing (convert --split-at-gaps makes trials of the parts between gaps, "
-                "--crop keeps one part)"
+                "rows with NaN or that repeat the one before count as missing (convert --split-at-gaps makes "
+                "trials of the parts between gaps, --crop keeps one part)"
             )
         jitter_s = (interval - periods * self._period_ns) * NS
         self._intervals += len(interval)

@@ -5,6 +5,7 @@ import csv
 import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -13,9 +14,35 @@ import pyarrow.csv as pcsv
 from estimator.errors import InputError
 from mocobot_logs.faults import detail_of, readable
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.table.comments import line_blocks
 from mocobot_logs.table.dates import TextClock, is_date
 from mocobot_logs.table.table import Block, Table, Wanted
+
+_COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
+
+
+def line_blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
+    """Blocks of whole lines, none of them empty, without those whose first character but blanks is ``#``.
+
+    Args:
+        file: read from where it is, where a line begins.
+        size: about how long blocks are [bytes]; a line of more than twice this is cut where it is so long.
+    """
+    rest = b""
+    while block := file.read(size):
+        lines = rest + block
+        end = lines.rfind(b"\n") + 1
+        if not end and len(lines) > 2 * size:
+            end = len(lines)
+        if ready := _without_comments(lines[:end]):
+            yield ready
+        rest = lines[end:]
+    if ready := _without_comments(rest):
+        yield ready
+
+
+def _without_comments(lines: bytes) -> bytes:
+    return _COMMENT.sub(b"", lines) if b"#" in lines else lines
+
 
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 1 << 20

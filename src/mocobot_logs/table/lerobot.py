@@ -16,10 +16,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 
 from estimator.errors import InputError
-from mocobot_logs.claims import check_claim, read_small
-from mocobot_logs.faults import detail_of, told_in_one_sentence
+from estimator.inputs import Unpacked, plain
+from mocobot_logs.faults import detail_of, read_small, told_in_one_sentence
 from mocobot_logs.formats import DATASET_INFO, dataset_root
 from mocobot_logs.table.parquet import KIND, ParquetTable, check_names
 from mocobot_logs.table.stamps import LARGEST_NS
@@ -89,6 +90,9 @@ class LeRobotTable(ParquetTable):
                 block = Block(block.columns, {**block.clocks, TIMESTAMP: (exact, given)})
             yield block
 
+    def _files(self) -> Iterator[tuple[Path, pq.ParquetSchema]]:
+        return ((Path(part.path), part.metadata.schema) for part in self._data.get_fragments())
+
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         return _read(self._data, self.name, columns=names, filter=self._filter, batch_size=rows)
 
@@ -104,7 +108,7 @@ def _read_info(root: Path, name: str) -> dict[str, Any]:
     where = f"{name}: {DATASET_INFO}"
     content = read_small(root / DATASET_INFO, MAX_INFO_BYTES, where, "dataset's description")
     try:
-        info = json.loads(content)
+        info = plain(json.loads(content))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where} cannot be read ({detail_of(error)})") from error
     if not isinstance(info, dict):
@@ -131,9 +135,9 @@ def _data_files(root: Path, info: dict[str, Any], name: str) -> Files:
     if listings:
         where = f"{name}: {listings[0].parents[1].relative_to(root)}"
         data = _dataset(listings, where)
-        missing = [column for column in NAME_COLUMNS if column not in data.schema.names]
-        if missing:
-            raise InputError(f"{where} has no column {missing[0]!r}")
+        for column in NAME_COLUMNS:
+            if column not in data.schema.names or not pa.types.is_integer(data.schema.field(column).type):
+                raise InputError(f"{where} has no column {column!r} of whole numbers")
         for batch in _read(data, where, columns=list(NAME_COLUMNS)):
             for place in zip(*batch.to_pydict().values(), strict=True):
                 if not all(type(value) is int and 0 <= value < 10**9 for value in place):
@@ -193,7 +197,7 @@ def _dataset(paths: list[Path], name: str) -> ds.Dataset:
         if any(not part.physical_schema.equals(data.schema) for part in data.get_fragments()):
             raise InputError(f"{name}: its Parquet files have different columns")
         rows, stored_bytes = _extent(data)
-    check_claim(8 * len(NAME_COLUMNS) * rows, stored_bytes, name)
+    Unpacked(name, stored_bytes).add(8 * len(NAME_COLUMNS) * rows)
     return data
 
 

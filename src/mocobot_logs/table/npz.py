@@ -12,9 +12,10 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.archive import refuse_other_packing
 from estimator.errors import InputError
+from estimator.inputs import Unpacked
 from estimator.recording.metadata import RecordingMetadata
-from mocobot_logs.claims import check_claim
 from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.table.stamps import from_numbers
 from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
@@ -98,7 +99,7 @@ class NpzTable(Table):
                 advance(count)
 
     def _rows(self, names: list[str]) -> int:
-        rows = self._arrays[names[0]].shape[0]
+        rows, unpacked = self._arrays[names[0]].shape[0], Unpacked(self.name, self._path.stat().st_size)
         for name in names:
             array = self._arrays[name]
             if array.dtype.kind not in "iuf":
@@ -108,8 +109,7 @@ class NpzTable(Table):
                     f"{self.name}: array {name!r} has {array.shape[0]} rows, but {names[0]!r} has {rows}; "
                     "all must have as many"
                 )
-            stored = min(array.member.compress_size, self._path.stat().st_size)
-            check_claim(array.size, stored, f"{self.name}: array {name!r}")
+            unpacked.add(array.size)
             if _is_columnwise(array) and array.size > MAX_WHOLE_BYTES:
                 raise InputError(
                     f"{self.name}: array {name!r} is in Fortran order and larger than {MAX_WHOLE_BYTES >> 30} GiB; "
@@ -169,6 +169,7 @@ class NpzTable(Table):
     @contextmanager
     def _opened(self) -> Iterator[zipfile.ZipFile]:
         with told_in_one_sentence(self.name, "NPZ archive"), zipfile.ZipFile(self._path) as archive:
+            refuse_other_packing(archive, self.name)
             yield archive
 
 

@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
+from estimator.inputs import Unpacked
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.parquet import METADATA_KEY
-from mocobot_logs.claims import check_claim
+from estimator.recording.parquet_claims import claimed_bytes
 from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.log import Stamps
 from mocobot_logs.table.stamps import from_numbers
@@ -70,13 +71,23 @@ class ParquetTable(Table):
         for name in names:
             self._check_type(name, time=name in wanted.clocks)
         cells = sum(int(np.prod(self.shapes[name], dtype=np.int64)) for name in names)
-        check_claim(8 * cells * self._rows, self._stored_bytes, f"{self.name}: the table")
+        self._check(names, 8 * cells * self._rows)
         row = 0
         for batch in self._batches(names, rows_at_a_time(cells)):
             yield self._block(batch, wanted, row)
             row += batch.num_rows
             advance(batch.num_rows)
         pa.default_memory_pool().release_unused()
+
+    def _check(self, names: list[str], claimed: int) -> None:
+        """Refuse columns that unpack to too much by another claim, or by what the files say."""
+        with told_in_one_sentence(self.name, KIND):
+            told = sum(claimed_bytes(path, _columns(schema), names) for path, schema in self._files())
+            Unpacked(self.name, self._stored_bytes).add(max(claimed, told))
+
+    def _files(self) -> Iterator[tuple[Path, pq.ParquetSchema]]:
+        with opened(self._path, self.name) as file:
+            yield self._path, file.schema
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         with opened(self._path, self.name) as file:
@@ -96,15 +107,17 @@ class ParquetTable(Table):
 
     def _check_type(self, name: str, *, time: bool) -> None:
         kind = _innermost(self._schema.field(name).type)
-        if time and pa.types.is_timestamp(kind):
-            return
-        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
+        if not (_is_number(kind) or (time and pa.types.is_timestamp(kind))):
             raise InputError(f"{self.name}: column {name!r} holds {kind}; it must hold numbers")
 
     def _row_shapes(self) -> dict[str, tuple[int, ...]]:
         """Lists whose length the schema does not fix are measured in the first row."""
         shapes = {field.name: _fixed_shape(field.type) for field in self._schema}
-        open_names = [name for name, shape in shapes.items() if shape is None]
+        open_names = [
+            n for n, s in shapes.items() if s is None and _is_number(_innermost(self._schema.field(n).type))
+        ]
+        if open_names:
+            self._check(open_names, 0)
         if open_names and (first := next(self._batches(open_names, 1), None)) is not None and len(first):
             shapes |= {name: np.shape(first.column(name)[0].as_py()) for name in open_names}
         return {name: shape or () for name, shape in shapes.items()}
@@ -182,6 +195,14 @@ def _clock(column: pa.Array, shape: tuple[int, ...], unit_ns: int | None, where:
         ns = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).fill_null(0)
         return ns.to_numpy(zero_copy_only=False), given
     return from_numbers(numbers(column, shape, where).reshape(len(column)), unit_ns, where, row)
+
+
+def _columns(schema: pq.ParquetSchema) -> list[str]:
+    return [schema.column(k).path for k in range(len(schema))]
+
+
+def _is_number(kind: pa.DataType) -> bool:
+    return pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)
 
 
 def _innermost(kind: pa.DataType) -> pa.DataType:

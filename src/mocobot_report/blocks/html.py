@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.etree import ElementTree
 
+from estimator.inputs import printable
+
 Node = ElementTree.Element
 Child = Node | str | None | Iterable["Child"]
 
@@ -85,7 +87,7 @@ def variables(values: Mapping[str, str]) -> str:
 
 
 def _clean(text: str) -> str:
-    return NOT_HTML.sub("\ufffd", text)
+    return NOT_HTML.sub(lambda found: printable(found[0]), text)
 
 
 def _text(node: Node, text: str) -> None:

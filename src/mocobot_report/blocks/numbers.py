@@ -3,7 +3,7 @@
 import math
 import re
 
-from estimator.numbers import decimals
+from estimator.statistics import decimals
 
 MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
 SUPERSCRIPTS = str.maketrans(

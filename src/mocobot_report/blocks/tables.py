@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el, words
 from mocobot_report.blocks.numbers import NONE, PLUS_MINUS, THIN, measured, plain
 from mocobot_report.blocks.units import spelled_text
@@ -144,3 +145,28 @@ def quantity(text: str) -> Node:
         out += [text[at : match.start()], el("i", match[1]), el("sub", match[2])]
         at = match.end()
     return el("span", *out, text[at:])
+
+
+def mass(e: PayloadEstimate) -> Num:
+    """The mass [kg]."""
+    return measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE)
+
+
+def place(e: PayloadEstimate, k: int) -> Num:
+    """One coordinate of the centre of mass in {1} [mm]."""
+    return component(e.p_1c, e.p_1c_se_m, k, 1e3)
+
+
+def moment(e: PayloadEstimate, k: int) -> Num:
+    """One principal moment of inertia [kg m²]."""
+    return (
+        component(e.inertia.principal.moments, e.inertia.principal.moments_se, k) if e.inertia else Num(NONE)
+    )
+
+
+def distance(e: PayloadEstimate, i: int, j: int) -> Num:
+    """Distance of two grasps [mm]; robots counted from 1."""
+    if e.grasps is None or max(i, j) > e.robots:
+        return Num(NONE)
+    pair = e.grasps.pair(i, j)
+    return measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)

@@ -7,11 +7,10 @@ import numpy as np
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.carried import carried
 from estimator.calibrate.outcome.text import frames_sentence
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section, tabs
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, plain, with_error
 from mocobot_report.blocks.prose import bullets, paragraph, tidy, tiles, verdict
-from mocobot_report.blocks.sections import section, tabs
 from mocobot_report.calibration.charts import certainty_chart, deviation_chart, fit_charts, share_chart
 from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
 from mocobot_report.folder import Calibrated

@@ -15,10 +15,12 @@ from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.blocks.units import short_names
 from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
 
 
+@plain_words()
 def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
     """Draw everything into an existing folder and return the paths."""
     figures = {
@@ -93,9 +95,10 @@ def _recordings(calibration: Calibration) -> Figure:
             )  # fmt: skip
         axis.axvline(1.0, color=LIGHT["text"], lw=1.0, ls="--")
         axis.set_xscale("log")
+        plain_numbers(axis.xaxis)
         axis.set_yticks(range(len(names)), names, fontsize=9)
         axis.set_ylim(len(names) - 0.4, -0.6)
-        axis.set_xlabel("chi$^2$/n")
+        axis.set_xlabel("chi²/n")
         axis.set_title(title, loc="left", fontsize=10)
         _plain(axis)
     figure.legend(loc="outside upper right", ncols=3, frameon=False, fontsize=9)
@@ -111,7 +114,14 @@ def _shares(calibration: Calibration) -> Figure:
     left = np.zeros(len(kinds))
     for k, (name, trial) in enumerate(zip(short_names([t.name for t in trials]), trials, strict=True)):
         share = 100.0 * np.array([trial.shares.get(kind, 0.0) for kind in kinds])
-        axis.barh(range(len(kinds)), share, 0.66, left, color=LIGHT[COLOURS[k % len(COLOURS)]], label=name)
+        axis.barh(
+            range(len(kinds)),
+            share,
+            0.66,
+            left,
+            color=LIGHT[COLOURS[k % len(COLOURS)]],
+            label=name if name[0] != "_" else f" {name}",
+        )
         left += share
     axis.barh(
         range(len(kinds)),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.charts import axis, chart, dots, figure, log_axis
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.prose import bullets, paragraph, verdict
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import table
 from mocobot_report.campaign.words import Json, background_words, sentences, share_words, tables
 from mocobot_report.folder import Campaign

@@ -7,13 +7,12 @@ import numpy as np
 
 from discrepancy.result.remains import all_as_found
 from discrepancy.result.text_gain import ERRORS, foretold_torques, response_units, something_is_off
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key, shared_legend
 from mocobot_report.blocks.numbers import NONE, percent, plain, spelled
 from mocobot_report.blocks.prose import folded, paragraph, tidy, verdict
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table, value
 
 Values = Mapping[str, Any]

@@ -8,8 +8,7 @@ from scipy.spatial.transform import RigidTransform
 from estimator.arm.delta import forward_kinematics
 from estimator.arrays import Array
 from mocobot_sim.base.drive import BaseDrive
-from mocobot_sim.base.motion import PlanarMotion
-from mocobot_sim.base.planar import moved, wrapped, yaw_of
+from mocobot_sim.base.motion import PlanarMotion, moved, wrapped, yaw_of
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.models import omnid_design

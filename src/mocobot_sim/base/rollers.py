@@ -41,7 +41,7 @@ def wheel_reach(design: BaseDesign, angle: ArrayLike) -> Array:
     return (design.wheel_radius_m - r) * np.cos(t) + np.sqrt(r**2 + lift)
 
 
-def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
+def release(omnid: "mjcf.RootElement", design: BaseDesign) -> None:
     """Put rollers on the wheels of an Omnid, motors on their axles, and take its planar joints away.
 
     Wheels keep their mass and their inertia. The chassis then needs a free joint, which belongs to the frame by which
@@ -75,7 +75,7 @@ def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
         )
 
 
-def rough_floor(root: mjcf.RootElement, design: BaseDesign) -> None:
+def rough_floor(root: "mjcf.RootElement", design: BaseDesign) -> None:
     """Let rollers stand on the floor of a scene: contact with elliptic friction cones, as stiff as the other loops."""
     root.option.flag.contact = "enable"
     root.option.cone, root.option.impratio = "elliptic", FRICTION_RATIO

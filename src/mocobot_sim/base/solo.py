@@ -1,19 +1,49 @@
 """One Omnid alone on a floor, its arm locked at home: to see what its base does."""
 
+from collections.abc import Sequence
+
 import mujoco
 
+from estimator.arrays import Array
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.rollers import release, rough_floor
-from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.scene.models import models_dir
 from mocobot_sim.scene.omnid import load_omnid, stand
 from mocobot_sim.scene.pymjcf import compiled, mjcf
 from mocobot_sim.scene.scene import TIMESTEP_S
+from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import RATE_HZ
 
 
-def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
+class Snapshots:
+    """Keeps ``qpos`` at given times: an actor of a trial that does nothing.
+
+    Args:
+        times_s: when [s]; each is kept at the first control tick from then on.
+    """
+
+    def __init__(self, times_s: Sequence[float]) -> None:
+        self.times_s = tuple(sorted(times_s))
+        self.qpos: list[Array] = []
+
+    def start(self, stage: Stage) -> None:
+        """Get ready."""
+        self.begin(stage.data, stage.rate_hz)
+
+    def begin(self, data: mujoco.MjData, rate_hz: float) -> None:
+        """The same without a trial."""
+        self._data, self._rate_hz, self.qpos = data, rate_hz, []
+
+    def act(self, tick: int) -> None:
+        """Look, and keep what is due."""
+        while (
+            len(self.qpos) < len(self.times_s) and tick >= self.times_s[len(self.qpos)] * self._rate_hz - 1e-6
+        ):
+            self.qpos.append(self._data.qpos.copy())
+
+
+def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> "mjcf.RootElement":
     """One released Omnid at the world's origin, heading along x; its arm is rigid.
 
     Args:
@@ -41,7 +71,7 @@ def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S)
     return root
 
 
-def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
+def compile_solo(root: "mjcf.RootElement") -> mujoco.MjModel:
     """Compile what ``build_solo`` returned."""
     return compiled(root)
 

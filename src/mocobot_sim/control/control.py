@@ -35,9 +35,17 @@ TAKE_UP_TICKS = 15
 """Place among the controller's constants that is set when a load is given."""
 
 
+RANGES = {
+    "rate_hz": (1.0, 1e5), "stiffness_N_per_m": (0.0, 1e6), "damping_Ns_per_m": (0.0, 1e5),
+    "torque_gain": (0.0, 1e3), "torque_rate_gain_s": (0.0, 10.0), "rate_filter_s": (0.0, 10.0),
+    "take_up_s": (0.0, 3600.0), "take_up_time_constant_s": (1e-6, 3600.0), "motor_torque_limit_Nm": (1e-3, 1e5),
+}  # fmt: skip
+"""Of gains; whether a team is stable with them is for ``control_stability`` to say."""
+
+
 @dataclass(frozen=True)
 class ControlGains:
-    """Gains of the wrist impedance and of the SEA torque loop.
+    """Gains of the wrist impedance and of the SEA torque loop, each within its ``RANGES``.
 
     Attributes:
         rate_hz: control rate [Hz].
@@ -61,6 +69,15 @@ class ControlGains:
     take_up_time_constant_s: float = 0.3
     motor_torque_limit_Nm: float = 40.0
 
+    def __post_init__(self) -> None:
+        """Refuse a gain that is no number, or out of its range, with an ``InputError``."""
+        for name, (low, high) in RANGES.items():
+            value = getattr(self, name)
+            if not is_number(value) or not low <= value <= high:
+                raise InputError(
+                    f"control.{name} is {value!r:.40}; it must be a number from {low:g} to {high:g}"
+                )
+
     def to_dict(self) -> dict[str, float]:
         """Plain numbers, keyed as documented for a recording's ``control``."""
         return asdict(self)
@@ -70,15 +87,10 @@ class ControlGains:
         """Read the gains out of a recording's ``control`` (other keys there are left alone).
 
         Raises:
-            InputError: a gain is missing or not a positive number.
+            InputError: a gain is missing, no number or out of its range.
         """
-        gains = {}
-        for entry in fields(cls):
-            value = values.get(entry.name)
-            if not is_number(value) or not value > 0:
-                raise InputError(f"control.{entry.name} is {value!r}; it must be a number greater than 0")
-            gains[entry.name] = float(value)
-        return cls(**gains)
+        gains: dict[str, Any] = {entry.name: values.get(entry.name) for entry in fields(cls)}
+        return cls(**{name: float(value) if is_number(value) else value for name, value in gains.items()})
 
 
 class TeamController:
@@ -163,6 +175,11 @@ class TeamController:
         from mocobot_sim.control.kernel import update_team  # numba takes half a second to load
 
         self._update = update_team
+
+    @property
+    def state(self) -> Array:
+        """What the controllers remember, shape (N, 7, 3), to be changed in place."""
+        return self._state
 
     @property
     def feed_forward(self) -> Array:

@@ -1,25 +1,105 @@
 """Extended models: a team with its effects as a folder that plain MuJoCo loads and a trial can run on."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from estimator.files import whole_folder
+from estimator.files import holds, whole_folder
+from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
-from mocobot_sim.extended.poses import poses_to_list, read_poses
-from mocobot_sim.extended.readme import readme
+from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.as_built_file import unit_in
+from mocobot_sim.scene.named_files import ASSETS, owned
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
+
+POSE = ("position_m", "quaternion_wxyz")
+
+
+def poses_to_list(poses: RigidTransform) -> list[dict[str, list[float]]]:
+    """One object per pose."""
+    quats = poses.rotation.as_quat(scalar_first=True)
+    return [
+        dict(zip(POSE, (p.tolist(), q.tolist()), strict=True))
+        for p, q in zip(poses.translation, quats, strict=True)
+    ]
+
+
+def read_poses(read: Fields, key: str, count: int) -> RigidTransform:
+    """Poses as ``poses_to_list`` writes them.
+
+    Raises:
+        InputError: they are not so many, or one of them is no pose.
+    """
+    positions, quats = [], []
+    for i, entry in enumerate(read.list(key, count), start=1):
+        pose = Fields(entry, POSE, f"{read.where}: {key}[{i}]")
+        positions.append(pose.array("position_m", (3,)))
+        quats.append(pose.array("quaternion_wxyz", (4,)))
+        if abs(np.linalg.norm(quats[-1]) - 1.0) > 1e-6:
+            raise InputError(f"{pose.where}: quaternion_wxyz has not length 1; it must have")
+    return RigidTransform.from_components(np.array(positions), Rotation.from_quat(quats, scalar_first=True))
+
+
+def readme(effects: Sequence[Mapping[str, Any]], robots: int, healthy: int = 0) -> str:
+    """Markdown for a user who finds the folder.
+
+    Args:
+        effects: as ``effect_to_dict`` gives them.
+        robots: number of robots.
+        healthy: how many of the effects, the last ones, are of parts that are off by no more than others.
+    """
+    named = len(effects) - healthy
+    table = _table(effects[:named])
+    if healthy:
+        table = table if named else "No cause was named."
+        rest = _table(effects[named:])
+        table = f"{table}\n\nEvery other part is as far off as it was found, within its tolerance:\n\n{rest}"
+    many = "1 Omnid" if robots == 1 else f"{robots} Omnids"
+    return f"""# Extended model
+
+A team of {many} and its payload in MuJoCo, with these effects built in:
+
+{table}
+
+- `team.xml`: the scene, complete. `mujoco.MjModel.from_xml_path("team.xml")` or MuJoCo's viewer loads it. What MJCF
+  cannot express is not in it: encoder and torque zeros, sensor timing, pushes, laws, a payload whose mass
+  changes, friction that gives way before it slips (`presliding_...` above 0).
+- `effects.json`: all numbers, those included.
+
+Simulate a trial with it:
+
+    mocobot simulate --model . --trajectory random --out trial.parquet
+
+From Python: `mocobot_sim.extended.extended.load_extended(folder)`, then `mocobot_sim.trial.trial.run_trial` or
+`mocobot_sim.trial.resimulate.resimulate`.
+"""
+
+
+def _table(effects: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for effect in effects:
+        place = (
+            ", ".join(f"{name} {effect[name]}" for name in ("robot", "joint") if name in effect) or "payload"
+        )
+        numbers = ", ".join(f"`{name}` = {_shown(value)}" for name, value in effect["parameters"].items())
+        rows.append(f"| `{effect['cause']}` | {place} | {numbers} |")
+    return "\n".join(["| cause | where | parameters |", "|---|---|---|", *rows]) if rows else "None."
+
+
+def _shown(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
+
 
 FORMAT = "mocobot-extended-model"
 VERSION = 1
@@ -81,21 +161,14 @@ def write_extended(
     page = readme(values["effects"], scene.robots, len(healthy))
     files = {SCENE: scene.to_xml().encode(), NUMBERS: text.encode(), README: page.encode(), **assets}
     folder = Path(folder)
-    if folder.exists() and not _is_extended(folder):
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir()) and not holds("extended")(folder)):
         raise InputError(f"{folder}: exists and is not an extended model; name a new folder")
     try:
-        with whole_folder(folder) as temporary:
+        with whole_folder(folder, "extended") as temporary:
             for name, content in files.items():
                 (temporary / name).write_bytes(content)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
-
-
-def _is_extended(folder: Path) -> bool:
-    try:
-        return json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
 
 
 def load_extended(folder: Path) -> TeamScene:
@@ -119,7 +192,7 @@ def load_extended(folder: Path) -> TeamScene:
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
-        if path.is_file() and path.name not in (SCENE, NUMBERS, README)
+        if path.is_file() and path.suffix.lower() in ASSETS and owned(path, folder, ASSETS)
     }
     scene = TeamScene(
         root=None,
@@ -138,6 +211,7 @@ def load_extended(folder: Path) -> TeamScene:
         assets=assets,
     )
     read.object("extra")
+    check_model(folder / SCENE)
     _check_model(scene, folder / SCENE)
     return scene
 
@@ -162,7 +236,7 @@ def _fields(values: dict[str, Any], where: str) -> Fields:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_input(path, JSON_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({detail}); an extended model has this file") from error

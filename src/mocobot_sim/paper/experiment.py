@@ -18,11 +18,12 @@ from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.result import PayloadEstimate
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
 from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
 from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.scoring import score, score_fit
+from mocobot_sim.paper.scoring import TrialSummary, score, score_fit
 from mocobot_sim.paper.store import Store
 from mocobot_sim.paper.work import Progress, Work
 from mocobot_sim.scene.models import payload_path
@@ -111,18 +112,6 @@ class PaperPlan:
         return list(groups.values())
 
 
-@dataclass(frozen=True)
-class TrialSummary:
-    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg]."""
-
-    name: str
-    rotation_deg: float
-    torque_Nm: float
-    rod_error_m: float
-    weld_error_m: float
-    weld_error_deg: float
-
-
 @dataclass
 class PaperResult:
     """What came out, by preset and payload.
@@ -169,7 +158,9 @@ def run_paper(
     # Far away all is sent at once: workers may come while it runs. A task's arguments are one tuple (``work``), which
     # joblib does not put on a worker beforehand, where they would be lost with it.
     ahead = "all" if remote else "2 * n_jobs"
-    with Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch=ahead) as pool:
+    with Parallel(
+        n_jobs=jobs, return_as="generator_unordered", pre_dispatch=ahead, **ends_with_this()
+    ) as pool:
         each = Work(pool, plan.steps, progress or _untold, store, remote=remote).each
         first = [
             (_request(plan, payload, "random", k), team, None)
@@ -261,6 +252,7 @@ def _trial(
         rod_error_m=done.log.rod_error_m,
         weld_error_m=done.log.weld_error_m,
         weld_error_deg=float(np.rad2deg(done.log.weld_error_rad)),
+        damping_ratio=done.log.stability.damping_ratio if done.log.stability else None,
     )
     return done.recordings, summary
 

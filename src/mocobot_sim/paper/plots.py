@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from estimator.files import whole_file
 from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.tables import BY_ENCODERS, MOMENTS, AllScores, Row, paper_tables, spring_share
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 COLOURS = {
     "paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", ONE_FIT: "#2f6fd0", "uncalibrated": "#e07b39",
@@ -25,6 +26,7 @@ SHARE = "springs' common scale"
 """A line in the plots of mass and inertia: what no carry decides."""
 
 
+@plain_words()
 def save_plots(scores: AllScores, folder: Path) -> list[Path]:
     """Draw one picture per table group and return their paths.
 
@@ -99,6 +101,7 @@ def _dots(axis: Axes, columns: Sequence[str], rows: Sequence[Row], title: str) -
             markerfacecolor="white" if name in HOLLOW else COLOURS.get(name),
         )  # fmt: skip
     axis.set_yscale("log")
+    plain_numbers(axis.yaxis)
     axis.set_xlim(-0.5, len(labels) - 0.5)
     axis.set_xticks(range(len(labels)), labels)
     axis.set_xticks([i + 0.5 for i in range(len(labels) - 1)], minor=True)

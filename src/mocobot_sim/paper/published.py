@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.estimate.frames import seen_by_encoders
 from estimator.strict import Fields, read_toml
 
 
@@ -46,15 +47,8 @@ class PayloadTruth:
         Args:
             theta_x_zero: reading minus true theta_x of every robot [rad], shape (N,).
         """
-        turn = Rotation.from_rotvec(np.outer(theta_x_zero, [1.0, 0.0, 0.0])).as_matrix()
-        back = turn[0].T
-        return replace(
-            self,
-            R_1i=back @ self.R_1i @ turn,
-            p_1i=self.p_1i @ turn[0],
-            p_1c=back @ self.p_1c,
-            R_1c=back @ self.R_1c,
-        )
+        R, p, p_1c, R_1c = seen_by_encoders(theta_x_zero, self.R_1i, self.p_1i, self.p_1c, self.R_1c)
+        return replace(self, R_1i=R, p_1i=p, p_1c=p_1c, R_1c=R_1c)
 
     def T(self, i: int, j: int) -> Array:
         """Homogeneous transform T_ij, shape (4, 4); robots counted from 1."""

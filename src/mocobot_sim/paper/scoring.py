@@ -11,6 +11,7 @@ are therefore given in both frames: those of the CAD, as in the paper, and those
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from estimator.calibrate.outcome.carried import carried
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.published import PayloadTruth
-from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.as_built import AsBuilt, theta_x_zeros, units_of
 
 MOMENTS = ("Ixx", "Iyy", "Izz")
 
@@ -31,6 +32,20 @@ ENCODER_FRAMES = "encoder_frames"
 """Key of the errors of grasps and centre of mass in the frames that the encoders define."""
 SPRING_SCALE = "spring_scale"
 """Key of what the team's common spring scale does to a calibrated mass and inertia, and of the errors beyond it."""
+
+
+@dataclass(frozen=True)
+class TrialSummary:
+    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg], and
+    the damping ratio of its control, below 0 if that was unstable."""
+
+    name: str
+    rotation_deg: float
+    torque_Nm: float
+    rod_error_m: float
+    weld_error_m: float
+    weld_error_deg: float
+    damping_ratio: float | None
 
 
 def score(
@@ -71,7 +86,7 @@ def score(
     result["random"] = _moment_errors(moments["random"], truth)
     result["periodic"] = _moment_errors(moments["periodic"], truth)
     if units is not None:
-        seen = _seen(truth, units)
+        seen = truth.seen_by_encoders(theta_x_zeros(units, len(truth.p_1i)))
         result[ENCODER_FRAMES] = _grasp_errors(grasps, seen) | _com_errors(estimate.p_1c, seen)
     return result
 
@@ -93,7 +108,7 @@ def score_fit(found: CalibratedPayload, truth: PayloadTruth, units: Sequence[AsB
     """
     numbers = carried(found, 0.0)
     mass, p_1c, moments = numbers.mass_kg, numbers.p_1c, numbers.principal.moments
-    seen = _seen(truth, units)
+    seen = truth.seen_by_encoders(theta_x_zeros(units, len(truth.p_1i)))
     built = units_of(units, len(truth.p_1i))
     share = 1.0 / (1.0 + float(np.mean([unit.stiffness_ratio for unit in built])))
     beyond = {"m": mass / (share * truth.mass)}
@@ -110,11 +125,6 @@ def score_fit(found: CalibratedPayload, truth: PayloadTruth, units: Sequence[AsB
 def rotation_error_deg(R: Array, R_estimated: Array) -> float:
     """Angle of R^T R_estimated [deg], shapes (3, 3)."""
     return float(np.rad2deg(Rotation.from_matrix(R.T @ R_estimated).magnitude()))
-
-
-def _seen(truth: PayloadTruth, units: Sequence[AsBuilt]) -> PayloadTruth:
-    built = units_of(units, len(truth.p_1i))
-    return truth.seen_by_encoders(np.array([unit.theta_zero_rad[2] for unit in built]))
 
 
 def _grasp_errors(grasps: Sequence[GraspEstimate], truth: PayloadTruth) -> dict[str, Any]:

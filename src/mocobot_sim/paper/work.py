@@ -1,14 +1,51 @@
 """Stages of an experiment: many tasks each, in several processes, with progress, kept on disk as they end."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.arrays import Array
-from mocobot_sim.paper.shares import shares
+from estimator.processes import scratch_folder
 from mocobot_sim.paper.store import Store
+
+EVERY_S = 0.2
+"""Time between two looks at the shares."""
+
+
+@contextmanager
+def shares(tasks: int, told: Callable[[float], object]) -> Iterator[Array]:
+    """Watch tasks while the block runs.
+
+    Args:
+        tasks: how many there are.
+        told: called, from a thread of its own, with how much is done, in tasks; at first with 0.
+
+    Yields:
+        The share of each task that is done, shape (tasks,), for the tasks to write to, in any process.
+    """
+    with scratch_folder() as folder:
+        done = np.memmap(folder / "shares", dtype=float, mode="w+", shape=(tasks,))
+        over = Event()
+
+        def tell() -> None:
+            ends = False
+            while not ends:
+                ends = over.wait(EVERY_S)
+                told(float(done.sum()))
+
+        told(0.0)
+        thread = Thread(target=tell, daemon=True)
+        thread.start()
+        try:
+            yield done
+        finally:
+            over.set()
+            thread.join()
+
 
 Progress = Callable[[float, float, str], object]
 

@@ -96,6 +96,11 @@ def units_of(as_built: Sequence[AsBuilt], robots: int) -> tuple[AsBuilt, ...]:
     return tuple(as_built) or (AsBuilt(),) * robots
 
 
+def theta_x_zeros(as_built: Sequence[AsBuilt], robots: int) -> Array:
+    """What every robot's theta_x reads too much [rad], shape (N,); see ``units_of``."""
+    return np.array([unit.theta_zero_rad[2] for unit in units_of(as_built, robots)])
+
+
 @dataclass(frozen=True)
 class CalibrationSpread:
     """Standard deviations of as-built deviations, normally distributed and independent.

@@ -10,14 +10,14 @@ from mocobot_sim.scene.model_files import models_dir
 from mocobot_sim.scene.pymjcf import mjcf
 
 
-def load_omnid(number: int) -> mjcf.RootElement:
+def load_omnid(number: int) -> "mjcf.RootElement":
     """The shipped model, its names prefixed with ``omnid{number}/`` when it is attached."""
     omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
     omnid.model = f"omnid{number}"
     return omnid
 
 
-def stand(root: mjcf.RootElement, omnid: mjcf.RootElement, place: ArrayLike, quat: ArrayLike) -> Any:
+def stand(root: "mjcf.RootElement", omnid: "mjcf.RootElement", place: ArrayLike, quat: ArrayLike) -> Any:
     """Attach an Omnid to a scene and return its frame.
 
     Args:
@@ -29,7 +29,7 @@ def stand(root: mjcf.RootElement, omnid: mjcf.RootElement, place: ArrayLike, qua
     return root.worldbody.add("site", name=name, group=4, pos=place, quat=quat).attach(omnid)
 
 
-def park(omnid: mjcf.RootElement) -> None:
+def park(omnid: "mjcf.RootElement") -> None:
     """Lock base and wheels to the floor, exactly and at no cost: a parked joint is one that is not there."""
     for name in (*BASE_JOINTS, *(f"wheel_{wheel}" for wheel in WHEELS)):
         omnid.find("joint", name).remove()

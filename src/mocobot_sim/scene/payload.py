@@ -9,7 +9,10 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
+from estimator.inputs import printable
+from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.models import payload_path, posed
+from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.scene.pymjcf import compiled, mjcf
 
 OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
@@ -18,22 +21,26 @@ OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbod
 GRASP = re.compile(r"grasp([0-9]+)")
 
 
-def load_payload(payload: str | Path) -> mjcf.RootElement:
+def load_payload(payload: str | Path) -> "mjcf.RootElement":
     """Read a payload's MJCF.
 
     Args:
         payload: name of a shipped payload, or path of an ``.xml`` file.
 
     Raises:
-        InputError: it cannot be read, or something in it would act on the robots, too.
+        InputError: it cannot be read, or something in it would act on the robots, too, or it names files
+            that are not its own.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
+    if path.exists():
+        check_model(path)
+    read = mjcf.from_path  # a refusal of its own where dm-control is missing
     try:
-        root = mjcf.from_path(str(path))
+        root = read(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
         said = " ".join(str(getattr(error, "strerror", None) or error).split())
-        quoted = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in said)  # of a damaged file
-        raise InputError(f"{path}: not a readable MJCF ({quoted})") from error
+        raise InputError(f"{path}: not a readable MJCF ({printable(said)})") from error
+    check_named(path, assets=True)
     if root.compiler.angle != "radian":
         # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')
@@ -58,7 +65,7 @@ def _is_set(element: Any) -> bool:
     return bool(element.get_attributes()) or any(_is_set(child) for child in element.all_children())
 
 
-def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
+def grasp_frames(payload_root: "mjcf.RootElement", where: str) -> RigidTransform:
     """Grasp frames X_1i, N transforms; from the compiled payload, so every MJCF orientation attribute works.
 
     Raises:

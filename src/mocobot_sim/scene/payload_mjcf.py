@@ -8,7 +8,7 @@ from estimator.errors import InputError
 from mocobot_sim.scene.pymjcf import mjcf
 
 
-def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTransform) -> mjcf.RootElement:
+def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTransform) -> "mjcf.RootElement":
     """Make a payload for ``build_team``.
 
     Args:

@@ -84,7 +84,7 @@ def _constant_impedance(d: float) -> list[float]:
     return [float(d), float(d), 0.001, 0.5, 2.0]
 
 
-def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
+def tune(root: "mjcf.RootElement", model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
     """Set soft rows of a PyMJCF tree for the inertias of the model that it compiles to."""
     for row in rows:
         equality = model.equality(row.equality).id

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import hyp2f1
 
 from estimator.arrays import Array
-from mocobot_sim.serial.state import direction
+from mocobot_sim.serial.law import direction
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,69 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
-from mocobot_sim.serial.assets import take_along
+from mocobot_sim.scene.named_files import ASSETS as TYPES
+from mocobot_sim.scene.named_files import owned
 from mocobot_sim.serial.built import Effect, refused, steps
 from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
-from mocobot_sim.serial.law import ActingLaw, JointLaw
+from mocobot_sim.serial.law import ActingLaw, JointLaw, State
 from mocobot_sim.serial.mjcf import into_mjcf
-from mocobot_sim.serial.state import State
+
+ASSETS = "assets"
+
+
+def take_along(spec: mujoco.MjSpec) -> dict[Path, str]:
+    """Name meshes, height fields, skins and textures by their place in ``assets`` beside a model that is written anew.
+
+    What is not found stays as it is named.
+
+    Args:
+        spec: the model as it was read from its file; changed.
+
+    Returns:
+        The files, each with its name in ``assets``.
+
+    Raises:
+        InputError: a file is not the model's own (see ``owned``).
+    """
+    taken: dict[Path, str] = {}
+
+    def moved(file: str, inside: str) -> str:
+        named = Path(
+            spec.modelfiledir, inside, Path(file).name if spec.strippath else file
+        )  # an absolute one alone
+        if not file or not named.is_file():
+            return file
+        source = owned(named, Path(spec.modelfiledir), TYPES)
+        if source not in taken:
+            taken[source] = (
+                source.name if source.name not in taken.values() else f"{len(taken)}_{source.name}"
+            )
+        return taken[source]
+
+    of = spec.compiler
+    for element in (*spec.meshes, *spec.hfields, *spec.skins):
+        element.file = moved(element.file, of.meshdir)
+    for texture in spec.textures:
+        texture.file = moved(texture.file, of.texturedir)
+        for k, file in enumerate(texture.cubefiles):
+            texture.cubefiles[k] = moved(file, of.texturedir)
+    if taken:
+        of.meshdir = of.texturedir = ASSETS
+    return taken
+
+
+def put(taken: Mapping[Path, str], spec: mujoco.MjSpec, folder: Path) -> None:
+    """Copy what ``take_along`` found into the folder that the model is written to.
+
+    Raises:
+        OSError: a file cannot be read or written.
+    """
+    if taken:
+        (folder / ASSETS).mkdir()
+        spec.modelfiledir = str(folder.resolve())  # from where MuJoCo reads them when it writes the model
+    for source, name in taken.items():
+        shutil.copyfile(source, folder / ASSETS / name)
+
 
 FORMAT, VERSION = "mocobot-extended-robot", 2
 SCENE, NUMBERS, README = "robot.xml", "effects.json", "README.md"
@@ -47,7 +105,8 @@ def write_extended(
         reference: whether it is what has changed since other logs, whose own errors are then in no model.
 
     Raises:
-        InputError: the folder cannot be written, or an effect makes a model that MuJoCo refuses.
+        InputError: the folder cannot be written, an effect makes a model that MuJoCo refuses, or a mesh or texture is
+            not the model's own.
     """
     try:
         inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
@@ -57,9 +116,10 @@ def write_extended(
     places = [
         SCENE if said else NUMBERS if steps(e) else "none" for e, said in zip(effects, inside, strict=True)
     ]
+    taken = take_along(spec)
     try:
         folder.mkdir()
-        take_along(spec, folder)
+        put(taken, spec, folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     write_text(folder / SCENE, spec.to_xml())

@@ -6,6 +6,7 @@ import numpy as np
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from mocobot_sim.control.control import ControlGains, home_phi
+from mocobot_sim.control.stability import Stability
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
@@ -115,6 +116,7 @@ class Rows:
         gains: ControlGains,
         scene: TeamScene,
         sensed: SensedLog,
+        stability: Stability | None,
     ) -> TrialLog:
         """The log of the whole trial."""
         rows = slice(None)
@@ -136,6 +138,7 @@ class Rows:
             rod_error_m=float(rod.max()),
             weld_error_m=float(weld.max()),
             weld_error_rad=float(angle.max()),
+            stability=stability,
         )
 
 

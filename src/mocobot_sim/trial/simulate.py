@@ -1,7 +1,7 @@
 """From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -84,7 +84,7 @@ class Simulated:
     @cached_property
     def truth(self) -> GroundTruth:
         """The payload and the robots; compiles the team once more."""
-        return GroundTruth.of(self.scene)
+        return replace(GroundTruth.of(self.scene), control=self.log.stability)
 
 
 def simulate(

@@ -1,6 +1,9 @@
 """Run one trial: physics and control at 1 kHz, logged at 100 Hz, checked for everything that can go wrong."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -9,16 +12,76 @@ from scipy.interpolate import CubicSpline
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains, TeamController
+from mocobot_sim.control.stability import control_stability
+from mocobot_sim.scene.applied import Pushing
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.actors import Actor, Loading, Stage
+from mocobot_sim.trial.actors import Acting, Actor, Loading, Reader, Stage
 from mocobot_sim.trial.assemble import assemble_at_home
-from mocobot_sim.trial.others import Others
 from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial.trial_log import TrialLog
+
+
+@dataclass(frozen=True)
+class Others:
+    """Actors, sensors that misread, and pushes of one trial.
+
+    Attributes:
+        actors, readers, pushes: each in the order in which it acts.
+        carries: whether there is a payload to act on.
+        R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
+    """
+
+    actors: tuple[Actor, ...]
+    readers: tuple[Reader, ...]
+    pushes: tuple[Pushing, ...]
+    carries: bool
+    R_Wb1: Array
+
+    @classmethod
+    def of(cls, scene: TeamScene, trial_number: int | None, actors: Sequence[Actor]) -> Others:
+        """``actors``, and after them what the scene's effects bring to a trial."""
+        acting = [effect for effect in scene.effects if isinstance(effect, Acting)]
+        return cls(
+            (*actors, *(actor for effect in acting for actor in effect.actors(trial_number))),
+            tuple(reader for effect in acting for reader in effect.readers(trial_number)),
+            tuple(push for push in scene.pushes if trial_number in (None, push.trial)),
+            scene.carries,
+            scene.mounts.rotation[0].as_matrix(),
+        )
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return bool(self.actors or self.readers or self.pushes)
+
+    def start(self, stage: Stage) -> None:
+        """Get ready."""
+        for part in (*self.actors, *self.readers):
+            part.start(stage)
+
+    def before_control(self, stage: Stage, tick: int, seen: Array) -> None:
+        """Act, from no force applied on, and change what the sensors see, shape (nq,), in place."""
+        data = stage.data
+        if self.carries and (self.pushes or self.actors):
+            data.xfrc_applied[stage.index.payload_body] = 0.0
+        if self.actors:
+            data.qfrc_applied[:] = 0.0
+        for actor in self.actors:
+            actor.act(tick)
+        if self.readers:
+            seen[:] = data.qpos
+            for reader in self.readers:
+                reader.read(tick, seen)
+
+    def after_control(self, stage: Stage) -> None:
+        """Push."""
+        for push in self.pushes:
+            if push.acts(stage.data.time):
+                mujoco.mj_kinematics(stage.model, stage.data)
+                push.act(stage.data, stage.index.payload_body, self.R_Wb1)
 
 
 def run_trial(
@@ -69,6 +132,8 @@ def run_trial(
     commands = np.stack(between_commands(trajectory.ref_b, ticks), axis=1)
     if feed_forward is None and not scene.carries:
         feed_forward = np.zeros((index.robots, 3))
+    parked = not actors and not index.base_dof.size
+    stability = control_stability(scene, model, data, gains, trajectory.ref_b[0]) if parked else None
     sensed = np.empty((len(commands), index.robots, 3, 3))
     others = Others.of(scene, trial_number, actors)
     seen = data.qpos.copy() if others.readers else data.qpos
@@ -105,9 +170,8 @@ def run_trial(
                 progress(sample + 1, last + 1)
             reported = sample + 1
     phi, theta, tau = (np.ascontiguousarray(sensed[:, :, k]) for k in range(3))
-    return log.finish(
-        trajectory, controller.feed_forward, gains, scene, SensedLog(gains.rate_hz, ticks, phi, theta, tau)
-    )
+    seen_by_sensors = SensedLog(gains.rate_hz, ticks, phi, theta, tau)
+    return log.finish(trajectory, controller.feed_forward, gains, scene, seen_by_sensors, stability)
 
 
 def _whole(name: str, ratio: float) -> int:

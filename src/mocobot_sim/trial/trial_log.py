@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
 from mocobot_sim.control.control import ControlGains
+from mocobot_sim.control.stability import Stability
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.trial.sensed import SensedLog
@@ -34,6 +35,7 @@ class TrialLog:
         rod_error_m: largest distance between a rod's tip and its platform joint [m].
         weld_error_m: largest distance between a flange and its grasp [m].
         weld_error_rad: largest angle between a flange and its grasp [rad].
+        stability: whether the control was stable; None where bases drove or others acted on the arms.
     """
 
     trial: str
@@ -52,6 +54,7 @@ class TrialLog:
     rod_error_m: float
     weld_error_m: float
     weld_error_rad: float
+    stability: Stability | None
 
     @property
     def robots(self) -> int:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
 from estimator.files import write_json
+from mocobot_sim.control.stability import Stability
 from mocobot_sim.effects import effect_to_dict
 from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.as_built import AsBuilt
@@ -33,6 +34,7 @@ class GroundTruth:
         principal_kgm2: principal moments of inertia, ascending, shape (3,).
         units: how each robot deviates from the design, N entries.
         effects: what else was hidden in the team.
+        control: whether the control of the trial was stable, if that is known.
 
     Robots that hold nothing have no grasps (N = 0 above), and all of the payload is zero.
     """
@@ -45,6 +47,7 @@ class GroundTruth:
     principal_kgm2: Array
     units: tuple[AsBuilt, ...]
     effects: tuple[Applied, ...] = ()
+    control: Stability | None = None
 
     @classmethod
     def of(cls, scene: TeamScene) -> GroundTruth:
@@ -77,7 +80,7 @@ class GroundTruth:
     def to_dict(self) -> dict[str, Any]:
         """JSON-able form, units in the keys; orientations as rotation vectors in degrees.
 
-        Of robots that hold nothing it has ``as_built`` and ``effects`` only.
+        Of robots that hold nothing it has ``as_built``, ``effects`` and ``control`` only.
         """
         payload = {
             "grasps": [
@@ -92,7 +95,7 @@ class GroundTruth:
         robots = {
             "as_built": [unit.to_dict() for unit in self.units],
             "effects": [effect_to_dict(effect) for effect in self.effects],
-        }
+        } | ({} if self.control is None else {"control": self.control.to_dict()})
         return payload | robots if len(self.p_1i) else robots
 
 

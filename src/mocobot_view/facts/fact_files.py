@@ -7,8 +7,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
+from estimator.estimate.frames import seen_by_encoders
 from estimator.estimate.result import PayloadEstimate
 from estimator.strict import Fields, read_json
+from mocobot_sim.scene.as_built import theta_x_zeros
+from mocobot_sim.scene.as_built_file import read_units
 from mocobot_sim.trial.truth import truth_path
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
@@ -17,15 +20,15 @@ TRUTH = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kg
 """Keys of the truth that are drawn."""
 
 
-def read_truth(recording: Path, robots: int) -> BodyFacts:
-    """The truth beside a simulated recording.
+def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = None) -> BodyFacts:
+    """The truth beside a simulated recording, in the frames of an estimate, if there is one.
 
     Raises:
         InputError: there is none, or it is not one of as many robots.
     """
     path = truth_path(recording)
     values = read_json(path, "the truth beside a simulated recording")
-    truth = Fields(values, TRUTH, str(path), optional=("as_built", "effects"))
+    truth = Fields(values, TRUTH, str(path), optional=("as_built", "effects", "control"))
     grasps = values["grasps"]
     if not isinstance(grasps, list) or len(grasps) != robots:
         count = len(grasps) if isinstance(grasps, list) else "no"
@@ -33,18 +36,17 @@ def read_truth(recording: Path, robots: int) -> BodyFacts:
     each = [
         Fields(entry, ("p_1i_m", "R_1i_rotvec_deg"), f"{path}: grasps[{k}]") for k, entry in enumerate(grasps)
     ]
-    return BodyFacts(
-        grasps=Grasps(
-            Rotation.from_rotvec(
-                [entry.array("R_1i_rotvec_deg", (3,)) for entry in each], degrees=True
-            ).as_matrix(),
-            np.array([entry.array("p_1i_m", (3,)) for entry in each]),
-        ),
-        mass_kg=truth.number("mass_kg"),
-        p_1c=truth.array("p_1c_m", (3,)),
-        R_1c=Rotation.from_rotvec(truth.array("R_1c_rotvec_deg", (3,)), degrees=True).as_matrix(),
-        principal_kgm2=truth.array("principal_inertia_kgm2", (3,)),
+    R_1c, *R_1i = (
+        Rotation.from_rotvec(read.array(key, (3,)), degrees=True).as_matrix()
+        for read, key in ((truth, "R_1c_rotvec_deg"), *((entry, "R_1i_rotvec_deg") for entry in each))
     )
+    p_1i = np.array([entry.array("p_1i_m", (3,)) for entry in each])
+    parts = [np.array(R_1i), p_1i, truth.array("p_1c_m", (3,)), R_1c]
+    if estimate is not None and estimate.zero_sd_rad and "as_built" in truth:
+        parts = seen_by_encoders(theta_x_zeros(read_units(path), robots), *parts)
+    R, p, p_1c, R_1c = parts
+    moments = truth.array("principal_inertia_kgm2", (3,))
+    return BodyFacts(Grasps(R, p), truth.number("mass_kg"), p_1c, R_1c, moments)
 
 
 def read_estimate(path: Path) -> PayloadEstimate:

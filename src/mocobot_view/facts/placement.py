@@ -4,13 +4,17 @@ The world W lies on the floor under robot 1, its axes those of {b1}. All bases a
 a calibration has found: any other is what a diagnosis looks for, not what a picture assumes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
+from estimator.arm.arms import Arms
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
 
 SPACING_M = 1.2
 """Distance of robots in a row, where nothing tells how they stand."""
@@ -118,3 +122,21 @@ def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> Pa
     return PayloadMotion(
         R_W1, p_W1, 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)), np.linalg.norm(p_Wi - held, axis=-1)
     )
+
+
+def as_estimated(recording: Recording, estimate: PayloadEstimate | None) -> Recording:
+    """A recording whose robots are those of its estimate, where it says nothing of them itself and they fit."""
+    metadata, units = recording.metadata, None if estimate is None else estimate.units
+    if units is None or metadata.units is not None:
+        return recording
+    if units.design != metadata.design or len(units.x) != metadata.robots:
+        return recording
+    return replace(recording, metadata=replace(metadata, units=units))
+
+
+def tilted(bases: Bases, arms: Arms) -> Bases:
+    """Bases as they stand: level ones, turned by what a calibration says of each."""
+    if not isinstance(arms, ArmUnit) or not np.any(arms.of("tilt")):
+        return bases
+    R: Array = bases.R_Wb @ arms.R_ba
+    return Bases(R, bases.p_Wb)

@@ -7,7 +7,6 @@ installation may take the process with it. So whoever asks for pictures needs no
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from estimator.extras import NO_PLOTS, has_plots
+from estimator.processes import scratch_folder
 from mocobot_view.pictures.camera import Camera, pixels
 from mocobot_view.pictures.marks import Marks
 
@@ -90,8 +90,7 @@ def render_shots(shots: Sequence[Shot], width: int = 1600, height: int = 1000) -
         return NO_PLOTS
     from mocobot_view.pictures.labels import with_labels  # matplotlib, an extra
 
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with scratch_folder() as folder:
         _write_task(folder, shots, width, height)
         plain = _run(folder)
     if isinstance(plain, str):

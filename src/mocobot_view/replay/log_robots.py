@@ -8,11 +8,10 @@ from scipy.spatial.transform import Rotation
 from mocobot_view import colours
 from mocobot_view.bodies.robot import PATHS, TINTED, fixed_frames, robot_shapes
 from mocobot_view.bodies.shapes import Shape
-from mocobot_view.colours import Colour
+from mocobot_view.colours import FORCE_M_PER_N, MARK_M, Colour
 from mocobot_view.facts.cause_body import by_place
 from mocobot_view.replay.log_time import send, send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
-from mocobot_view.sizes import FORCE_M_PER_N, MARK_M
 
 TRAIL_HZ = 25.0
 """Pieces of a wrist path per second; it is drawn only, the samples are among the series."""

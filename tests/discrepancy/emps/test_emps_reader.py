@@ -14,6 +14,7 @@ from discrepancy.emps.recording.preflight import checked, stuck
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.recording.whole import is_whole
 from emps_made import GAIN, KP, KV, as_mat, reference, written
+from estimator import inputs
 from estimator.errors import InputError
 
 RATE = 1000.0
@@ -248,3 +249,30 @@ def test_a_coarse_position_and_saturation_are_said(tmp_path: Path) -> None:
     assert any("steps of 20 um" in note for note in log.notes)
     assert any("saturates (+-10 V) in 10 of 7200 samples" in note for note in log.notes)
     assert log.saturated.sum() == 10
+
+
+def test_rows_that_repeat_count_once(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    made = axis()
+    made = replace(made, voltage=made.voltage + rng.normal(0.0, 0.01, len(made.time)))
+    whole = read_emps(written(tmp_path, made))
+    assert whole.notes == ()
+    index = np.arange(len(made.time))
+    index[2000:2010] = 2000
+    fields = {name: getattr(made, name)[index] for name in ("position", "reference", "voltage")}
+    log = read_emps(written(tmp_path, replace(made, **fields)))
+    assert log.notes[0] == "9 rows repeat the one before, and a reading counts once."
+    assert "9 of" in log.notes[1]
+    np.testing.assert_allclose(log.position, whole.position, atol=1e-5)
+    index[2000:4000] = 2000
+    fields = {name: getattr(made, name)[index] for name in ("position", "reference", "voltage")}
+    assert "s are missing from t = 2 s on" in refused(written(tmp_path, replace(made, **fields)))
+
+
+def test_a_file_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "axis.mat"
+    savemat(path, as_mat(axis()) | {"more": np.zeros(1 << 18)}, do_compression=True)
+    assert len(read_emps(path).time)
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(inputs, "LARGEST_RATIO", 2)
+    assert "axis.mat: unpacks to at least 0.00" in refused(path)

@@ -15,6 +15,7 @@ import pytest
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import TABLES, load_traces, save_traces
 from discrepancy.rig import Channel
+from estimator import inputs
 from estimator.errors import InputError
 
 EPOCH_S = 1.7e9
@@ -155,3 +156,14 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         load_traces(tmp_path)
     with pytest.raises(InputError, match="cannot be written"):
         save_traces([], CHANNELS, tmp_path / "none" / "residuals.npz")
+
+
+def test_a_file_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
+    save_traces([made_trace("a")], CHANNELS, path := tmp_path / "residuals.npz")
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("more.npy", bytes(10 << 20))
+    with pytest.raises(
+        InputError, match=r"residuals.npz: unpacks to at least 0.0097\d* GiB; the limit is 0.00"
+    ):
+        load_traces(path)

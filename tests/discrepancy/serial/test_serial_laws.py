@@ -25,8 +25,7 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.rows.signals import Signals
 from estimator.errors import InputError
 from mocobot_sim.serial.extended import load_effects, step
-from mocobot_sim.serial.law import ActingLaw, JointLaw
-from mocobot_sim.serial.state import State
+from mocobot_sim.serial.law import ActingLaw, JointLaw, State
 from serial_made import a_little_off, nominal, simulated, spec
 
 

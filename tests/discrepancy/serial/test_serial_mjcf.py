@@ -14,8 +14,7 @@ from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import load_spec
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended
-from mocobot_sim.serial.inertials import real_inertia
-from mocobot_sim.serial.mjcf import into_mjcf
+from mocobot_sim.serial.mjcf import into_mjcf, real_inertia
 
 
 def compiled(inertia: np.ndarray) -> mujoco.MjModel:

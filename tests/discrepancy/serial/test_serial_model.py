@@ -127,8 +127,8 @@ REFUSED = {
         ),
         "2 tendons;",
     ),
-    "text": ("robot", "MuJoCo cannot read it"),
-    "empty": ("", "MuJoCo cannot read it"),
+    "text": ("robot", "not a readable MJCF"),
+    "empty": ("", "not a readable MJCF"),
     "other": ("<robot_description/>", "MuJoCo cannot read it"),
     "massless": (mjcf('<body name="a"><joint name="one"/></body>'), "MuJoCo cannot compile it"),
 }  # fmt: skip
@@ -150,7 +150,7 @@ def test_no_file_and_no_model(tmp_path) -> None:
     with pytest.raises(InputError, match="there is no such file"):
         load_model(tmp_path)
     (tmp_path / "bytes.xml").write_bytes(bytes(range(256)) * 8)
-    with pytest.raises(InputError, match="MuJoCo cannot read it"):
+    with pytest.raises(InputError, match="not a readable MJCF"):
         load_model(tmp_path / "bytes.xml")
 
 

@@ -206,6 +206,7 @@ def test_a_rest_too_short_for_a_row(recording) -> None:
     """Nothing is left of it, and nothing is held against anything."""
     names = ("phi", "theta", "tau", "ref")
     fields = {name: np.repeat(getattr(recording, name)[:1], 450, axis=0) for name in names}
+    fields["tau"] += 1e-6 * np.random.default_rng(0).normal(size=fields["tau"].shape)  # or it is one reading
     still = replace(recording, time=recording.time[:450], **fields)
     reduction = Reduction.of(Signals.of(still))
     assert len(reduction.time) == 0

@@ -6,9 +6,9 @@ from scipy.linalg import block_diag
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.calibrate import rules
-from estimator.calibrate.descent import Descent
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
+from estimator.calibrate.fit import Descent
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.problem import Problem, Trial
 from estimator.calibrate.quadratic import solved

@@ -63,6 +63,18 @@ def test_derivatives_of_averaged_rows_are_taken_at_the_mean():
         assert np.abs(found[..., k] - expected[..., k]).max() < 0.03 * np.abs(expected[..., k]).max()
 
 
+def test_derivatives_by_the_payload_are_averaged_over_a_row():
+    units, held, exact = exact_trial(3)
+    rows = Rows.of(exact.recording).take(np.array([5, 15]))
+    equations = TrialEquations.of(rows, Sensing.of([exact.recording]))
+    here = units, held.shared, exact.bases
+    found = equations.at(*here, curvature=equations.curvature(*here)).by_carried[:, BALANCE]
+    expected = differences(
+        lambda dx: equations.residual(units, held.shared.moved(dx), exact.bases)[:, BALANCE], 22, 1e-6
+    )
+    assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+
+
 def with_signals(equations: TrialEquations, change) -> TrialEquations:
     rows = replace(equations.rows, s=equations.rows.s + change)
     return replace(equations, rows=rows, mean=rows.s)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
+from estimator.calibrate.calibrate import held_out
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.calibrate.fit import Trial, fit
-from estimator.calibrate.held_out import held_out
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.unknowns import Unknowns
 from omnid_design import DESIGN

@@ -22,6 +22,7 @@ from estimator.estimate.uncertainty import standard_errors
 from estimator.filtering import low_pass
 from estimator.recording.model import Recording
 from omnid_design import DESIGN
+from recorded_team import Sines
 from synthetic_team import Load, carry, draw_path, draw_units, load, with_noise
 
 DESIGNED = ArmUnit(DESIGN, np.zeros((3, COUNT)))
@@ -120,6 +121,38 @@ def test_a_channel_that_sticks_is_no_noise(good: tuple[Load, list[Recording]]) -
     assert "in the loops of trial 1" in found.why_not_fit
 
 
+def yawing(tilt_rad: float, seed: int) -> tuple[Load, Recording]:
+    """One noisy trial in which the payload yaws, and tilts that little."""
+    rng = np.random.default_rng(seed)
+    held = load(3, rng)
+    path = Sines.draw(rng, [tilt_rad, tilt_rad, 0.04, 0.003, 0.003, 1e-4], 3, 0.1, 0.9)
+    return held, with_noise(carry(DESIGNED, held, path, rng, 18.0).recording, ANGLE_RAD, TORQUE_NM, rng)
+
+
+def test_weak_motion_has_large_errors_and_no_wrong_ones() -> None:
+    """The twists do not tell the inertia; the fit leaves it as uncertain as it is, and what goes with it."""
+    held, recording = yawing(1e-3, 1)
+    before, found = estimate_payload([recording]), estimate([recording])
+    assert before.inertia is None
+    assert found.method == METHOD
+    assert found.inertia is not None
+    assert not found.undetermined
+    off = errors(found, held)
+    for error, covariance in off.values():
+        assert np.all(np.abs(error) < 3.5 * standard_errors(covariance))
+    assert standard_errors(found.p_1c_covariance)[2] > 20 * standard_errors(found.p_1c_covariance)[0]
+
+
+def test_an_inertia_as_uncertain_as_itself_is_not_reported() -> None:
+    held, recording = yawing(2e-4, 2)
+    found = estimate([recording])
+    assert found.method == METHOD
+    assert found.inertia is None
+    assert {weak.step for weak in found.undetermined} == {"inertia"}
+    assert "a third of the inertia" in found.undetermined[0].reason
+    assert np.all(np.abs(found.p_1c - held.com) < 3.5 * standard_errors(found.p_1c_covariance))
+
+
 def one_robot(recording: Recording) -> Recording:
     told = replace(recording.metadata, robots=1)
     parts = {name: getattr(recording, name)[:, :1] for name in ("phi", "theta", "tau")}
@@ -128,6 +161,7 @@ def one_robot(recording: Recording) -> Recording:
 
 def at_rest(recording: Recording) -> Recording:
     parts = {name: np.repeat(getattr(recording, name)[:1], 1200, axis=0) for name in ("phi", "theta", "tau")}
+    parts["tau"] += 1e-6 * np.random.default_rng(0).normal(size=parts["tau"].shape)  # or it is one reading
     return replace(recording, time=recording.time[:1200], **parts)
 
 

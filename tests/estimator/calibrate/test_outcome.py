@@ -88,10 +88,6 @@ def test_estimate_on_robots_held(recordings: list[Recording], made: Calibration,
     bare = estimate_payload([calibrated(recordings[0], made)], "joint")
     assert found.method == ("calibrated" if method == "auto" else "joint")
     assert found.contradicts is False
-    if method == "auto":  # the robots as they are held, not as one recording would have them
-        held = calibrate([calibrated(recordings[0], made)], robots=made).payloads[0]
-        assert found.grasps is not None
-        np.testing.assert_array_equal(found.grasps.p_1i, held.grasps.p_1i)
     assert found.mass is not None
     assert bare.mass is not None
     assert found.inertia is not None
@@ -116,6 +112,7 @@ def test_too_little_for_the_errors_is_said(recordings: list[Recording], made: Ca
         },
         time=recordings[0].time[:1200],
     )
+    still.tau[:] += 1e-6 * np.random.default_rng(0).normal(size=still.tau.shape)  # or it is one reading
     found = estimate_on(made, [still])
     assert found.method == "staged"
     assert found.mass is not None

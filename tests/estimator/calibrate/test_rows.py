@@ -100,6 +100,33 @@ def test_sensing_finds_steps_and_noise():
     assert found.sigma == pytest.approx(np.tile(np.repeat([2e-5, 2e-5, 0.004], 3), (3, 1)), rel=0.15)
 
 
+def test_ripple_of_slow_rounding_is_no_noise():
+    """A joint of 50 steps a second: its rounding errors are as fast as noise, but no reading goes back."""
+    time, step = np.arange(0, 40, 0.01), 1e-4
+    slow = 1.3e-3 * np.sin(2 * np.pi * 0.67 * time)
+
+    def found(noise):
+        read = slow + noise * step * np.random.default_rng(5).standard_normal(len(time))
+        return Sensing.of([recording_of(np.round(read / step) * step)])
+
+    assert found(0.0).step[0, 0] == pytest.approx(step)
+    assert found(0.0).sigma[0, 0] < 0.05 * step  # 0.44 of one by its frequencies alone
+    assert found(0.5).sigma[0, 0] == pytest.approx(0.5 * step, rel=0.2)
+
+
+def test_each_joint_has_its_own_rounding_errors_again():
+    """Of a cycle that is no whole number of samples, a slow joint's readings come again, and a fast one's do not."""
+    time, step = np.arange(0, 44, 0.01), 1e-4
+    angle = 2 * np.pi * 0.6037 * time
+    trial = recording_of(np.round(0.1 * np.sin(angle) / step) * step)
+    trial.theta[:] = (np.round(1.2e-3 * np.sin(angle) / step) * step)[:, None, None]
+    trial.phi[:, 1] = 0.1 * np.cos(angle)[:, None]  # something always moves
+    repeats = Rows.of(trial).repeats
+    assert repeats.shape == (2, 9)
+    assert np.all(repeats[:, 3:6] > 0.7 * 40 * 0.6037)
+    assert np.all(repeats[0, [0, 1, 2, 6, 7, 8]] < 4.0)
+
+
 @pytest.mark.slow
 def test_residual_of_the_truth_has_the_covariance_of_its_rows():
     """Monte Carlo of whole trials: chi2 per number, and NEES of what is constant over a trial."""

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.clocks.fit import Rates, fit_clock
-from estimator.clocks.offsets import estimate_clocks, recorded_clocks
-from estimator.clocks.search import likely_lags
+from estimator.clocks.offsets import Rates, estimate_clocks, fit_clock, likely_lags, recorded_clocks
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.trial.sensors import PRESETS, measure
 from turning_body import RATE_HZ, clocked, swaying, theta_at

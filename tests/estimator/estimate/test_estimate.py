@@ -9,8 +9,7 @@ import pytest
 
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial
-from estimator.estimate.one_payload import check_one_payload, mass_alone
-from estimator.estimate.payload import estimate_from_trials, estimate_payload
+from estimator.estimate.payload import check_one_payload, estimate_from_trials, estimate_payload, mass_alone
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import MassEstimate
 from estimator.estimate.text import format_estimate

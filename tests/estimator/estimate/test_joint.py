@@ -3,12 +3,14 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.joint import estimate_joint, newton_euler_regressor
+from estimator.estimate.uncertainty import standard_errors
 from mujoco_body import mujoco_data
-from rigid_body_data import make_body, moving, still
+from rigid_body_data import RATE, make_body, make_data, moving, still
 
 PIN_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
 
@@ -90,6 +92,49 @@ def test_reversed_torques_are_an_error():
     data.wrench[:] *= -1
     with pytest.raises(InputError, match=r"mass is -11 kg.*sign of the torques"):
         estimate_joint([data], grasps)
+
+
+def yawing(body, tilt, seed=0, **noise):
+    """Yaw about an axis 0.6 m off {1}, with tilts of that many rad at other frequencies."""
+    t = np.arange(round(20 * RATE)) / RATE
+    w = 2 * np.pi * np.array([0.37, 0.53, 0.6])
+    turn = Rotation.from_euler("xyz", np.sin(np.outer(t, w)) * [tilt, tilt, 0.08])
+    step = 1e-4  # derivatives by differences
+    near = [np.sin(np.outer(t + k * step, w)) * [tilt, tilt, 0.08] for k in (-1, 0, 1)]
+    before, R, after = (Rotation.from_euler("xyz", e) for e in near)
+    omega = (before.inv() * after).as_rotvec() / (2 * step)
+    alpha = ((R.inv() * after).as_rotvec() - (before.inv() * R).as_rotvec()) / step**2
+    pivot = np.array([0.5, -0.3, 0.0])
+    places = [pivot - r.apply(pivot) for r in (before, R, after)]
+    v, a = (places[2] - places[0]) / (2 * step), (places[2] - 2 * places[1] + places[0]) / step**2
+    return make_data(body, (turn.as_matrix(), omega, alpha, places[1], v, a), t, seed=seed, **noise)
+
+
+def test_a_part_of_the_centre_that_goes_with_the_inertia_is_not_reported():
+    """Level yaw about one axis: the height of the centre moves the moments as products of inertia do."""
+    body = make_body(3)
+    grasps, _ = estimate_grasps([moving(body, 15)])
+    estimate, (com, _) = estimate_joint([yawing(body, 0.0)], grasps)
+    assert estimate.mass.mass == pytest.approx(body.mass, abs=1e-3)
+    assert estimate.com is None
+    assert [weak.direction for weak in com.weak] == ["along z of {1}"]
+
+
+def test_weak_directions_of_the_inertia_are_errors_of_the_centre():
+    """Yaw with tilts that show the inertia hardly and the height of the centre a little, 40 times with noise."""
+    body = make_body(3)
+    grasps, _ = estimate_grasps([moving(body, 15)])
+    off, claimed = [], []
+    for seed in range(40):
+        trial = yawing(body, 4e-4, seed, twist_noise=2e-4, linear_noise=2e-5, wrench_noise=0.02)
+        estimate, (com, inertia) = estimate_joint([trial], grasps)
+        assert com.determined
+        assert not inertia.determined
+        off.append(estimate.com.p_1c - body.p_1c)
+        claimed.append(standard_errors(estimate.com.covariance[1:, 1:]))
+    rms = np.sqrt(np.mean((np.array(off) / claimed) ** 2, axis=0))
+    assert np.all((rms > 0.7) & (rms < 1.4)), rms
+    assert np.min(claimed, axis=0)[2] > 1e-3
 
 
 def test_turning_about_one_axis_leaves_the_inertia_open_and_nothing_else():

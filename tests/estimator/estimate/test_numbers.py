@@ -1,6 +1,6 @@
 import pytest
 
-from estimator.numbers import decimals, measured
+from estimator.statistics import decimals, measured
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ MERGES = "a: &a {x: 1}\n" + "".join(
         ("a: [", r"metadata.yaml: not readable YAML"),
         (b"\0\xff\xfe" * 100, r"metadata.yaml: not readable YAML"),
         (DEEP, r"holds YAML beyond plain values"),
-        (LAUGHS, r"has no table 'rosbag2_bagfile_information'"),
+        (LAUGHS, r"it has anchors"),
         (MERGES, r"holds YAML beyond plain values"),
         ("a: !!python/object/apply:os.system [ls]", r"holds YAML beyond plain values"),
         ("#" * 2_000_000, r"is larger than 1 MiB"),
@@ -164,7 +164,7 @@ def test_bombs_in_compressed_files_and_messages(tmp_path, storage):
     packed.write_bytes(zstandard.compress(bytes(1 << 28)))
     refuses(packed, "what it unpacks to is neither an MCAP nor an SQLite file")
     packed.write_bytes(zstandard.compress(content + bytes((1 << 28) + 1)))
-    refuses(packed, "unpacks to more than 100 times its size, which is no measured log")
+    refuses(packed, "unpacks to at least 0.25.* GiB; the limit is 0.25 GiB, which --max-unpacked GIB changes")
     packed.write_bytes(zstandard.compress(content)[:-1000])
     refuses(packed, "cut off|unpacks to nothing|damaged")
     packed.write_bytes(zstandard.compress(b""))

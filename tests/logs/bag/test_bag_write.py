@@ -19,9 +19,10 @@ from ruamel.yaml import YAML
 
 from estimator.arm.delta import forward_kinematics
 from estimator.errors import InputError
+from estimator.files import LIST, holds
 from estimator.recording.model import Recording
 from mocobot_logs.bag.read import METADATA_TOPIC, open_bag
-from mocobot_logs.bag.write import is_written_bag, write_bag
+from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import CHANNELS, REF, collect
 from mocobot_logs.map.files import builtin_map
 from mocobot_logs.resample.log import resample
@@ -201,7 +202,7 @@ def refused(tmp_path, match, path, recording=None, **options):
     with pytest.raises(InputError, match=match):
         write_bag(recording or small_recording(rows=20), path, **options)
     assert {entry: entry.read_bytes() for entry in tmp_path.rglob("*") if entry.is_file()} == before
-    assert not [entry for entry in tmp_path.rglob(".*")]
+    assert not [entry for entry in tmp_path.rglob(".*") if entry.name != LIST]
 
 
 def test_targets_that_cannot_be_written(tmp_path):
@@ -259,7 +260,7 @@ def test_an_earlier_bag_is_replaced_only_if_asked_and_only_once_the_new_one_is_c
     assert killed_after(1, new, path, replace_bag=True) == -signal.SIGKILL
     assert {entry.name: entry.read_bytes() for entry in path.iterdir()} == before
     write_bag(new, path, storage="sqlite3", replace_bag=True)
-    assert sorted(entry.name for entry in path.iterdir()) == ["lab.db3", "metadata.yaml"]
+    assert sorted(entry.name for entry in path.iterdir()) == [LIST, "lab.db3", "metadata.yaml"]
     assert [len(stream.stamp_ns) for stream in collect(open_bag(path)).streams] == [60] * 3
 
 
@@ -267,12 +268,11 @@ def test_other_peoples_bags_are_not_replaced(tmp_path):
     ours, theirs, more = (tmp_path / name for name in ("ours", "theirs", "more"))
     for path in (ours, theirs, more):
         write_bag(small_recording(rows=20), path)
-    told = (theirs / "metadata.yaml").read_text()
-    (theirs / "metadata.yaml").write_text(told.replace(METADATA_TOPIC, "/robot/description"))
+    (theirs / LIST).unlink()
     (more / "thesis").write_text("mine")
-    assert [is_written_bag(path) for path in (ours, theirs, more)] == [True, False, False]
-    for path in (theirs, more):
-        refused(tmp_path, "is a folder that holds something", path, replace_bag=True)
+    assert holds("bag")(ours)
+    refused(tmp_path, "is a folder that holds something", theirs, replace_bag=True)
+    refused(tmp_path, "thesis: was not written by mocobot, or changed since", more, replace_bag=True)
 
 
 def test_recordings_that_do_not_fit(tmp_path):

@@ -89,7 +89,12 @@ SAMPLES: dict[str, tuple[Callable[[Columns], Columns], list[str]]] = {
     "a few rows": (rows(np.arange(9)), ["robot 1 has 9 samples; at least 16"]),
     "NaN for too long": (
         change("omnid2.tau1", put(slice(77, 90), np.nan)),
-        ["robot 2: no samples for 0.14 s", "NaN count as missing", "--split-at-gaps", "--crop"],
+        [
+            "robot 2: no samples for 0.14 s",
+            "NaN or that repeat the one before count as missing",
+            "--split-at-gaps",
+            "--crop",
+        ],
     ),
     "infinity": (change("omnid3.phi2", put(77, np.inf)), ["robot 3", "phi2", "inf", "--drop"]),
     "time runs back": (change("time", put(100, 0.2)), ["robot 1", "time"]),

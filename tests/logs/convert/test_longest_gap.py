@@ -6,7 +6,7 @@ import numpy as np
 
 import mocobot
 from array_log import ArrayLog, stream
-from mocobot.options.logs import Convert
+from mocobot.options import Convert
 from mocobot_logs.resample.log import MAX_GAP_S, resample
 
 

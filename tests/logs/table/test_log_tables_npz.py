@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimator import inputs
+from estimator.inputs import set_max_unpacked
 from log_files import assert_same, read_log, refused
 from mocobot_logs.map.files import TimeMap, builtin_map
 from mocobot_logs.open_log import open_log
@@ -113,7 +115,8 @@ def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         path, time=recording.time, phi=recording.phi, theta=recording.theta, tau=recording.tau
     )
     source, steps = open_log(path), []
-    assert len(list(source.chunks(steps.append))) == 6 * 3
+    assert sum(len(samples.stamp_ns) for _, samples in source.chunks(steps.append)) == 333 * 3
+    assert len(steps) == 6
     assert sum(steps) == source.size == 333
     assert_same(read_log(path), replace(recording, ref=None))
 
@@ -159,7 +162,7 @@ def test_claims_are_refused_before_anything_is_allocated(path: Path) -> None:
     cases: list[tuple[dict[str, bytes], str]] = [
         (members(time=npy_header(text)), "but has 0"),
         (members(time=npy_header("x" * 100, 2, length=0xFFFFFFF0)), "has a header of 4294967280 bytes"),
-        (members(time=bomb), "claims 0.373 GiB in 0.37"),
+        (members(time=bomb), "unpacks to at least 0.3725 GiB; the limit is 0.25 GiB, which --max-unpacked"),
     ]
     for content, words in cases:
         archive(path, content)
@@ -174,6 +177,32 @@ def test_claims_are_refused_before_anything_is_allocated(path: Path) -> None:
         assert peak < 4 << 20
 
 
+def test_arrays_have_one_limit_together(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is within what is free, and packs a thousandfold."""
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(inputs, "LARGEST_RATIO", 1)
+    rows = 12_000
+    shapes = {name: np.zeros((rows, 3, 3)) for name in ("phi", "theta", "tau")} | {
+        "time": np.arange(rows) * 0.01
+    }
+    archive(
+        path,
+        {f"{name}.npy": npy(values) for name, values in shapes.items()} | {"other.npy": npy(np.zeros(10**7))},
+    )
+    assert "unpacks to at least 0.0016" in refused(path)
+    set_max_unpacked(0.01)
+    try:
+        assert read_log(path).robots == 3  # what is not read is not counted
+    finally:
+        set_max_unpacked(None)
+
+
+@pytest.mark.parametrize("packing", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
+def test_packing_that_unpacks_without_a_limit(path: Path, packing: int) -> None:
+    archive(path, members(), packing)
+    assert "is not packed as numpy does it" in refused(path)
+
+
 @pytest.mark.parametrize("also_header", [False, True])
 def test_a_directory_that_lies_about_an_entry(path: Path, also_header: bool) -> None:
     """The archive's directory claims 3.2 GB for an entry of 480 bytes, with or without the array's header."""
@@ -185,7 +214,7 @@ def test_a_directory_that_lies_about_an_entry(path: Path, also_header: bool) -> 
     content[entry + 20 : entry + 28] = struct.pack("<II", 3_200_000_128, 3_200_000_128)
     path.write_bytes(content)
     message = refused(path)
-    assert ("claims 2.98 GiB in 0.01" if also_header else "claims the shape (60,)") in message
+    assert ("unpacks to at least 2.98 GiB" if also_header else "claims the shape (60,)") in message
 
 
 def test_data_that_are_not_all_there(path: Path) -> None:

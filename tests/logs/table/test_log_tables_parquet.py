@@ -11,9 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from estimator import inputs
 from estimator.recording.parquet import write_recording
 from log_files import assert_same, channels_of, column, read_log, refused
-from mocobot_logs import claims
 from mocobot_logs.map.files import TimeMap, builtin_map
 from mocobot_logs.open_log import open_log
 from mocobot_logs.table import table as tables
@@ -188,7 +188,8 @@ def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     recording = small_recording(rows=333)
     write_recording(recording, path)
     source, steps = open_log(path), []
-    assert len(list(source.chunks(steps.append))) == 6 * 3
+    assert len(list(source.chunks(steps.append))) >= 3
+    assert len(steps) == 6
     assert sum(steps) == source.size == 333
     assert_same(read_log(path), recording)
 
@@ -200,8 +201,8 @@ def test_a_bomb(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pq.write_table(pa.table(columns), path, compression="zstd")
     assert path.stat().st_size < rows * 37 * 8 / 200
     assert read_log(path).robots == 3  # 118 MB do no harm
-    monkeypatch.setattr(claims, "FREE_BYTES", 1 << 20)
-    assert "claims 0.11 GiB in 0.0" in refused(path)
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
+    assert "unpacks to at least 0.1103 GiB; the limit is 0.0" in refused(path)
 
 
 def test_no_rows_is_an_empty_log(path: Path, table: pa.Table) -> None:

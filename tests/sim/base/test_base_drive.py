@@ -13,10 +13,8 @@ from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.drive_kernel import update_drives
 from mocobot_sim.base.index import BaseIndex
 from mocobot_sim.base.mecanum import MecanumKinematics, axle_share
-from mocobot_sim.base.motion import Leg, plan
-from mocobot_sim.base.planar import moved
-from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
+from mocobot_sim.base.motion import Leg, moved, plan
+from mocobot_sim.base.solo import Snapshots, build_solo, compile_solo, drive_solo
 
 DESIGN = base_design()
 TEXTBOOK = MecanumKinematics.textbook(DESIGN)

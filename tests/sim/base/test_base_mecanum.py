@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mocobot_sim.base.contact import WheelContacts
 from mocobot_sim.base.design import HAND, base_design
+from mocobot_sim.base.drive import WheelContacts
 from mocobot_sim.base.index import BaseIndex
 from mocobot_sim.base.mecanum import MecanumKinematics, axle_share
 from mocobot_sim.base.rollers import wheel_reach

@@ -6,8 +6,17 @@ from scipy.linalg import expm
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
-from mocobot_sim.base.planar import compose, moved, relative, wrapped, yaw_of
+from mocobot_sim.base.motion import (
+    Leg,
+    PlanarMotion,
+    carried,
+    compose,
+    moved,
+    plan,
+    relative,
+    wrapped,
+    yaw_of,
+)
 
 
 def _transform(pose: np.ndarray) -> RigidTransform:

@@ -9,9 +9,8 @@ from estimator.errors import InputError
 from mocobot_sim.base.design import base_design
 from mocobot_sim.base.drive import BaseDrive
 from mocobot_sim.base.follow import FollowingDrive
-from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
-from mocobot_sim.base.planar import compose, relative, yaw_of
-from mocobot_sim.base.snapshots import Snapshots
+from mocobot_sim.base.motion import Leg, PlanarMotion, carried, compose, plan, relative, yaw_of
+from mocobot_sim.base.solo import Snapshots
 from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
 from mocobot_sim.guided.hand import PushingHand
 from mocobot_sim.scene.scene import TeamScene, build_team

@@ -150,6 +150,7 @@ def test_trials_stay_within_the_papers_limits(result: PaperResult) -> None:
         assert trial.rod_error_m < 0.02e-3, trial.name
         assert trial.weld_error_m < 0.01e-3, trial.name
         assert trial.weld_error_deg < 0.001, trial.name
+        assert trial.damping_ratio > 0.2, trial.name
 
 
 def test_plan_is_the_papers() -> None:
@@ -348,6 +349,7 @@ def test_fits_stand_beside_their_presets(monkeypatch: pytest.MonkeyPatch) -> Non
             metadata=Namespace(trial=request.trial), name=f"{request.payload}{request.number}"
         )
         log = Namespace(
+            stability=Namespace(damping_ratio=0.4),
             payload_rotation=lambda: np.zeros((1, 3)), tau=np.zeros(1), rod_error_m=0.0, weld_error_m=0.0,
             weld_error_rad=0.0,
         )  # fmt: skip

@@ -9,10 +9,10 @@ import pytest
 
 from effect_cases import example, one_robot, team_with
 from estimator.errors import InputError
+from estimator.files import LIST
 from mocobot.cli import main
 from mocobot_sim.effects import EFFECTS
-from mocobot_sim.extended.extended import extra_of, load_extended, write_extended
-from mocobot_sim.extended.readme import readme
+from mocobot_sim.extended.extended import extra_of, load_extended, readme, write_extended
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.scene import build_team
@@ -83,7 +83,7 @@ def test_plain_mujoco_loads_it(folder):
     assert np.isfinite(data.qpos).all()
     text = (folder / "README.md").read_text(encoding="utf-8")
     assert all(f"`{cause}`" in text for cause in HIDDEN)
-    assert sorted(path.name for path in folder.iterdir()) == ["README.md", "effects.json", "team.xml"]
+    assert sorted(path.name for path in folder.iterdir()) == [LIST, "README.md", "effects.json", "team.xml"]
 
 
 @pytest.mark.parametrize("cause", list(EFFECTS))

@@ -214,11 +214,11 @@ def test_gains_survive_a_round_trip():
     assert list(values) == [entry.name for entry in dataclasses.fields(ControlGains)]
 
 
-@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf"), True, "400", None, 10**400])
+@pytest.mark.parametrize("bad", [-1.0, float("nan"), float("inf"), True, "400", None, 10**400])
 def test_bad_gain_is_named(bad):
     values = ControlGains().to_dict() | {"damping_Ns_per_m": bad}
     with pytest.raises(
-        InputError, match=r"control\.damping_Ns_per_m is .*; it must be a number greater than 0"
+        InputError, match=r"control\.damping_Ns_per_m is .*; it must be a number from 0 to 100000$"
     ):
         ControlGains.from_dict(values)
 

@@ -21,8 +21,7 @@ from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.assemble import assemble_at_home
-from mocobot_sim.trial.loops import close
+from mocobot_sim.trial.assemble import assemble_at_home, close
 from mocobot_sim.trial.resimulate import resimulate
 from mocobot_sim.trial.sensors import PRESETS
 from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
@@ -179,7 +178,7 @@ def test_the_units_are_those_of_the_seeds_carrying_trials() -> None:
     for one, other in zip(done.truth.units, draw_units("c", preset, 5)[:2], strict=True):
         assert one.to_dict() == other.to_dict()
     assert np.any(done.truth.units[0].phi_zero_rad)
-    assert set(done.truth.to_dict()) == {"as_built", "effects"}
+    assert set(done.truth.to_dict()) == {"as_built", "effects", "control"}
     recording = done.recordings["uncalibrated"]
     metadata = recording.metadata
     assert (metadata.trial, metadata.payload, metadata.robots, metadata.seed) == ("free", None, 2, 5)

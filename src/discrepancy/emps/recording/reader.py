@@ -11,6 +11,8 @@ from discrepancy.emps.recording.sampling import on_grid
 from discrepancy.emps.recording.whole import is_whole
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.inputs import open_input
+from estimator.quantisation import Repeats
 
 SERIES = {
     "t": "time [s]",
@@ -35,7 +37,7 @@ def read_emps(path: Path) -> AxisLog:
             raise InputError(
                 f"{path}: is cut off: what its last variable should have goes beyond the end of the file"
             )
-        with path.open("rb") as file:
+        with open_input(path) as file:
             found = loadmat(file, variable_names=[*SERIES, *NUMBERS])
     except InputError:
         raise
@@ -58,7 +60,11 @@ def read_emps(path: Path) -> AxisLog:
         listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"{path}: the series have different lengths ({listed})")
     numbers = {name: _number(path, name, found[name]) for name in NUMBERS}
+    repeats = Repeats([2]).of(np.column_stack([series[name] for name in ("qm", "qg", "vir")]))
+    series = {name: values[~repeats] for name, values in series.items()}
     time, others, usable, notes = on_grid(str(path), series.pop("t"), series)
+    if repeats.any():
+        notes = [f"{repeats.sum()} rows repeat the one before, and a reading counts once.", *notes]
     return AxisLog(
         path.name,
         time,

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from pathlib import Path
 
+from estimator.inputs import Unpacked, open_input
+
 HEADER_BYTES, TAG_BYTES = 128, 8
+COMPRESSED = 15
+"""Type of an element that zlib packed."""
+_STEP = 1 << 20
 
 
 def is_whole(path: Path) -> bool:
@@ -17,9 +23,11 @@ def is_whole(path: Path) -> bool:
 
     Raises:
         OSError: it cannot be read.
+        InputError: it unpacks to too much.
     """
     size = path.stat().st_size
-    with path.open("rb") as file:
+    unpacked = Unpacked(str(path), size)
+    with open_input(path) as file:
         header = file.read(HEADER_BYTES)
         order = {b"IM": "<", b"MI": ">"}.get(header[126:])
         if order is None or struct.unpack(f"{order}H", header[124:126]) != (0x0100,):
@@ -30,5 +38,11 @@ def is_whole(path: Path) -> bool:
             tag = file.read(TAG_BYTES)
             if len(tag) < TAG_BYTES:
                 return False
-            at += TAG_BYTES + struct.unpack(f"{order}II", tag)[1]
+            kind, count = struct.unpack(f"{order}II", tag)
+            at += TAG_BYTES + count
+            if kind == COMPRESSED and at <= size:
+                packed, stream = file.read(count), zlib.decompressobj()
+                while packed:
+                    unpacked.add(len(stream.decompress(packed, _STEP)))
+                    packed = stream.unconsumed_tail
     return at == size

@@ -18,11 +18,13 @@ from discrepancy.result.pictures.plots_law import law_figure
 from discrepancy.result.pictures.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
+from mocobot_sim.plots_plain import plain_words
 
 CLEAN_BAND = "#d9dde3"
 COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")
 
 
+@plain_words()
 def save_plots(
     values: Mapping[str, Any],
     traces: Sequence[Trace],
@@ -98,7 +100,10 @@ def _components(axis: Axes, trace: Trace, group: Group, values: Array, scale: fl
         band = _broken(trace, sigma)
         axis.fill_between(time, -band, band, color=CLEAN_BAND, linewidth=0)
     for k, name, colour in zip(group.columns, group.components, cycle(COMPONENTS), strict=False):
-        axis.plot(time, _broken(trace, values[:, k]), color=colour, linewidth=0.8, label=name)
+        label = (
+            f" {name}" if name.startswith("_") else name
+        )  # a legend leaves out what begins with an underscore
+        axis.plot(time, _broken(trace, values[:, k]), color=colour, linewidth=0.8, label=label)
         axis.plot(trace.time[trace.moving :], values[trace.moving :, k], "o", color=colour, markersize=3)
     axis.axhline(0.0, color="black", linewidth=0.4)
     axis.grid(alpha=0.25)

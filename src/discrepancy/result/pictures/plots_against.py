@@ -5,11 +5,11 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from discrepancy.causes.words import Words
 from discrepancy.result.pictures.residual_statistics import binned, spectrum
 from discrepancy.result.traces import Group, Trace
+from mocobot_sim.plots_plain import plain_numbers
 
 BEFORE, AFTER = "#c8553d", "#2f6fd0"
 SERIES = (("as simulated", "white_before", BEFORE), ("with causes and tolerances", "white_after", AFTER))
@@ -59,7 +59,7 @@ def log_scale(axis: Axes, low: float, high: float) -> None:
     """A logarithmic axis with plain numbers."""
     axis.set_yscale("log")
     axis.set_ylim(low, high)
-    axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+    plain_numbers(axis.yaxis)
 
 
 def _binned(axis: Axes, traces: Sequence[Trace], group: Group, name: str) -> float:

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from discrepancy.result.evidence_list import drawn, label, relation
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
 from discrepancy.result.text_gain import foretold_torques, response_units
+from mocobot_sim.plots_plain import plain_numbers
 
 RELATIONS = {
     "named": ("named", "#2f6fd0", "s"),
@@ -54,7 +54,7 @@ def _dots(axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[M
                       ha="left" if right else "right", fontsize=8)  # fmt: skip
     axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
     axis.set_ylim(-0.7, max(len(strongest), 1) - 0.3)
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    plain_numbers(axis.xaxis)
     axis.set_xlabel("log Bayes factor [nats]")
     axis.grid(alpha=0.25)
     if not strongest:

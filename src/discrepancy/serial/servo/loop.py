@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter1d
 from discrepancy.rules import serial as rules
 from discrepancy.serial.recording.joint_log import JointLog
 from estimator.arrays import Array
-from estimator.numbers import measured
+from estimator.statistics import measured
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,17 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual, poses
-from estimator.rigid_team.start import start_bases
+from estimator.rigid_team.residual import (
+    Bases,
+    Shared,
+    balance,
+    grasp_data,
+    pose_residual,
+    poses,
+    start_bases,
+)
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
@@ -120,7 +128,9 @@ def linearised_trials(
 
 def _processes(jobs: int) -> Parallel:
     prefer = "processes" if jobs > 1 else "threads"
-    return Parallel(n_jobs=jobs, prefer=prefer, return_as="generator")  # for the sake of memory
+    return Parallel(
+        n_jobs=jobs, prefer=prefer, return_as="generator", **ends_with_this()
+    )  # for the sake of memory
 
 
 def _linearised(

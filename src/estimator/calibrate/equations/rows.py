@@ -30,7 +30,7 @@ class Rows:
         length: samples that a row averages over in a hold, shape (n,); 0 in motion.
         travel: way that each driven and gimbal joint goes while a row is averaged [rad], shape (n, N, 6).
         rate_hz: of the samples.
-        repeats: how often the same rounding errors come again, because the motion does.
+        repeats: how often the same rounding errors come again, because the motion does, shape (N, 9) or 1.
     """
 
     s: Array
@@ -41,7 +41,7 @@ class Rows:
     length: NDArray[np.intp]
     travel: Array
     rate_hz: float
-    repeats: float
+    repeats: Array | float
 
     def __call__(self, x: Array) -> Array:
         """Rows of samples, shape (q, ...) -> (n, ...)."""
@@ -133,8 +133,8 @@ def _within(samples: int, trim: int) -> NDArray[np.bool_]:
     return (at >= trim) & (at < samples - trim)
 
 
-def _repeats(angles: Array, rate_hz: float) -> float:
-    """Times that readings come again to the last digit, shape (Q, N, 6); 1 for none.
+def _repeats(angles: Array, rate_hz: float) -> Array | float:
+    """Times that readings (Q, N, 6) come again to the last digit, of each angle and torque, shape (N, 9); 1 for none.
 
     A commanded motion that repeats in whole samples repeats its rounding errors, too, and averaging over them does not
     help. Periods are looked for where the autocorrelation of one joint is high.
@@ -146,14 +146,15 @@ def _repeats(angles: Array, rate_hz: float) -> float:
     alike = correlate(x, x, method="fft")[len(x) - 1 :] / np.arange(len(x), 0, -1)
     lags = find_peaks(alike[: len(x) - shortest])[0]
     lags = lags[lags >= shortest]
-    lags = lags[np.argsort(-alike[lags])[: rules.PERIODS]]
-    shares = [(float(np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9)), int(lag)) for lag in lags]
-    # Of multiples of the period, the period itself.
-    most = max((share for share, _ in shares), default=0.0)
-    if most < rules.REPEATED:
+    best = lags[np.argsort(-alike[lags])[: rules.PERIODS]]
+    lags = np.union1d(best, lags[alike[lags] > 0.9 * alike[best].max(initial=0.0)][: rules.PERIODS])
+    shares = np.array([np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0) for lag in lags])
+    if not len(lags) or shares.mean(axis=(1, 2)).max() < rules.REPEATED:
         return 1.0
-    lag = min(lag for share, lag in shares if share > 0.8 * most)
-    return 1.0 + most * (len(angles) / lag - 1.0)
+    # Of multiples of the period, the shortest after which a joint reads much the same: a slow one after any.
+    first = np.argmax(shares > 0.8 * shares.max(axis=0), axis=0)
+    again = 1.0 + np.take_along_axis(shares, first[None], axis=0)[0] * (len(angles) / lags[first] - 1.0)
+    return np.concatenate([again, again[:, :3]], axis=1)
 
 
 def _kernel(rate_hz: float) -> tuple[Array, int]:

@@ -32,7 +32,15 @@ class Resolution(NamedTuple):
     @classmethod
     def of(cls, recording: Recording) -> Resolution:
         """Of one recording."""
-        return cls(_steps(recording), _white(recording), _share(recording))
+        step, white = _steps(recording), _white(recording)
+        if recording.metadata.sampling is None:
+            # The ripple of a slow joint's rounding is no noise: without noise, no reading goes to and fro.
+            to_and_fro = _to_and_fro(recording, step)
+            noise = np.where(
+                to_and_fro < rules.TO_AND_FRO, rules.NOISE_TO_AND_FRO * to_and_fro * step, np.inf
+            )
+            white = np.minimum(white, np.sqrt(noise**2 + step**2 / 12.0))
+        return cls(step, white, _share(recording))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +114,14 @@ def _steps(recording: Recording) -> Array:
     if told is not None:
         return np.array([np.concatenate([one.steps_of(kind) for kind in range(3)]) for one in told])
     return np.apply_along_axis(rounding_step, 0, _columns(recording))
+
+
+def _to_and_fro(recording: Recording, step: Array) -> Array:
+    """Share of slow changes, of a step at most, that the next one takes back, shape (N, 9); 1 where few are slow."""
+    change = np.rint(np.diff(_columns(recording), axis=0) / np.where(step > 0, step, np.inf))
+    slow = np.all([np.abs(change[1:]) <= 1, np.abs(change[:-1]) <= 1], axis=0)
+    back, count = np.sum(slow & (change[1:] * change[:-1] < 0), axis=0), np.sum(slow, axis=0)
+    return np.where((count < rules.LEAST_SLOW) | (step == 0), 1.0, back / np.maximum(count, 1))
 
 
 def _share(recording: Recording) -> Array:

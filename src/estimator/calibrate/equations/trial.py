@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 
+from estimator.arm.delta import jacobian_of, leg_geometry, length_jacobians
+from estimator.arm.gimbal import rate_matrix, rotation
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.equations.level import corrected
-from estimator.calibrate.equations.loops import pose_derivatives
-from estimator.calibrate.equations.noise import adjustment_of, covariance_of, noise_of
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.estimate.fusion import fusion_changes, fusion_with, total_wrench
@@ -31,6 +30,115 @@ from estimator.rigid_team.slots import PHI, TAU, THETA
 from estimator.signals.arm_changes import BY_UNIT, ArmChanges
 from estimator.signals.arm_data import ArmData
 from estimator.so3 import cross
+
+_POSE = np.r_[
+    AT["phi_zero"], AT["theta_zero"], AT["radius"], AT["proximal_length"], AT["rod_length"], AT["tilt"]
+]
+_AXES = np.eye(3)[:, :2]
+
+
+def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array]:
+    """Of the loops' 6 (N - 1) channels; n rows.
+
+    Returns:
+        By the robots' deviations, shape (n, 6 (N - 1), N, ``COUNT``), by ``Shared.moved``, (n, ., 6 (N - 1) + 10), and
+        by ``Bases.moved``, (n, ., 4 (N - 1)).
+    """
+    s = corrected(rows.s, units)
+    R_bi, h, turn, shift = _by_unit(s, units)
+    n, N = len(rows.time), h.shape[1]
+    channels = 6 * (N - 1)
+    by_units = np.zeros((n, channels, N, COUNT))
+    by_carried = np.zeros((n, channels, channels + 10))
+    by_bases = np.zeros((n, channels, 4 * (N - 1)))
+    R_b1 = rows(R_bi[:, 0])
+    mean_turn, mean_shift, mean_h = rows(turn), rows(shift), rows(h)
+    for j in range(1, N):
+        about, along = slice(6 * (j - 1), 6 * (j - 1) + 3), slice(6 * (j - 1) + 3, 6 * j)
+        lever = R_bi[:, 0] @ shared.grasps.p_1i[j]
+        swept = rows(np.asarray(np.cross(turn[:, 0], lever[:, :, None], axis=1), dtype=np.float64))
+        by_units[:, about, 0, _POSE] = -mean_turn[:, 0]
+        by_units[:, along, 0, _POSE] = -mean_shift[:, 0] - swept
+        by_units[:, about, j, _POSE] = bases.R[j] @ mean_turn[:, j]
+        by_units[:, along, j, _POSE] = bases.R[j] @ mean_shift[:, j]
+        by_carried[:, about, about] = by_carried[:, along, along] = -R_b1
+        column, turned = 4 * (j - 1), mean_h[:, j] @ bases.R[j].T
+        by_bases[:, along, column : column + 3] = np.eye(3)
+        by_bases[:, about.start + 2, column + 3] = 1.0
+        by_bases[:, along.start, column + 3] = -turned[:, 1]
+        by_bases[:, along.start + 1, column + 3] = turned[:, 0]
+    return by_units, by_carried, by_bases
+
+
+def _by_unit(s: Array, units: ArmUnit) -> tuple[Array, Array, Array, Array]:
+    """R_bi, h, and how deviations turn and shift them, shape (q, N, 3, len(_POSE)), in level base frames."""
+    phi, theta = s[..., PHI], s[..., THETA]
+    legs = leg_geometry(phi, units)
+    R_ai = rotation(theta)
+    shift = np.zeros((*phi.shape, len(_POSE)))
+    turn = np.zeros_like(shift)
+    shift[..., :3] = -jacobian_of(legs)
+    turn[..., 3:6] = -(R_ai @ rate_matrix(theta))
+    for k, part in enumerate(length_jacobians(legs, phi, units)):
+        shift[..., 6 + 3 * k : 9 + 3 * k] = part
+    R_ba = units.R_ba
+    R_bi, h = R_ba @ R_ai, (R_ba @ legs.h[..., None])[..., 0]
+    turn, shift = R_ba @ turn, R_ba @ shift
+    turn[..., 15:] = _AXES
+    shift[..., 15:] = np.cross(_AXES.T, h[..., None, :]).swapaxes(-1, -2)
+    return R_bi, h, turn, shift
+
+
+# Value, rate and acceleration of each joint; the three torques.
+_CHAINS = [np.array([first + k + 3 * order for order in range(3)]) for first in (0, 9) for k in range(3)] + [
+    np.arange(18, 21)
+]
+
+
+def covariance_of(J: Array, noise: Array) -> Array:
+    """Covariance of the rows' residual, shape (n, C, C).
+
+    Args:
+        J: derivative by the rows' signals, shape (n, C, N, ``SLOTS``).
+        noise: theirs, as ``noise_of`` has it.
+    """
+    total = np.zeros((len(J), J.shape[1], J.shape[1]))
+    for robot in range(J.shape[2]):
+        for joint, at in enumerate(_CHAINS):
+            part = J[:, :, robot, at]
+            total += part @ noise[:, robot, joint] @ np.swapaxes(part, 1, 2)
+    return total
+
+
+def adjustment_of(J: Array, noise: Array, covariance: Array, residual: Array) -> Array:
+    """The likeliest change of the rows' signals that makes loops and balance close, shape (n, N, ``SLOTS``).
+
+    Args:
+        J, noise: as for ``covariance_of``.
+        covariance: what that gives.
+        residual: what is to be closed, shape (n, C).
+    """
+    weighed = np.linalg.solve(covariance, residual[..., None])
+    out = np.zeros((len(J), J.shape[2], SLOTS))
+    for robot in range(J.shape[2]):
+        for joint, at in enumerate(_CHAINS):
+            moved = noise[:, robot, joint] @ (np.swapaxes(J[:, :, robot, at], 1, 2) @ weighed)
+            out[:, robot, at] -= moved[..., 0]
+    return out
+
+
+def noise_of(rows: Rows, variances: tuple[Array, Array]) -> Array:
+    """Covariance of every joint's (value, rate, acceleration) and of every torque in the rows: (n, N, 7, 3, 3)."""
+    moving, held = variances
+    n, N = moving.shape[:2]
+    out = np.zeros((n, N, 7, 3, 3))
+    at = slice(0, rows.moving)
+    out[at, :, :6] = moving[at, :, :6, None, None] * rows.gain
+    out[at, :, 6, range(3), range(3)] = moving[at, :, 6:] * rows.gain[0, 0]
+    at = slice(rows.moving, None)
+    out[at, :, :6, 0, 0] = held[at, :, :6]
+    out[at, :, 6, range(3), range(3)] = held[at, :, 6:]
+    return out
 
 
 class Rowed(NamedTuple):
@@ -98,28 +206,33 @@ class TrialEquations:
         """Rows of the residual, shape (n, C)."""
         return self.rows(_residual(robot_data(corrected(self.rows.s, units), units), units, shared, bases))
 
-    def curvature(self, units: ArmUnit, shared: Shared, bases: Bases) -> Curvature:
-        """What the balance's derivatives, averaged over each row, have beyond those at its mean signals."""
-        coarse = _derivatives(corrected(self.mean, units), units, shared, bases)
-        every = rules.CURVATURE_EVERY
-        fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)
-        # Each instant stands for those around it.
-        near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(self.rows.s[::every]) - 1)
-        gather = csr_array(
-            (np.ones(len(near)), (np.arange(len(near)), near)), shape=(len(near), len(self.rows.s[::every]))
-        )
-        operator = csr_array(self.rows.operator @ gather)
-        parts = []
-        for mean, samples in zip(coarse[1:3], fine[1:3], strict=True):
-            balance = samples[:, -6:]
-            averaged = np.asarray(operator @ balance.reshape(len(balance), -1)).reshape(
-                -1, *balance.shape[1:]
-            )
-            parts.append(averaged - mean[:, -6:])
-        # At rest there is no curvature, but noise of rates.
-        for part in parts:
-            part[self.rows.moving :] = 0.0
-        return Curvature(*parts)
+    def curvature(
+        self, units: ArmUnit, shared: Shared, bases: Bases, before: Curvature | None = None
+    ) -> Curvature:
+        """What the balance's derivatives, averaged over each row, have beyond those at its mean signals.
+
+        Those by the payload are averaged over all instants: one that turns about one axis shows moments of inertia
+        about the others by products of rates, which mean rates do not tell. At rest there is none, but noise of rates.
+        Those by the robots take longer and vary less: they are as found ``before``.
+        """
+        payload = [
+            _by_carried(robot_data(corrected(s, units), units), units, shared)[:, -6:]
+            for s in (self.rows.s, self.mean)
+        ]
+        by_carried = self.rows(payload[0]) - payload[1]
+        by_carried[self.rows.moving :] = 0.0
+        if before is not None:
+            return Curvature(before.by_units, by_carried)
+        by_units = np.zeros((len(self.mean), 6, *units.x.shape))
+        if not self.held:
+            every = rules.CURVATURE_EVERY
+            fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)[1][:, -6:]
+            coarse = _derivatives(corrected(self.mean, units), units, shared, bases)[1][:, -6:]
+            # Each instant stands for those around it.
+            near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(fine) - 1)
+            by_units = self.rows(fine[near]) - coarse
+            by_units[self.rows.moving :] = 0.0
+        return Curvature(by_units, by_carried)
 
     def at(
         self,
@@ -151,7 +264,7 @@ class TrialEquations:
             by_carried[:, -6:] += curvature.by_carried
         noise = noise_of(self.rows, self.variances)
         covariance = covariance_of(by_signals, noise)
-        again = self.rows.repeats > 1.0
+        again = bool(np.any(np.asarray(self.rows.repeats) > 1.0))
         return Rowed(
             residual,
             by_units,
@@ -186,14 +299,18 @@ def _regressor(motion: Array, motion_dot: Array, up: Array, gravity_mps2: float)
     return newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific)
 
 
+def _motion(data: ArmData, units: ArmUnit, shared: Shared) -> tuple[Array, Array, Array]:
+    """The payload's twist in {1}, its derivative, and the direction against gravity; shapes (Q, 6) twice and (Q, 3)."""
+    G, Q = _fusion(units, shared), len(data.h)
+    up = np.einsum("iab,qib->qa", shared.grasps.R_1i, data.R_bi[..., 2, :])
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    return data.twist.reshape(Q, -1) @ G.T, data.twist_dot.reshape(Q, -1) @ G.T, up
+
+
 def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     """(f, M) of the robots at the origin of {1}, in {1}, minus what moves the payload, shape (Q, 6)."""
-    grasps, Q = shared.grasps, len(data.h)
-    G = _fusion(units, shared)
-    motion, motion_dot = data.twist.reshape(Q, -1) @ G.T, data.twist_dot.reshape(Q, -1) @ G.T
-    up = np.einsum("iab,qib->qa", grasps.R_1i, data.R_bi[..., 2, :])
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    force, moment = total_wrench(data.wrench, grasps)
+    motion, motion_dot, up = _motion(data, units, shared)
+    force, moment = total_wrench(data.wrench, shared.grasps)
     needed = _regressor(motion, motion_dot, up, units.gravity_mps2) @ shared.pi
     return np.concatenate([force, moment], axis=1) - needed
 
@@ -227,7 +344,7 @@ def _derivatives(
         by_units[:, :, i, AT["tau_zero"]] = -of_tau * (1.0 + unit.of("stiffness_ratio"))
         tau = s[:, i, TAU] / (1.0 + unit.of("stiffness_ratio"))
         by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
-    by_carried = _by_carried(data, motion, motion_dot, up, units, shared)
+    by_carried = _by_carried(data, units, shared)
     return by_signals, by_units, by_carried, np.zeros((n, C, 4 * (N - 1)))
 
 
@@ -258,9 +375,8 @@ def _chain(
     return out
 
 
-def _by_carried(
-    data: ArmData, motion: Array, motion_dot: Array, up: Array, units: ArmUnit, shared: Shared
-) -> Array:
+def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
+    motion, motion_dot, up = _motion(data, units, shared)
     n, N = data.h.shape[:2]
     grasped, gravity = 6 * (N - 1), units.gravity_mps2
     out = np.zeros((n, 6 * N, grasped + 10))

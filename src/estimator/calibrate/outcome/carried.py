@@ -27,6 +27,7 @@ class Carried:
         p_1c: centre of mass in {1} [m], shape (3,).
         inertia: about it, axes of {1} [kg m^2], shape (3, 3).
         covariance: of the mass, p_1c and xx, xy, xz, yy, yz, zz of the inertia, shape (10, 10).
+        by_scale: derivative of the same by the common spring scale, shape (10,).
         principal: principal moments and axes.
     """
 
@@ -34,6 +35,7 @@ class Carried:
     p_1c: Array
     inertia: Array
     covariance: Array
+    by_scale: Array
     principal: PrincipalInertia
 
     @property
@@ -70,12 +72,11 @@ def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
     values = _about_com(at)
     step = np.maximum(np.abs(at), 1e-3)  # parameters of different units
     J = numerical_jacobian(lambda x: _about_com(at + step * x), np.zeros(10)) / step
-    by_scale = payload.by_scale[-10:]
-    covariance = J @ (payload.covariance[-10:, -10:] + scale_sd**2 * np.outer(by_scale, by_scale)) @ J.T
+    by_scale = J @ payload.by_scale[-10:]
+    covariance = J @ payload.covariance[-10:, -10:] @ J.T + scale_sd**2 * np.outer(by_scale, by_scale)
     inertia = inertia_matrix(values[4:])
-    return Carried(
-        float(values[0]), values[1:4], inertia, covariance, principal_inertia(inertia, covariance[4:, 4:])
-    )
+    principal = principal_inertia(inertia, covariance[4:, 4:])
+    return Carried(float(values[0]), values[1:4], inertia, covariance, by_scale, principal)
 
 
 def _about_com(parameters: Array) -> Array:

@@ -13,7 +13,7 @@ from estimator.arrays import Array
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.calibrate.outcome.apply import calibrated
-from estimator.calibrate.outcome.carried import Carried, carried
+from estimator.calibrate.outcome.carried import Carried, carried, grasps_of
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial, wrench_balance
 from estimator.estimate.fusion import fuse
@@ -46,7 +46,7 @@ def estimate_calibrated(
     """Grasps, mass, centre of mass and inertia as the calibration found them, errors of a held spring scale included.
 
     What each recording says (holds, robots that contradict each other, wrenches left over) is judged with the
-    calibrated arms. All is in the frames that the encoders define.
+    calibrated arms. All is in the calibration's frames.
 
     Args:
         calibration: made from these recordings, and others perhaps.
@@ -66,6 +66,7 @@ def estimate_calibrated(
         method=METHOD,
         units=calibration.units,
         open=calibration.open,
+        zero_sd_rad=calibration.zero_sd_rad,
     )
     estimate = replace(estimate, flags=(*calibration.findings, *estimate.flags))
     return withheld(estimate, max(trial.team for trial in trials))
@@ -90,15 +91,22 @@ def with_payload(
         force, moment = wrench_balance(trial.data, grasps, numbers.mass_kg, numbers.p_1c, inertia)
         records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
     before = inertia_flags(staged.inertia) if staged.inertia else []
+    # What a least squares of twists would not tell apart from noise says nothing of the fit: its errors do.
+    steps = [
+        inertia.judged(replace(step, weak=())) if step.step == "inertia" else step for step in staged.steps
+    ]
+    told = all(step.determined for step in steps if step.step == "inertia")
+    after = inertia_flags(inertia) if told else []
     return replace(
         staged,
         grasps=grasps,
         mass=MassEstimate(numbers.mass_kg, numbers.mass_se_kg, _force_residual(records, numbers, trials)),
         p_1c=numbers.p_1c,
         p_1c_covariance=numbers.covariance[1:4, 1:4],
-        inertia=inertia,
+        inertia=inertia if told else None,
+        steps=tuple(steps),
         recordings=tuple(records),
-        flags=(*(flag for flag in staged.flags if flag not in before), *inertia_flags(inertia)),
+        flags=(*(flag for flag in staged.flags if flag not in before), *after),
     )
 
 
@@ -141,6 +149,7 @@ def _with_errors(
 
     Those are the robots' and, within, those of a fit that follows noise less: at most 1.4 times too much.
     """
+    estimate = replace(estimate, open=calibration.open, zero_sd_rad=calibration.zero_sd_rad)
     mass, grasps, inertia = estimate.mass, estimate.grasps, estimate.inertia
     if held is None:
         flag = (
@@ -163,9 +172,7 @@ def _with_errors(
             inertia.residual_rms,
             inertia.moment_rms,
         )
-    return replace(
-        estimate, grasps=grasps, mass=mass, p_1c_covariance=com, inertia=inertia, open=calibration.open
-    )
+    return replace(estimate, grasps=grasps, mass=mass, p_1c_covariance=com, inertia=inertia)
 
 
 def one_payload(recordings: Sequence[Recording]) -> None:
@@ -198,10 +205,8 @@ def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> Ca
 
 def _grasps(payload: CalibratedPayload, scale_sd: float, staged: PayloadEstimate) -> GraspEstimate:
     """The calibration's frames; residuals of twists, which it does not use, are those of the staged estimate."""
-    by_scale = payload.by_scale[:-10]
-    covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
-    found = staged.grasps or payload.grasps
-    return replace(found, R_1i=payload.grasps.R_1i, p_1i=payload.grasps.p_1i, covariance=covariance)
+    found, own = staged.grasps or payload.grasps, grasps_of(payload, scale_sd)
+    return replace(found, R_1i=own.R_1i, p_1i=own.p_1i, covariance=own.covariance)
 
 
 def _inertia(trials: Sequence[Trial], grasps: GraspEstimate, numbers: Carried) -> InertiaEstimate:

@@ -20,6 +20,7 @@ from estimator.calibrate.problem import Trial
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from estimator.estimate import consistency
+from estimator.estimate.joint import estimate_joint
 from estimator.estimate.payload import (
     estimate_from_trials,
     estimate_payload,
@@ -30,8 +31,7 @@ from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.withheld import withheld
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared, robot_data
-from estimator.rigid_team.start import start_bases
+from estimator.rigid_team.residual import Shared, robot_data, start_bases
 
 METHOD = "fit"
 WITHOUT_ERRORS = (
@@ -78,8 +78,9 @@ def estimate(
     Args:
         recordings: one or several trials with the same robots and grasps, taken one after the other.
         method: ``"fit"``, one least squares of closed loops and balance of wrenches, the robots held; ``"staged"`` and
-            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine everything and
-            nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit further.
+            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine the centre of
+            mass and nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit
+            further.
         cutoff_hz: cut-off of the low-pass filter for what the fit does not do [Hz].
         say: takes the name of the stage that begins.
 
@@ -127,15 +128,19 @@ def _fitted(staged: PayloadEstimate, trials: Sequence[consistency.Trial], read: 
     if staged.robots < 2:
         raise _CannotBe("one robot closes no loop")
     grasps, mass, c, inertia = staged.grasps, staged.mass, staged.p_1c, staged.inertia
-    if grasps is None or mass is None or c is None or inertia is None:
-        parts = {"grasps": grasps, "mass": mass, "centre of mass": c, "inertia": inertia}
+    if grasps is None or mass is None or c is None:
+        parts = {"grasps": grasps, "mass": mass, "centre of mass": c}
         missing = next(name for name, part in parts.items() if part is None)
         raise _CannotBe(f"these recordings do not determine the {missing}")
     if staged.units is None and any(trial.units is not None for trial in trials):
         raise _CannotBe("the recordings say different things of their robots")
     units = staged.units or ArmUnit(read[0].design, np.zeros((staged.robots, COUNT)))
-    about_1 = inertia.inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
-    shared = Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
+    if inertia is None:  # the fit leaves it as open as the recordings do
+        pi = estimate_joint([trial.data for trial in trials], grasps)[0].parameters
+    else:
+        about_1 = inertia.inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        pi = np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)])
+    shared = Shared(grasps, pi)
     parts, bases = [], []
     for one, sensing in zip(read, Sensing.of_each([one.resolution for one in read]), strict=True):
         if one.rows is None or one.why_not:

@@ -13,8 +13,9 @@ from estimator.arm.unit import AT, GROUPS, Group
 from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
 from estimator.calibrate.outcome.carried import carried, grasps_of
+from estimator.estimate.frames import frames_said, in_encoder_frames
 from estimator.estimate.uncertainty import standard_errors
-from estimator.numbers import measured
+from estimator.statistics import measured
 
 
 class Shown(NamedTuple):
@@ -47,16 +48,11 @@ WIDTH = 118
 MASSES = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
 
 
-def in_drawing(calibration: Calibration) -> bool:
-    """Whether the zeros of theta_x are known, so that results are in the frames of drawings."""
-    return bool(calibration.units.of("theta_zero")[..., 2].any())
-
-
 def frames_sentence(calibration: Calibration) -> str:
     """In which frames the results are."""
-    if in_drawing(calibration):
+    if not in_encoder_frames(calibration.units):
         return "frames {i} as in the drawing, from flanges that are parallel"
-    return "frames {i} as the encoders define them: each turned about its x axis by the zero of that theta_x"
+    return frames_said(calibration.zero_sd_rad)
 
 
 def format_calibration(calibration: Calibration) -> str:

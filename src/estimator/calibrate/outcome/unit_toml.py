@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.calibrate.calibration import Calibration
+from estimator.estimate.frames import in_encoder_frames
 
 _HEAD = """\
 # Robot {robot} of {robots} as calibrated; SI units in the keys. Lists have one number a leg (1, 2, 3); theta_zero_rad
@@ -28,7 +29,6 @@ def unit_toml(calibration: Calibration, robot: int) -> str:
     k = robot - 1
     design = calibration.design
     ratio = unit.of("stiffness_ratio")[k]
-    given = calibration.units.of("theta_zero")[..., 2].any()
     values: dict[str, float | Sequence[float]] = {
         "radius_m": unit.radius_m[k],
         "proximal_length_m": unit.proximal_length_m[k],
@@ -50,9 +50,9 @@ def unit_toml(calibration: Calibration, robot: int) -> str:
         "gravity_mps2": design.gravity_mps2,
     }
     frames = (
-        "The zero of theta_x is known: frames are those of the drawing."
-        if given
-        else "The zero of theta_x is not known and set to 0: frames are those that the encoders define."
+        "The zero of theta_x is not known and set to 0: frames are those that the encoders define."
+        if in_encoder_frames(unit)
+        else "The zero of theta_x is known: frames are those of the drawing."
     )
     head = _HEAD.format(
         robot=robot, robots=calibration.robots, stiffness=design.sea_stiffness_Nm_per_rad, frames=frames

@@ -13,15 +13,17 @@ from pathlib import Path, PurePosixPath
 from tempfile import mkdtemp
 from typing import Any
 
+import numpy as np
 from ruamel.yaml import YAML
+from ruamel.yaml.tokens import AnchorToken
 
 from estimator.errors import InputError
+from estimator.inputs import Unpacked, plain
 from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Storage, joined, merged
 from mocobot_logs.bag.storage.mcap import McapBag
 from mocobot_logs.bag.storage.sqlite import SqliteBag
 from mocobot_logs.bag.storage.unpack import UnpackError, unpack_file, unpack_message
-from mocobot_logs.claims import read_small
-from mocobot_logs.faults import detail_of, readable
+from mocobot_logs.faults import detail_of, read_small, readable
 from mocobot_logs.formats import BAG_METADATA, MCAP, ROS1, SQLITE, has_bag_suffix
 
 VERSIONS = range(1, 10)
@@ -67,6 +69,11 @@ class BagFiles:
         """
         paths, self._are_packed = _files_of(path)
         self._scratch: Scratch | None = None  # keeps unpacked copies, which go when this goes
+        stored = sum(file.stat().st_size for file in paths if file.is_file())
+        self._unpacked, self._on_disk = (
+            Unpacked(str(path), stored),
+            0,
+        )  # in one reading of all, and of it those copies
         self._storages = [self._opened(file, number) for number, file in enumerate(paths)]
         self.topics = merged((t for storage in self._storages for t in storage.topics.values()), str(path))
         self.size = sum(storage.size for storage in self._storages)
@@ -87,22 +94,48 @@ class BagFiles:
         Raises:
             InputError: a file is damaged.
         """
+        self._unpacked.size = self._on_disk
         for storage in self._storages:
             for block in storage.blocks(topics, advance, block_bytes):
                 if self._are_packed:
-                    yield {t: _unpacked(m, f"{storage.name}: topic {t!r:.80}") for t, m in block.items()}
+                    yield from self._messages(block, storage.name)
                 else:
                     yield block
+
+    def _messages(self, block: dict[str, Messages], name: str) -> Iterator[dict[str, Messages]]:
+        """Messages that are compressed one by one, about ``BLOCK_BYTES`` at a time, topics in step."""
+        orders = {topic: np.maximum.accumulate(m.log_ns).tolist() for topic, m in block.items()}
+        held, found = 0, {topic: ([], []) for topic in block}
+        for _, topic, k in sorted(
+            (at, topic, k) for topic, order in orders.items() for k, at in enumerate(order)
+        ):
+            try:
+                payload = unpack_message(block[topic][k], MESSAGE_BYTES)
+            except UnpackError as error:
+                raise InputError(
+                    f"{name}: topic {topic!r:.80}: damaged, a compressed message {error}"
+                ) from error
+            self._unpacked.add(len(payload))
+            held += len(payload)
+            found[topic][0].append(payload)
+            found[topic][1].append(block[topic].log_ns[k])
+            if held > BLOCK_BYTES:
+                yield _joined(found, name)
+                held, found = 0, {topic: ([], []) for topic in block}
+        if last := _joined(found, name):
+            yield last
 
     def _opened(self, path: Path, number: int) -> Storage:
         name, head = str(path), _head(path)
         if head.startswith(_ZSTD):
             self._scratch = self._scratch or Scratch(path)
             packed, path = path, self._scratch.path / str(number)
-            unpack_file(packed, path, tuple(STORAGES.values()), name)
+            before = self._unpacked.size
+            unpack_file(packed, path, tuple(STORAGES.values()), name, self._unpacked)
+            self._on_disk += self._unpacked.size - before
             head = _head(path)
         if head.startswith(MCAP):
-            return McapBag(path, name)
+            return McapBag(path, name, self._unpacked)
         if head.startswith(SQLITE):
             return SqliteBag(path, name)
         if head.startswith(ROS1):
@@ -129,12 +162,12 @@ def _files_of(path: Path) -> tuple[list[Path], bool]:
     return [path / name for name in names], are_packed
 
 
-def _unpacked(messages: Messages, where: str) -> Messages:
-    try:
-        payloads = [unpack_message(messages[k], MESSAGE_BYTES) for k in range(len(messages))]
-    except UnpackError as error:
-        raise InputError(f"{where}: damaged, a compressed message {error}") from error
-    return joined(payloads, messages.log_ns, where)
+def _joined(found: dict[str, tuple[list[bytes], list[int]]], name: str) -> dict[str, Messages]:
+    return {
+        topic: joined(payloads, np.array(log_ns, np.int64), f"{name}: topic {topic!r:.80}")
+        for topic, (payloads, log_ns) in found.items()
+        if payloads
+    }
 
 
 def _head(path: Path) -> bytes:
@@ -193,7 +226,9 @@ def _load(content: bytes, path: Path) -> dict[str, Any]:
         # Merged keys grow without bound, tags make objects, deep nesting takes minutes: no recorder writes them.
         raise InputError(f"{path}: holds YAML beyond plain values, which no bag's metadata does")
     try:
-        values = YAML(typ="safe", pure=True).load(text)
+        if "&" in text and any(isinstance(t, AnchorToken) for t in YAML(typ="safe", pure=True).scan(text)):
+            raise ValueError("it has anchors, which no bag's metadata has")
+        values = plain(YAML(typ="safe", pure=True).load(text))
     except Exception as error:  # on damaged text the parser raises many types, not all of them its own
         raise InputError(f"{path}: not readable YAML ({detail_of(error)})") from error
     if not isinstance(values, dict):

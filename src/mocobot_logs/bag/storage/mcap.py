@@ -21,6 +21,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
 
 from estimator.errors import InputError
+from estimator.inputs import Unpacked
 from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, Topic, check_sizes, merged
 from mocobot_logs.bag.storage.unpack import CHUNK_BYTES, UnpackError, unpack
 from mocobot_logs.faults import readable
@@ -50,13 +51,13 @@ _Starts = dict[int, list[int]]
 class McapBag:
     """One MCAP file, see ``Storage``."""
 
-    def __init__(self, path: Path, name: str) -> None:
-        """Find the topics: in the summary, or in the whole file where there is none.
+    def __init__(self, path: Path, name: str, unpacked: Unpacked) -> None:
+        """Find the topics: in the summary, or in the whole file where there is none; ``unpacked`` counts chunks.
 
         Raises:
             InputError: not a complete MCAP file, or a damaged one.
         """
-        self._path, self.name = path, name
+        self._path, self.name, self._unpacked = path, name, unpacked
         self._channels: dict[int, Topic] = {}
         self._schemas: dict[int, Schema] = {}
         self._counts: dict[int, int] | None = None
@@ -112,7 +113,7 @@ class McapBag:
                 if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                     break
                 if opcode == Opcode.CHUNK:
-                    block = self._unpacked(file, length, at)
+                    block = self._chunk(file, length, at)
                     found, stop = self._walk(block, at, topics)
                     if stop < len(block):
                         raise self._stuck(block, stop, at)
@@ -269,7 +270,7 @@ class McapBag:
         if (stop := self._walk(block, at, ())[1]) < length:
             raise self._stuck(block, stop, at)
 
-    def _unpacked(self, file: BinaryIO, length: int, at: int) -> bytes:
+    def _chunk(self, file: BinaryIO, length: int, at: int) -> bytes:
         """What is in a chunk, its checksum compared where it has one."""
         if not _CHUNK.size + 8 <= length <= 2 * CHUNK_BYTES:
             raise self._damaged(at, f"a chunk of {length} bytes")
@@ -280,6 +281,8 @@ class McapBag:
         if begin > length or stored > length - begin:
             raise self._damaged(at, "a chunk claims more bytes than it has")
         compression = content[_CHUNK.size : begin - 8].decode(errors="replace")
+        if compression:
+            self._unpacked.add(min(size, CHUNK_BYTES))  # of larger ones ``unpack`` says more
         try:
             block = unpack(content[begin : begin + stored], compression, size)
         except UnpackError as error:

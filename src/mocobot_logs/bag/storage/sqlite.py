@@ -54,7 +54,7 @@ class SqliteBag:
             InputError: the file is damaged.
         """
         ids = [key for key, name in self._ids.items() if name in topics]
-        last, told = -(1 << 63), 0
+        last, told, held = -(1 << 63), 0, 0
         with self._connected() as connection:
             marks = ",".join("?" * len(ids))
             # By rowid: no index is trusted, nothing sorted, and the file is read from front to back.
@@ -68,6 +68,11 @@ class SqliteBag:
                 if order[0] <= last or (order[1:] <= order[:-1]).any():
                     raise InputError(f"{self.name}: damaged, its table 'messages' holds the same row twice")
                 last = int(order[-1])
+                held += sum(len(row[1]) for row in found)
+                if held > self.size:
+                    raise InputError(
+                        f"{self.name}: damaged, its messages are larger than the file: they share pages"
+                    )
                 yield self._by_topic(found)
                 now = int(self.size * min(max(last / self._last, 0.0), 1.0)) if self._last > 0 else 0
                 advance(now - told)

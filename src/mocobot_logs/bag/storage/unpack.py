@@ -6,7 +6,7 @@ import lz4.frame
 import zstandard
 
 from estimator.errors import InputError
-from mocobot_logs.claims import FREE_BYTES, LARGEST_RATIO
+from estimator.inputs import Unpacked
 from mocobot_logs.faults import detail_of
 
 CHUNK_BYTES = 256 << 20
@@ -64,7 +64,7 @@ def unpack_message(data: bytes, limit: int) -> bytes:
     return unpacked
 
 
-def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str) -> None:
+def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str, unpacked: Unpacked) -> None:
     """Unpack a file of a bag that was compressed as a whole (zstd).
 
     Args:
@@ -72,11 +72,11 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str)
         target: where to unpack it.
         heads: first bytes that the unpacked file may have.
         name: what messages call it.
+        unpacked: counts.
 
     Raises:
-        InputError: damaged, not one of ``heads``, larger than any log would be, or there is no room for it.
+        InputError: damaged, not one of ``heads``, too much in all, or there is no room for it.
     """
-    limit = max(FREE_BYTES, LARGEST_RATIO * source.stat().st_size)
     done = 0
     try:
         with (
@@ -88,10 +88,7 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str)
                 if not done and not block.startswith(heads):
                     raise InputError(f"{name}: what it unpacks to is neither an MCAP nor an SQLite file")
                 done += len(block)
-                if done > limit:
-                    raise InputError(
-                        f"{name}: unpacks to more than {LARGEST_RATIO} times its size, which is no measured log"
-                    )
+                unpacked.add(len(block))
                 out.write(block)
     except zstandard.ZstdError as error:
         raise InputError(f"{name}: damaged, does not unpack ({detail_of(error)})") from error

@@ -1,0 +1,1 @@
+"""Made-up joint logs for `benchmarks/inspect_joints.py`."""

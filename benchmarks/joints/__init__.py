@@ -1,0 +1,1 @@
+"""Robots of many shapes for the engine of evidence: hide, diagnose, score."""

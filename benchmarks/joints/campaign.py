@@ -1,0 +1,203 @@
+"""Hide causes in robots, diagnose their logs with the engine of evidence, score.
+
+    python benchmarks/joints/campaign.py --part panda|bare|shapes|clean-shapes --first SEED --draws N --out DIR
+    python benchmarks/joints/campaign.py --out DIR --tables
+
+It goes on where it was stopped. Seconds are of CPU.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np
+import tyro
+
+from arm import machine
+from arm.sets import ArmSet
+from arm.sets import make as make_arm
+from discrepancy.evidence.odds import odds_of
+from discrepancy.joints.diagnose import diagnose, labels_of
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.recording.joint_log import JointLog
+from joints.foreign import make, thinned
+
+RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
+KINDS = ("clean", "single", "clean", "single", "pairs")
+"""Of successive sets of the panda."""
+RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
+        "load_friction")  # fmt: skip
+ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
+"""Names of one thing at one joint: no log without rests parts the first, terms of one friction are the last."""
+SURE = 0.9
+Item = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Command line.
+
+    Attributes:
+        part: of the campaign.
+        kind: of all sets of the panda; in turn where it is not given.
+        first: seed of the first set.
+        draws: how many sets.
+        out: where results go.
+        tables: print the tables of the results instead.
+    """
+
+    part: Literal["panda", "bare", "shapes", "clean-shapes"] = "panda"
+    kind: Literal["clean", "single", "pairs", "triples"] | None = None
+    first: int = 0
+    draws: int = 10
+    out: Path = Path("out/joints")
+    tables: bool = False
+
+
+def main(options: Options) -> None:
+    """Run, or print."""
+    path = options.out / "results.jsonl"
+    results = [json.loads(x) for x in path.read_text(encoding="utf-8").splitlines()] if path.is_file() else []
+    if options.tables:
+        print(tables(results))
+        return
+    options.out.mkdir(parents=True, exist_ok=True)
+    done = {(r["part"], r["seed"], r["rate_hz"]) for r in results}
+    for seed in range(options.first, options.first + options.draws):
+        left = [r for r in RATES_HZ.get(options.part, (250.0,)) if (options.part, seed, r) not in done]
+        if not left:
+            continue
+        made = _arm(options, seed) if options.part == "panda" else make(options.part, seed, options.out)
+        for rate in left:
+            result = {"part": options.part, "seed": seed, "rate_hz": rate, "truth": made[2], "error": None}
+            begun = time.process_time()
+            try:
+                result |= _found(made[0], [thinned(g, rate) for g in made[1]], made[2])
+            except Exception:  # one that fails must not end the campaign
+                result["error"] = traceback.format_exc()
+            result["cpu_s"] = time.process_time() - begun
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(result) + "\n")
+            print("\n".join(told_of(result)), flush=True)
+
+
+def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
+    request = ArmSet.of(seed, options.kind or KINDS[seed % len(KINDS)], 4.0)  # type: ignore[arg-type]
+    made, model = make_arm(request, options.out), machine.nominal(options.out)
+    places = {"payload": model.bodies[-1], "push": "last link", "gravity_direction": "base"}
+    faults = [e | {"place": places.get(e["cause"], f"joint{e['joint']}")} for e in made.truth["effects"]]
+    return model, [made.log], {"kind": request.kind, "faults": faults, "values": {}}
+
+
+def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
+    """Causes with all that is told of them, values, the search's steps, and what further causes would gain."""
+    steps: list[str] = []
+    outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)))
+    causes = []
+    for o in odds_of(outcome.search, outcome.state, 1.0):
+        none = {True: ("open", ""), False: ("nothing", "")}
+        rivals = [(r.group.key if r.group else none[r.open], r.probability) for r in o.rivals]
+        every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
+        told = [None if g is None else g.key for g in o.told()]
+        causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})
+    numbers, hidden = labels_of(outcome), {f["cause"] for f in truth["faults"]}
+    offers = enumerate(outcome.search.offers(outcome.state))
+    listed = [[round(g, 1), c.group.name] for k, (g, c) in offers if k < 3 or c.group.cause in hidden]
+    return {"causes": causes, "steps": steps, "offers": listed[:12], "values": numbers}
+
+
+def _same(fault: Item, key: Sequence[str]) -> bool:
+    """Whether a cause at a place is the fault, or what no log parts from it."""
+    names = {n for family in ALIKE if fault["cause"] in family for n in family} | {fault["cause"]}
+    return key[0] in names and (fault["cause"] == "push" or key[1] == fault["place"])
+
+
+def score(result: Item) -> Item:
+    """Which faults are named, and what is besides; a cause whose likeliest reading is open or nothing is not named."""
+    truth, faults = result["truth"], result["truth"]["faults"]
+    named = [c for c in result["causes"] if c["every"][0][0][1]]
+    head = [c["every"][0][0] for c in named]
+    hits, right = [], {k for k, h in enumerate(head) if truth.get("foreign") and h[0] in RUBS}
+    for fault in faults:
+        told = [[head[k], *([] if None in c["told"] else c["told"])] for k, c in enumerate(named)]
+        own = {k for k, keys in enumerate(told) if any(_same(fault, key) for key in keys)}
+        hit = bool(own)
+        if fault["place"] == "all joints" and not own:
+            own = {k for k, h in enumerate(head) if h[0] == fault["cause"]}
+            hit = len(own) == truth["joints"]
+        hits.append(hit)
+        right |= own
+    strangers = [c for k, c in enumerate(named) if k not in right]
+    sure = [c for c in strangers if c["every"][0][1] >= SURE]
+    missed = [f for f, hit in zip(faults, hits, strict=True) if not hit]
+    return {"hits": hits, "missed": missed, "certain": sure, "false": [c for c in strangers if c not in sure],
+            "right": not missed and not strangers}  # fmt: skip
+
+
+def told_of(result: Item) -> list[str]:
+    """A set in words."""
+    truth = result["truth"]
+    said = {k: v for k, v in truth.items() if k not in ("faults", "values")}
+    words = ("cause", "place", "name", "size")
+    hidden = [" ".join(str(f[k]) for k in words if k in f) for f in truth["faults"]]
+    begin = f"{result['part']} {result['seed']} {result['rate_hz']:.0f} Hz {said}: {'; '.join(hidden)}"
+    if result["error"]:
+        return [begin, "    " + result["error"].splitlines()[-1]]
+    s = score(result)
+    out = [f"{begin} -> {'RIGHT' if s['right'] else 'not right'}, {result['cpu_s']:.1f} s"]
+    for c in result["causes"]:
+        mark = "CERTAIN" if c in s["certain"] else "false" if c in s["false"] else ""
+        every = ", ".join(f"{' '.join(key)} {p:.2f}" for key, p in c["every"] if p > 0.02)
+        out.append(f"    {mark:8s}{c['name']}, {c['nats']:.0f} nats: {every}")
+    return out + [f"    missed  {f['cause']} {f['place']}; offers {result['offers']}" for f in s["missed"]]
+
+
+def tables(results: Sequence[Item]) -> str:
+    """All tables there are results for, as Markdown, and every set that is not right."""
+    rows: dict[str, list[Item]] = {}
+    bare: dict[tuple[str, float], list[Sequence[float]]] = {}
+    verdicts: dict[int, list[list[str]]] = {}
+    for r in results:
+        more = r["truth"].get("kind", f"{r['rate_hz']:.0f} Hz" if r["part"] == "bare" else "")
+        rows.setdefault(f"{r['part']} {more}", []).append(r)
+        if r["part"] == "bare" and not r["error"]:
+            verdicts.setdefault(r["seed"], []).append(sorted(c["name"] for c in r["causes"]))
+            true = r["truth"]["values"]
+            for label in true.keys() & r["values"].keys():
+                key = label.split()[-1], r["rate_hz"]
+                bare.setdefault(key, []).append((*r["values"][label], true[label]))
+    head = "| sets | falsely certain | false below 0.9 | faults named | wholly right | errors | CPU s median, most |"
+    out = [head, "|---|---|---|---|---|---|---|"]
+    for name, own in sorted(rows.items()):
+        good = [score(r) for r in own if not r["error"]]
+        certain, false, hits = (sum(len(s[what]) for s in good) for what in ("certain", "false", "hits"))
+        named, right, bad = (
+            sum(sum(s["hits"]) for s in good),
+            sum(s["right"] for s in good),
+            len(own) - len(good),
+        )
+        seconds = f"{np.median([r['cpu_s'] for r in own]):.1f}, {max(r['cpu_s'] for r in own):.1f}"
+        row = f"{certain} | {false} | {named} of {hits} | {right} | {bad} | {seconds}"
+        out.append(f"| {name} ({len(own)}) | {row} |")
+    out += ["", "| value | Hz | n | rms of error over se | median of se over size |", "|---|---|---|---|---|"]
+    for (word, rate), numbers in sorted(bare.items()):
+        value, se, true = np.array(numbers).T
+        z, share = np.sqrt(np.mean(((value - true) / se) ** 2)), np.median(se / np.abs(true))
+        out.append(f"| {word} | {rate:.0f} | {len(numbers)} | {z:.2f} | {share:.3f} |")
+    whole = [v for v in verdicts.values() if len(v) == len(RATES_HZ["bare"])]
+    same = sum(all(x == v[0] for x in v) for v in whole)
+    wrong = [line for r in results if r["error"] or not score(r)["right"] for line in told_of(r)]
+    return "\n".join([*out, "", f"One verdict at all rates: {same} of {len(whole)}.", "", *wrong])
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))

@@ -1,0 +1,178 @@
+"""Rows of a linear problem by channel and frequency band, and their Gram matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+
+from estimator.arrays import Array
+
+Series = Mapping[int, Sequence[Array]]
+"""A column by channel: one time series (W,) a trial."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Which cosine coefficients of a trial are rows, and to which band each belongs.
+
+    Attributes:
+        rates_hz: samples per second of each trial.
+        lengths: samples of each trial.
+        edges_hz: K + 1 increasing edges of K bands.
+    """
+
+    rates_hz: Sequence[float]
+    lengths: Sequence[int]
+    edges_hz: Array
+
+    def of_trial(self, trial: int) -> NDArray[np.intp]:
+        """Band of each coefficient that is a row, shape (n,)."""
+        frequency = np.arange(self.lengths[trial]) * self.rates_hz[trial] / (2.0 * self.lengths[trial])
+        count = int(np.searchsorted(frequency, self.edges_hz[-1]))
+        return np.searchsorted(self.edges_hz, frequency[:count], side="right") - 1
+
+    def spectrum(self, series: Sequence[Array]) -> Array:
+        """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n, ...)."""
+        out = []
+        for t, x in enumerate(series):
+            out.append(dct(x, axis=0, norm="ortho")[: len(self.of_trial(t))])
+        return np.concatenate(out)
+
+
+@dataclass(eq=False)
+class Channel:
+    """The rows of one channel.
+
+    Attributes:
+        y: residual, band after band, shape (n,).
+        starts: first row of each band, and the end, shape (bands + 1,).
+        columns: indices of the columns that this channel sees, shape (k,).
+        X: their coefficients, shape (n, k).
+        grams, products: of each band, shapes (bands, k, k) and (bands, k).
+        squares: of each band, shape (bands,).
+    """
+
+    y: Array
+    starts: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    X: Array
+    grams: Array
+    products: Array
+    squares: Array
+
+
+@dataclass(eq=False)
+class Cells:
+    """A linear problem y = X x + noise whose noise has one variance for each channel and band.
+
+    Attributes:
+        bands: of the rows.
+        channels: one each.
+        count: number of columns.
+    """
+
+    bands: Bands
+    channels: list[Channel]
+    count: int = 0
+    _order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+
+    @classmethod
+    def of(cls, bands: Bands, residual: Sequence[Array]) -> Cells:
+        """Without columns; ``residual`` has one array (W, C) a trial."""
+        band = np.concatenate([bands.of_trial(t) for t in range(len(residual))])
+        order = np.argsort(band, kind="stable")
+        number = len(bands.edges_hz) - 1
+        starts = np.searchsorted(band[order], np.arange(number + 1))
+        none = np.zeros(0, dtype=np.intp)
+        channels = []
+        for c in range(residual[0].shape[1]):
+            y = bands.spectrum([r[:, c] for r in residual])[order]
+            squares = np.array([y[a:b] @ y[a:b] for a, b in pairwise(starts)])
+            X, grams, products = np.zeros((len(y), 0)), np.zeros((number, 0, 0)), np.zeros((number, 0))
+            channels.append(Channel(y, starts, none, X, grams, products, squares))
+        return cls(bands, channels, 0, order)
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """Number of rows by channel and band, shape (C, bands)."""
+        return np.array([np.diff(c.starts) for c in self.channels])
+
+    def add(self, series: Sequence[Series]) -> list[int]:
+        """Append columns; their indices."""
+        first = self.count
+        seen: dict[int, list[tuple[int, Array]]] = {}
+        for k, one in enumerate(series):
+            for c, x in one.items():
+                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x)[self._order]))
+        for c, found in seen.items():
+            self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
+        self.count += len(series)
+        return list(range(first, self.count))
+
+    @staticmethod
+    def _append(channel: Channel, indices: list[int], X: Array) -> None:
+        old, new = channel.X.shape[1], X.shape[1]
+        grams = np.zeros((len(channel.starts) - 1, old + new, old + new))
+        products = np.zeros((len(channel.starts) - 1, old + new))
+        grams[:, :old, :old], products[:, :old] = channel.grams, channel.products
+        for band, (a, b) in enumerate(pairwise(channel.starts)):
+            cross = channel.X[a:b].T @ X[a:b]
+            grams[band, :old, old:], grams[band, old:, :old] = cross, cross.T
+            grams[band, old:, old:] = X[a:b].T @ X[a:b]
+            products[band, old:] = X[a:b].T @ channel.y[a:b]
+        channel.columns = np.append(channel.columns, indices)
+        channel.X, channel.grams, channel.products = np.concatenate([channel.X, X], axis=1), grams, products
+
+    def truncate(self, count: int) -> None:
+        """Remove all columns from an index on."""
+        for channel in self.channels:
+            keep = int(np.sum(channel.columns < count))
+            channel.columns, channel.X = channel.columns[:keep], channel.X[:, :keep]
+            channel.grams, channel.products = channel.grams[:, :keep, :keep], channel.products[:, :keep]
+        self.count = count
+
+    def weighted_residual(self, x: Array, variance: Array) -> list[Array]:
+        """Time series of W (y - X x), one array (W, C) a trial: its product with a column is that column's score."""
+        spectra = []
+        for channel, own in zip(self.channels, variance, strict=True):
+            left = channel.y - channel.X @ x[channel.columns]
+            rows = np.empty_like(left)
+            rows[self._order] = left / np.repeat(own, np.diff(channel.starts))
+            spectra.append(rows)
+        out, first = [], 0
+        for t, length in enumerate(self.bands.lengths):
+            n = len(self.bands.of_trial(t))
+            wide = np.zeros((length, len(spectra)))
+            wide[:n] = np.column_stack([rows[first : first + n] for rows in spectra])
+            out.append(idct(wide, axis=0, norm="ortho"))
+            first += n
+        return out
+
+    def weighted(self, variance: Array) -> tuple[Array, Array, float]:
+        """X' W X (K, K), X' W y (K,) and y' W y for noise variances (C, bands)."""
+        G, b, yy = np.zeros((self.count, self.count)), np.zeros(self.count), 0.0
+        for channel, own in zip(self.channels, variance, strict=True):
+            weight = 1.0 / own
+            at = channel.columns
+            G[np.ix_(at, at)] += np.tensordot(weight, channel.grams, 1)
+            b[at] += weight @ channel.products
+            yy += float(weight @ channel.squares)
+        return G, b, yy
+
+    def left(self, x: Array, covariance: Array) -> tuple[Array, Array]:
+        """Squares that values leave, and those that their covariance explains besides, shape (C, bands) each."""
+        out = np.zeros((2, len(self.channels), len(self.bands.edges_hz) - 1))
+        for c, channel in enumerate(self.channels):
+            own, at = x[channel.columns], channel.columns
+            out[0, c] = (
+                channel.squares
+                - 2.0 * channel.products @ own
+                + np.einsum("bij,i,j->b", channel.grams, own, own, optimize=True)
+            )
+            out[1, c] = np.einsum("bij,ij->b", channel.grams, covariance[np.ix_(at, at)])
+        return np.maximum(out[0], 0.0), out[1]

@@ -1,0 +1,93 @@
+"""How probable each cause of a set is: it is taken out, and everything that could be in its place is weighed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.search import Chosen, Search, State
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What may be in a cause's place.
+
+    Attributes:
+        group: a cause; None: nothing, or something that no entry describes.
+        open: whether it is the latter.
+        probability: of it.
+    """
+
+    group: Group | None
+    open: bool
+    probability: float
+
+
+@dataclass(frozen=True)
+class Odds:
+    """A cause of the set.
+
+    Attributes:
+        chosen: it.
+        probability: that it is what and where it is said to be.
+        over_nothing: log odds over nothing in its place [nats].
+        rivals: everything else that was weighed, the likeliest first.
+    """
+
+    chosen: Chosen
+    probability: float
+    over_nothing: float
+    rivals: tuple[Rival, ...]
+
+    def told(self, share: float = 0.9) -> tuple[Group | None, ...]:
+        """The smallest set of causes that holds a share of the probability, the likeliest first."""
+        every = sorted([(self.probability, self.chosen.group), *((r.probability, r.group) for r in self.rivals)],
+                       key=lambda pair: -pair[0])  # fmt: skip
+        total, out = 0.0, []
+        for probability, group in every:
+            out.append(group)
+            total += probability
+            if total >= share:
+                break
+        return tuple(out)
+
+
+def odds_of(search: Search, state: State) -> list[Odds]:
+    """Probabilities of all causes of a set, which a search found."""
+    return [_odds(search, state, c) for c in state.chosen]
+
+
+def _odds(search: Search, state: State, own: Chosen) -> Odds:
+    cells = search.problem.cells
+    rest = [c for c in state.chosen if c is not own]
+    without = search.value(rest, state.posterior)
+    weighed: list[tuple[float, Group | None, bool]] = [(without.evidence, None, False)]
+    channels = {
+        c for c, channel in enumerate(cells.channels) if set(own.group.columns) & set(channel.columns)
+    }
+    if len(channels) == 1:
+        free = search.value(rest, without.posterior, open_at=channels.pop())
+        weighed.append((free.evidence - search.against - search.settings.open_nats, None, True))
+    offers = [o for o in search.offers(without) if o[1].group.name != own.group.name]
+    best = state.evidence
+    for gain, chosen in offers[: search.settings.most_rivals]:
+        if without.evidence + gain < best - search.settings.within_nats:
+            break
+        count = cells.count
+        rival = search.formed(search.value((*rest, chosen), without.posterior))
+        weighed.append((rival.evidence, chosen.group, False))
+        cells.truncate(count)
+    logs = np.array([state.evidence, *(w[0] for w in weighed)])
+    share = np.exp(logs - logs.max())
+    share /= share.sum()
+    merged: dict[tuple[str, str] | bool, Rival] = {}
+    for (_, group, is_open), p in zip(weighed, share[1:], strict=True):
+        key = is_open if group is None else group.key
+        if key == own.group.key:
+            share[0] += p  # another shape of the same cause
+        elif key not in merged or merged[key].probability < p:
+            merged[key] = Rival(group, is_open, float(p))
+    rivals = sorted(merged.values(), key=lambda r: -r.probability)
+    return Odds(own, float(share[0]), float(state.evidence - without.evidence), tuple(rivals))

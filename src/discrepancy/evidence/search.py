@@ -1,0 +1,305 @@
+"""The likeliest set of causes: add, delete, exchange on exact evidence, with the noise learnt for every set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from discrepancy.evidence.cells import Cells, Series
+from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.settings import SETTINGS, Settings
+from estimator.arrays import Array
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A cause in the model.
+
+    Attributes:
+        group: what and where.
+        scale: of its prior's standard deviation.
+        forms: columns of its law's error.
+    """
+
+    group: Group
+    scale: float
+    forms: tuple[int, ...] = ()
+
+
+class Linear(Protocol):
+    """A machine's logs as a linear problem."""
+
+    cells: Cells
+
+    @property
+    def groups(self) -> Sequence[Group]:
+        """Every cause at every place in every shape."""
+        ...
+
+    @property
+    def families(self) -> Sequence[Sequence[int]]:
+        """Columns of random effects whose common spread is learnt."""
+        ...
+
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
+        ...
+
+    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+        """What may have acted for a while, the likeliest first: groups whose columns are yet to be added."""
+        ...
+
+    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+        """The same event a little earlier, later, shorter and longer, with columns yet to be added."""
+        ...
+
+    def forms(self, group: Group, values: Array) -> list[Series]:
+        """What a cause of such values leaves if its law has another form, one standard deviation each."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A set of causes with everything else at its likeliest.
+
+    Attributes:
+        chosen: the causes.
+        posterior: of all columns.
+        evidence: log probability of the set and of the data, up to a constant.
+    """
+
+    chosen: tuple[Chosen, ...]
+    posterior: Posterior
+    evidence: float
+
+    @property
+    def keys(self) -> set[Key]:
+        """What and where the causes are."""
+        return {c.group.key for c in self.chosen}
+
+
+@dataclass(eq=False)
+class Search:
+    """The search on one linear problem.
+
+    Attributes:
+        problem: columns and groups.
+        floor: of the noise, shape (C, bands).
+        settings: numbers.
+        say: takes a line about each step.
+    """
+
+    problem: Linear
+    floor: Array
+    settings: Settings = SETTINGS
+    say: Callable[[str], object] = lambda _: None
+    against: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
+
+    def value(
+        self,
+        chosen: Sequence[Chosen],
+        near: Posterior | None,
+        steps: int | None = None,
+        *,
+        open_at: int | None = None,
+    ) -> State:
+        """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
+
+        Args:
+            chosen: the set.
+            near: where learning begins; None begins at the floor.
+            steps: of learning.
+            open_at: a channel whose noise may be anything.
+        """
+        cells, s = self.problem.cells, self.settings
+        nominal = self.prior(chosen, None if near is None else near.mean)
+        p = Posterior(cells, nominal, self.floor if near is None else near.variance)
+        weight = np.full((len(cells.channels), 1), s.floor_rows)
+        if open_at is not None:
+            weight[open_at] = 1.0
+        spread = np.ones(len(self.problem.families))
+        for _ in range(steps or (s.start_steps if near is None else s.noise_steps)):
+            S = nominal.copy()
+            for f, family in enumerate(self.problem.families):
+                idx = np.asarray(family)
+                if nominal[idx[0]] > 0:
+                    share = (p.mean[idx] ** 2 + np.diag(p.covariance)[idx]) / nominal[idx]
+                    spread[f] = (s.spread_rows + share.sum()) / (s.spread_rows + len(idx))
+                    S[idx] *= spread[f]
+            p = Posterior(cells, S, p.better_noise(self.floor, weight))
+        evidence = p.log_evidence + sum(c.group.log_prior - self.against for c in chosen)
+        evidence -= 0.5 * float(
+            np.sum(weight * (np.log(p.variance / self.floor) + self.floor / p.variance - 1.0))
+        )
+        evidence -= 0.5 * s.spread_rows * float(np.sum(np.log(spread) + 1.0 / spread - 1.0))
+        return State(tuple(chosen), p, evidence)
+
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        """Variances of all columns with some causes in the model."""
+        S = np.zeros(self.problem.cells.count)
+        base = self.problem.prior(chosen, values)
+        S[: len(base)] = base
+        for c in chosen:
+            S[list(c.group.columns)] += (np.array(c.group.slab) * c.scale) ** 2
+            S[list(c.forms)] += self.settings.form_share**2
+        return S
+
+    def fixed(self, chosen: Iterable[Chosen]) -> State:
+        """A set as it is, with its laws' errors."""
+        state = self.value((), None)
+        for one in chosen:
+            state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
+        return state
+
+    def run(self, state: State) -> State:
+        """The likeliest set from another on."""
+        state = self._pruned(self._settled(state), fresh=False)
+        while len(state.chosen) < self.settings.most_causes:
+            grown = self._grown(state) or self._exchanged(state)
+            if grown is None:
+                break
+            state = self._settled(grown)
+        return self._pruned(state, fresh=False)
+
+    def _settled(self, state: State) -> State:
+        """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
+        for _ in range(self.settings.settle_steps):
+            before, state = state.evidence, self.value(state.chosen, state.posterior)
+            if abs(state.evidence - before) < 0.1 * self.settings.need_nats:
+                break
+        return state
+
+    def _exchanged(self, state: State) -> State | None:
+        """A likelier set with another cause in the place of one; None if there is none."""
+        cells = self.problem.cells
+        for out in state.chosen:
+            rest = [c for c in state.chosen if c is not out]
+            without = self.value(rest, state.posterior)
+            for gain, chosen in self.offers(without)[: self.settings.tried]:
+                if chosen.group.name == out.group.name or without.evidence + gain < state.evidence - 5.0:
+                    continue
+                count = cells.count
+                other = self.formed(self.value((*rest, chosen), without.posterior))
+                if other.evidence - state.evidence >= self.settings.need_nats:
+                    gap = other.evidence - state.evidence
+                    self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
+                    return other
+                cells.truncate(count)
+        return None
+
+    def offers(self, state: State) -> list[tuple[float, Chosen]]:
+        """Every group that a set has room for by its linear gain, the likeliest first."""
+        taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
+        out = []
+        for g in self.problem.groups:
+            if g.key in taken or (g.cause, "all joints") in taken or g.family in families:
+                continue
+            gain, scale = state.posterior.gain(g, self.settings.octaves)
+            out.append((gain + g.log_prior - self.against, Chosen(g, scale)))
+        return sorted(out, key=lambda offer: -offer[0])
+
+    def _grown(self, state: State) -> State | None:
+        """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
+        count = self.problem.cells.count
+        tried = [self.value((*state.chosen, c), state.posterior) for c in self._events(state)]
+        for gain, chosen in self.offers(state)[: self.settings.tried]:
+            if gain < -5.0:
+                break
+            kept = [
+                c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
+            ]
+            tried.append(self.value((*kept, chosen), state.posterior))
+        for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
+            if best.evidence - state.evidence < self.settings.need_nats:
+                break
+            if not best.chosen[-1].group.event:
+                self.problem.cells.truncate(count)
+            grown = self._pruned(self.formed(best))
+            if grown.evidence - state.evidence >= self.settings.need_nats:
+                self.say(f"+ {best.chosen[-1].group.name}: {grown.evidence - state.evidence:.0f} nats")
+                return grown
+            self.problem.cells.truncate(count)
+        self.problem.cells.truncate(count)
+        return None
+
+    def _events(self, state: State) -> list[Chosen]:
+        """The likeliest events, with their columns added."""
+        cells = self.problem.cells
+        found = [
+            replace(group, columns=tuple(cells.add(series)))
+            for group, series in self.problem.events(state.posterior)
+            if group.key not in state.keys
+        ]
+        wider = Posterior(cells, self.prior(state.chosen, state.posterior.mean), state.posterior.variance)
+        return [Chosen(group, wider.gain(group, self.settings.octaves)[1]) for group in found]
+
+    def formed(self, state: State) -> State:
+        """The set with the law's errors of its last cause."""
+        if state.chosen[-1].group.event:
+            state = self._moved(state)
+        last = state.chosen[-1]
+        forms = self.problem.forms(last.group, state.posterior.mean)
+        if not forms:
+            return state
+        index = tuple(self.problem.cells.add(forms))
+        return self.value((*state.chosen[:-1], replace(last, forms=index)), state.posterior, 3)
+
+    def _moved(self, state: State) -> State:
+        """The set with its last event at the likeliest instants nearby."""
+        cells, (*rest, last) = self.problem.cells, state.chosen
+        for _ in range(self.settings.event_steps):
+            count, tried = cells.count, []
+            for group, series in self.problem.nearby(last.group):
+                moved = Chosen(replace(group, columns=tuple(cells.add(series))), last.scale)
+                tried.append(self.value((*rest, moved), state.posterior))
+            better = max(tried, key=lambda t: t.evidence)
+            if better.evidence <= state.evidence:
+                cells.truncate(count)
+                return state
+            state, last = better, better.chosen[-1]
+        return state
+
+    def _pruned(self, state: State, *, fresh: bool = True) -> State:
+        """The set without causes that it is likelier without; ``fresh``: the last is kept."""
+        while len(state.chosen) > fresh:
+            shorter = [
+                self.value([c for c in state.chosen if c is not out], state.posterior)
+                for out in state.chosen[: len(state.chosen) - fresh]
+            ]
+            best = max(shorter, key=lambda s: s.evidence)
+            if best.evidence < state.evidence:
+                return state
+            (gone,) = set(state.keys) - best.keys
+            self.say(f"- {gone[0]} at {gone[1]}: {best.evidence - state.evidence:.0f} nats")
+            state = best
+        return state
+
+
+def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Array:
+    """Variances that the whole dictionary leaves, smoothed over neighbouring bands, shape (C, bands).
+
+    Args:
+        problem: columns.
+        slabs: prior variances with every cause in the model, shape (K,).
+        settings: numbers.
+    """
+    cells = problem.cells
+    power = np.array([c.squares for c in cells.channels]) / cells.rows
+    # From below: noise that explains everything is a solution, too.
+    start = np.broadcast_to(power.min(axis=1, keepdims=True), power.shape)
+    p = Posterior(cells, slabs, start)
+    for _ in range(
+        settings.floor_steps
+    ):  # expectation and maximisation: MacKay's step is not safe with more columns than rows
+        left, fitted = cells.left(p.mean, p.covariance)
+        p = Posterior(cells, slabs, np.maximum((left + fitted) / cells.rows, settings.least_floor * start))
+    log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
+    return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])

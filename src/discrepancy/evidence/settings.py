@@ -1,0 +1,53 @@
+"""Every number of the engine that decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numbers of the search and of the noise.
+
+    Attributes:
+        floor_rows: observations that the noise's floor counts (20: a band of 0.25 Hz in 40 s).
+        spread_rows: observations that the nominal spread of a family of random effects counts.
+        form_share: standard deviation of a law's error, of the law's own trace, in each of its forms.
+        need_nats: log odds by which a set must be likelier to replace another (1: a factor of e).
+        cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
+        most_causes: largest set.
+        tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
+        octaves: scales of a cause's prior, by halves from the slab down.
+        noise_steps: steps in which noise and spreads are learnt for a candidate.
+        settle_steps: times that is repeated at most for a set that is taken.
+        start_steps: the same where nothing was learnt before.
+        floor_steps: the same for the noise that the whole dictionary leaves.
+        rounds: times the problem is made linear again.
+        event_steps: times the instants of an event are moved.
+        open_nats: log odds of a listed cause over something unlisted at its place, before the data are seen.
+        within_nats: linear gain below the best beyond which a rival is not weighed (15: 3e-7 of its odds).
+        most_rivals: rivals that are weighed exactly.
+        least_floor: least noise variance over that of the quietest band, in which there is noise at least.
+    """
+
+    floor_rows: float = 20.0
+    spread_rows: float = 5.0
+    form_share: float = 0.1
+    need_nats: float = 1.0
+    cause_nats: float = 3.0
+    most_causes: int = 30
+    tried: int = 6
+    octaves: int = 5
+    noise_steps: int = 2
+    settle_steps: int = 8
+    start_steps: int = 8
+    floor_steps: int = 15
+    rounds: int = 3
+    event_steps: int = 4
+    open_nats: float = 1.0
+    within_nats: float = 15.0
+    most_rivals: int = 8
+    least_floor: float = 0.1
+
+
+SETTINGS = Settings()

@@ -1,0 +1,543 @@
+"""Logs of a robot's joints as a linear problem, linear around given values of what is uncertain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import fftconvolve
+
+from discrepancy.evidence.cells import Bands, Cells, Series
+from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.search import Chosen
+from discrepancy.joints import friction
+from discrepancy.joints.causes import CAUSES, JointSignals, Span
+from discrepancy.serial.causes.elasticity import along
+from discrepancy.serial.mechanics.nominal import inverse_torque
+from discrepancy.serial.mechanics.regressor import (
+    body_regressor,
+    force_torque,
+    inertial_parameters,
+    torque_of,
+)
+from discrepancy.serial.mechanics.shift import by_acceleration, by_displacement
+from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rows.signals import Signals
+from estimator.arrays import Array
+from estimator.filtering import low_pass
+
+EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
+"""Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
+TOP_SHARE = 0.15
+"""Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
+EDGE_S = 0.1
+"""Left out at both ends, where smoothing is spoilt."""
+INERTIA, JOINT, ZERO_RAD, LENGTH_M, TILT_RAD, SCALE, DELAY_S = 0.1, 0.03, 2e-3, 1e-3, 5e-3, 0.02, 5e-4
+"""Standard deviations of a healthy robot's numbers; shares of the model's own for inertias, rotors and friction."""
+LEAST_COM_M = 0.01
+FORM = 0.1
+"""Share of the friction that a model names by which that may differ from its law."""
+PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
+MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
+PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
+PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
+"""Durations of pushes that are tried [s], standard deviation of their force [N], the frequency whose noise ranks them
+[Hz], and how many are weighed exactly."""
+REST = 1.5
+"""Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
+
+Values = Mapping[str, float]
+
+
+@dataclass(eq=False)
+class JointProblem:
+    """A linear problem; see ``evidence.search.Linear``.
+
+    Attributes:
+        model: the robot as described.
+        parts: smoothed logs, around which columns are made.
+        cells, groups, families: of the engine.
+        labels: names of the columns.
+        tolerance: standard deviations of a healthy robot, shape (K,).
+        series: the columns.
+        joints: signals by joint and log.
+        dry: dry friction that the model names, shape (J,).
+        pushed: torques per newton on the last link along the world's axes, shape (W, J, 3) a log.
+        resting: columns of friction at rest by joint, and their standard deviations per newton metre.
+        rubbing: by group key, which joint's friction its first value is.
+    """
+
+    model: SerialModel
+    parts: list[Signals]
+    cells: Cells
+    groups: list[Group] = field(default_factory=list)
+    families: list[list[int]] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
+    tolerance: list[float] = field(default_factory=list)
+    series: list[Series] = field(default_factory=list)
+    joints: list[list[JointSignals]] = field(default_factory=list)
+    dry: Array = field(default_factory=lambda: np.zeros(0))
+    resting: list[tuple[list[int], Array]] = field(default_factory=list)
+    pushed: list[Array] = field(default_factory=list)
+
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        """Variances of what is always in the model; friction at rest follows the friction there is."""
+        S = np.array(self.tolerance) ** 2
+        rubs = self.dry.copy()
+        if values is not None:
+            index = {name: j for j, name in enumerate(self.model.joints)}
+            named = {cause.name for cause in CAUSES if cause.rubs}
+            for c in chosen:
+                if c.group.cause in named:
+                    members = c.group.members or (c.group.columns,)
+                    places = self.model.joints if c.group.members else (c.group.place,)
+                    for place, member in zip(places, members, strict=True):
+                        rubs[index[place]] += values[member[0]]  # with its sign: terms share one torque
+        for j, (columns, unit) in enumerate(self.resting):
+            S[columns] = (unit * rubs[j]) ** 2
+        return S
+
+    def slabs(self) -> Array:
+        """Prior variances with every cause in the model, shape (K,)."""
+        S = np.array(self.tolerance) ** 2
+        for g in self.groups:
+            k = list(g.columns)
+            S[k] = np.maximum(S[k], np.array(g.slab) ** 2)
+        for j, (columns, unit) in enumerate(self.resting):
+            S[columns] = np.maximum(
+                S[columns], (unit * max(self.dry[j], 0.1 * self.joints[j][0].span.torque)) ** 2
+            )
+        return S
+
+    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+        """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
+        scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
+        middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
+        weight = 1.0 / posterior.variance[:, middle]
+        found, windows = [], 0
+        for t, score in enumerate(scores):
+            force, rate = self.pushed[t], self.cells.bands.rates_hz[t]
+            Q = np.einsum("wck,wc->wk", force, score)
+            R = np.einsum("wck,wcl,c->wkl", force, force, weight)
+            ridge = 1e-9 * np.trace(R.sum(axis=0)) * np.eye(3)
+            for seconds in PUSH_S:
+                n = round(seconds * rate)
+                if n < 3 or 4 * n > len(score):
+                    continue
+                sine = np.sin(np.pi * (np.arange(n) + 0.5) / n)
+                q = fftconvolve(Q, sine[:, None], mode="valid", axes=0)
+                r = fftconvolve(R, (sine**2)[:, None, None], mode="valid", axes=0) + ridge
+                gain = 0.5 * np.einsum("wk,wk->w", q, np.linalg.solve(r, q[..., None])[..., 0])
+                windows += len(gain) * 4 // n
+                best = int(np.argmax(gain))
+                found.append((float(gain[best]), t, best, n))
+        return [
+            self.event(self._window(t, first, n, -math.log(windows)))
+            for _, t, first, n in sorted(found, reverse=True)[:EVENTS]
+        ]
+
+    def _window(self, trial: int, first: int, n: int, log_prior: float) -> Group:
+        rate = self.cells.bands.rates_hz[trial]
+        shape = (("trial", float(trial)), ("start_s", first / rate), ("duration_s", n / rate))
+        place = f"last link from {first / rate:.1f} s of log {trial + 1}"
+        return Group("push", place, (), (PUSH_N,) * 3, log_prior, shape, event=True)
+
+    def event(self, group: Group) -> tuple[Group, list[Series]]:
+        """A push with its columns: force along the world's axes, half a sine long."""
+        return group, [self._push(group, np.eye(3)[k], 1) for k in range(3)]
+
+    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+        """The same push a little earlier, later, shorter and longer."""
+        shape = dict(group.shape)
+        trial = int(shape["trial"])
+        rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
+        middle, n = (shape["start_s"] + 0.5 * shape["duration_s"]) * rate, shape["duration_s"] * rate
+        out = []
+        for shift, stretch in (
+            (-0.15, 1.0),
+            (0.15, 1.0),
+            (0.0, 0.75),
+            (0.0, 1.33),
+            (-0.15, 1.33),
+            (0.15, 1.33),
+        ):
+            length = round(stretch * n)
+            first = round(middle + shift * n - 0.5 * length)
+            if length > 2 and first >= 0 and first + length <= most:
+                out.append(self.event(self._window(trial, first, length, group.log_prior)))
+        return out
+
+    def _push(self, group: Group, force: Array, wave: int) -> Series:
+        """Torques of a force during a push, ``wave`` half sines long."""
+        shape = dict(group.shape)
+        trial = int(shape["trial"])
+        rate = self.cells.bands.rates_hz[trial]
+        first, n = round(shape["start_s"] * rate), round(shape["duration_s"] * rate)
+        window = np.sin(wave * np.pi * (np.arange(n) + 0.5) / n)
+        by: dict[int, list[Array]] = {}
+        for c in range(self.pushed[trial].shape[1]):
+            by[c] = [np.zeros(len(f)) for f in self.pushed]
+            by[c][trial][first : first + n] = -(self.pushed[trial][first : first + n, c] @ force) * window
+        return by
+
+    def forms(self, group: Group, values: Array) -> list[Series]:
+        """Traces of a cause times smooth functions; none of what inertia and geometry do."""
+        if group.event:
+            force = 3.0 * values[list(group.columns)]
+            return [self._push(group, force, wave) for wave in (2, 3, 4)]
+        named = {cause.name: cause for cause in CAUSES}
+        if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
+            return []
+        out: list[Series] = []
+        members = group.members or (group.columns,)
+        for member in members:
+            for c in {c for k in member for c in self.series[k]}:
+                signals = self.joints[c]
+                if group.cause == "friction":
+                    coulomb, viscous = (abs(float(values[k])) for k in member)
+                    out += [{c: x} for x in friction.other_forms(signals, coulomb, viscous, 1.0, 3.0)]
+                    continue
+                trace = [
+                    sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
+                    for t in range(len(signals))
+                ]
+                each = [friction.smooth(s) for s in signals]
+                out += [
+                    {c: [e * f[i] for e, f in zip(trace, each, strict=True)]} for i in range(len(each[0]))
+                ]
+                size = np.sqrt(np.mean(np.concatenate(trace) ** 2))
+                slope = [np.gradient(e, s.step_s) for e, s in zip(trace, signals, strict=True)]
+                steep = np.sqrt(np.mean(np.concatenate(slope) ** 2)) + 1e-12
+                out.append({c: [x * size / steep for x in slope]})
+        return out
+
+
+def smoothed(model: SerialModel, logs: Sequence[JointLog]) -> list[Signals]:
+    """Signals of logs with one typical speed for all."""
+    tree = Tree.of(model.model)
+    parts = [Signals.of(log, tree, partial(inverse_torque, model.model)) for log in logs]
+    typical = np.sqrt(np.mean([np.mean(s.dq**2, axis=0) for s in parts], axis=0))
+    return [replace(s, typical=np.maximum(typical, 1e-6)) for s in parts]
+
+
+def joint_problem(
+    model: SerialModel, smooth: Sequence[Signals], values: Values | None = None
+) -> JointProblem:
+    """The linear problem around some values of its columns, by label; None: the model as it is."""
+    return _Builder(model, list(smooth), values or {}).built()
+
+
+class _Builder:
+    def __init__(self, model: SerialModel, smooth: list[Signals], values: Values) -> None:
+        self.model, self.values, self.names = model, values, model.joints
+        self.J = len(model.joints)
+        self.given = smooth[0].tree
+        self.tree = self._tree()
+        zero = np.array([values.get(f"{n} zero", 0.0) for n in self.names])
+        self.cut = [self._inside(s) for s in smooth]
+        self.parts = []
+        for s in smooth:
+            q, inverse = s.q + zero, s.inverse
+            if values:
+                inverse = torque_of(self.tree, q, s.dq, s.ddq) + self.given.armature * s.ddq
+            self.parts.append(replace(s, tree=self.tree, q=q, inverse=inverse))
+        self.slow = REST * self.parts[0].slow
+        self.spans = self._spans()
+        self.joints: list[list[JointSignals]] = [[] for _ in self.names]
+        residual = [self._residual(s, c) for s, c in zip(self.parts, self.cut, strict=True)]
+        rates = [s.rate_hz for s in self.parts]
+        top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
+        edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
+        self.bands = Bands(rates, [len(r) for r in residual], edges)
+        self.residual = residual
+        self.out = JointProblem(model, self.parts, Cells.of(self.bands, residual), joints=self.joints)
+        self.out.dry = np.array(self.given.coulomb)
+
+    def _inside(self, s: Signals) -> slice:
+        edge = math.ceil(EDGE_S * s.rate_hz)
+        return slice(edge, len(s.time) - edge)
+
+    def _tree(self) -> Tree:
+        t, v = self.given, self.values
+        if not v:
+            return t
+        mass, com, inertia, position = t.mass.copy(), t.com.copy(), t.inertia.copy(), t.position.copy()
+        for b in t.links:
+            n = self.model.model.body(int(b)).name
+            mass[b] *= max(1.0 + v.get(f"{n} mass share", 0.0), 0.05)
+            com[b] += [v.get(f"{n} com {x}", 0.0) for x in "xyz"]
+            inertia[b] *= max(1.0 + v.get(f"{n} inertia share", 0.0), 0.05)
+            load = [v.get(f"payload {n} {x}", 0.0) for x in MOMENTS]
+            if any(load):
+                mass[b], com[b], inertia[b] = _with_load(float(mass[b]), com[b], inertia[b], np.array(load))
+        for j, n in enumerate(self.names):
+            position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
+        gravity = t.gravity.copy()
+        for i, w in enumerate(_horizontal(t.gravity)):
+            gravity = gravity - v.get(f"tilt {i}", 0.0) * np.cross(w, t.gravity)
+        return replace(t, mass=mass, com=com, inertia=inertia, position=position, gravity=gravity)
+
+    def _spans(self) -> list[Span]:
+        def every(of: Callable[[Signals], Array]) -> Array:
+            return np.concatenate([of(s)[c] for s, c in zip(self.parts, self.cut, strict=True)])
+
+        def size(x: Array) -> Array:
+            return np.sqrt(np.mean(x**2, axis=0)) + 1e-9
+
+        q, until = every(lambda s: s.q), max(float(s.time[-1]) for s in self.parts)
+        middle = 0.5 * (q.max(axis=0) + q.min(axis=0))
+        sizes = [size(every(of)) for of in (lambda s: s.torque, lambda s: s.dq, lambda s: s.ddq)]
+        travel = np.ptp(q, axis=0) + 1e-9
+        return [
+            Span(float(sizes[0][j]), float(sizes[1][j]), float(sizes[2][j]), float(travel[j]),
+                 float(middle[j]), until)
+            for j in range(self.J)
+        ]  # fmt: skip
+
+    def _residual(self, s: Signals, c: slice) -> Array:
+        v = self.values
+        step = 1.0 / s.rate_hz
+        side = np.column_stack([friction.direction(s.dq[:, j], step, self.slow[j]) for j in range(self.J)])
+        of = lambda what: np.array([v.get(f"{n} {what}", 0.0) for n in self.names])  # noqa: E731
+        torque = s.torque
+        late = of("delay_s")
+        if late.any():
+            torque = np.column_stack([
+                CubicSpline(s.time, torque[:, j])(np.clip(s.time + late[j], s.time[0], s.time[-1]))
+                for j in range(self.J)
+            ])  # fmt: skip
+        asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
+        asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
+        for j in range(self.J):
+            here = (c, j)
+            one = JointSignals(
+                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=s.inverse[here],
+                asked=asked[here], torque=torque[here], t=s.time[c], span=self.spans[j],
+            )  # fmt: skip
+            self.joints[j].append(one)
+        return (torque - asked * (1.0 + of("scale")))[c]
+
+    # --- columns
+
+    def add(self, label: str, tolerance: float, by: Series) -> int:
+        self.out.series.append(by)
+        self.out.labels.append(label)
+        self.out.tolerance.append(float(tolerance))
+        return len(self.out.labels) - 1
+
+    def wide(self, of: Callable[[Signals], Array]) -> Series:
+        """A column of all joints."""
+        done = [of(s)[c] for s, c in zip(self.parts, self.cut, strict=True)]
+        return {j: [d[:, j] for d in done] for j in range(self.J) if any(d[:, j].any() for d in done)}
+
+    def group(
+        self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float] | Array, **more: Any
+    ) -> None:
+        sizes = tuple(float(x) for x in slab)
+        self.out.groups.append(Group(cause, place, tuple(columns), sizes, **more))
+
+    def built(self) -> JointProblem:
+        for j in range(self.J):
+            self._joint(j)
+        self._kinds()
+        for j in range(1, self.J):
+            self._geometry(j)
+        for j in range(self.J):
+            self._elasticity(j)
+        self._arm()
+        for body in self.tree.links:
+            self._link(int(body))
+        for j in range(self.J):
+            self._rests(j)
+        out = self.out
+        body = int(self.tree.joint_body[self.tree.last_link])
+        out.pushed = [
+            force_torque(s.motion, body, self.tree.com[body])[c]
+            for s, c in zip(self.parts, self.cut, strict=True)
+        ]
+        for i, label in enumerate(
+            out.labels
+        ):  # values count from the model, not from where columns are linear
+            if self.values.get(label):
+                for c, x in out.series[i].items():
+                    for t, own in enumerate(x):
+                        self.residual[t][:, c] += self.values[label] * own
+        out.cells = Cells.of(self.bands, self.residual)
+        out.cells.add(out.series)
+        return out
+
+    def _tolerance(self, j: int, parameter: str) -> float:
+        t = self.given
+        return {
+            "coulomb_Nm": JOINT * t.coulomb[j], "viscous_Nms_per_rad": JOINT * t.viscous[j],
+            "armature_kgm2": JOINT * t.armature[j], "scale": SCALE, "delay_s": DELAY_S,
+        }.get(parameter, 0.0)  # fmt: skip
+
+    def _joint(self, j: int) -> None:
+        n, t = self.names[j], self.given
+        own = {
+            "coulomb_Nm": t.coulomb[j],
+            "viscous_Nms_per_rad": t.viscous[j],
+            "armature_kgm2": t.armature[j],
+        }
+        for cause in CAUSES:
+            for shape in cause.shapes:
+                plain = not any(shape.values())
+                columns = [cause.columns(s, shape) for s in self.joints[j]]
+                index = []
+                for k, p in enumerate(cause.parameters):
+                    shared = plain and cause.name != "warming"
+                    label = f"{n} {p}" if shared else f"{n} {cause.name} {p} {dict(shape)}"
+                    if shared and label in self._known:
+                        index.append(self._known[label])
+                        continue
+                    tolerance = self._tolerance(j, p) if shared else 0.0
+                    index.append(self.add(label, tolerance, {j: [c[k] for c in columns]}))
+                    self._known[label] = index[-1]
+                least = tuple(-own.get(p, 0.0) if p in cause.positive else -np.inf for p in cause.parameters)
+                self.group(
+                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(cause.shapes)),
+                    shape=tuple(shape.items()), least=least if cause.positive else (),
+                )  # fmt: skip
+        if t.coulomb[j] or t.viscous[j]:
+            forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
+            for i, x in enumerate(forms):
+                self.add(f"{n} form {i}", 1.0, {j: x})
+
+    @property
+    def _known(self) -> dict[str, int]:
+        return self.__dict__.setdefault("_known_columns", {})
+
+    def _kinds(self) -> None:
+        """Causes of all joints alike: a common part and deviations."""
+        for cause in (c for c in CAUSES if c.kind):
+            members = [g for g in self.out.groups if g.cause == cause.name and not any(v for _, v in g.shape)]
+            if len(members) < 2:
+                continue
+            self.group(
+                cause.name, "all joints", [k for g in members for k in g.columns], [s for g in members for s in g.slab],
+                least=tuple(x for g in members for x in g.least), members=tuple(g.columns for g in members),
+            )  # fmt: skip
+
+    def _geometry(self, j: int) -> None:
+        n, body = self.names[j], int(self.tree.joint_body[j])
+        zero = self.add(f"{n} zero", ZERO_RAD, self.wide(lambda s: along(s, j, np.ones(len(s.time)))))
+        self.group("joint_zero", n, [zero], [0.1])
+        moved = {id(s): by_displacement(s.motion, body) for s in self.parts}
+        lengths = [
+            self.add(f"{n} length {'xyz'[k]}", LENGTH_M, self.wide(lambda s, k=k: moved[id(s)][:, :, k]))
+            for k in range(3)
+        ]
+        self.group("link_length", n, lengths, [0.02] * 3)
+        self._coupled(j)
+
+    def _coupled(self, j: int) -> None:
+        p, n, z = j - 1, self.names[j], self.spans[j]
+        for ratio in (1.0, -1.0):
+            by: tuple[Series, ...] = tuple({j: [], p: []} for _ in range(3))
+            for s, c in zip(self.parts, self.cut, strict=True):
+                v, a = s.dq[c, j] + ratio * s.dq[c, p], s.ddq[c, j] + ratio * s.ddq[c, p]
+                side = friction.direction(v, 1.0 / s.rate_hz, self.slow[j] + self.slow[p])
+                for k, x in enumerate((side, v, a)):
+                    by[k][j].append(x)  # type: ignore[attr-defined]
+                    by[k][p].append(ratio * x)  # type: ignore[attr-defined]
+            index = [self.add(f"{n} coupled {ratio:+.0f} {k}", 0.0, by[k]) for k in range(3)]
+            slab = [z.torque, z.torque / z.speed, z.torque / z.acceleration]
+            self.group("coupled_drive", n, index, slab, log_prior=-math.log(2.0), shape=(("ratio", ratio),))
+
+    def _elasticity(self, j: int) -> None:
+        def series(s: Signals) -> Array:
+            return along(s, j, -low_pass(s.inverse[:, j], s.rate_hz, min(7.0, 0.2 * s.rate_hz)))
+
+        k = self.add(f"{self.names[j]} compliance", 0.0, self.wide(series))
+        self.group("elasticity", self.names[j], [k], [1e-3], least=(0.0,))
+
+    def _arm(self) -> None:
+        g = self.tree.gravity
+        if not g.any():
+            return
+        by = {id(s): by_acceleration(s.motion) for s in self.parts}
+        tilts = [
+            self.add(f"tilt {i}", TILT_RAD, self.wide(lambda s, w=w: by[id(s)] @ np.cross(w, g)))
+            for i, w in enumerate(_horizontal(self.given.gravity))
+        ]
+        self.group("gravity_direction", "base", tilts, [0.1] * 2)
+        share = self.add("gravity share", 0.0, self.wide(lambda s: by[id(s)] @ g))
+        self.group("gravity_compensation", "robot", [share], [0.5])
+
+    def _link(self, body: int) -> None:
+        n, t, zero = self.model.model.body(body).name, self.tree, np.zeros((3, 3))
+        Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
+        m, c = self.given.mass[body], t.com[body]
+        loaded = body == self.tree.joint_body[self.tree.last_link] or body == self.tree.links[-1]
+        family = f"load of {n}" if loaded else ""
+
+        def column(label: str, tolerance: float, change: Array) -> int:
+            return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
+
+        mass = column(f"{n} mass share", INERTIA, inertial_parameters(m, c, zero))
+        self.group("link_mass", n, [mass], [1.0], family=family)
+        coms = []
+        for k in range(3):
+            e = 1e-4 * np.eye(3)[k]
+            change = inertial_parameters(t.mass[body], c + e, zero) - inertial_parameters(
+                t.mass[body], c - e, zero
+            )
+            tolerance = INERTIA * max(abs(self.given.com[body][k]), LEAST_COM_M)
+            coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
+        self.group("link_com", n, coms, [0.1] * 3, family=family)
+        inertia = column(
+            f"{n} inertia share", INERTIA, inertial_parameters(0.0, np.zeros(3), self.given.inertia[body])
+        )
+        self.group("link_inertia", n, [inertia], [2.0], family=family)
+        if loaded:
+            r = PAYLOAD_M
+            index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))
+                     for i, x in enumerate(MOMENTS)]  # fmt: skip
+            slab = PAYLOAD_KG * np.array([1.0, r, r, r] + [0.5 * r * r] * 6)
+            self.group("payload", n, index, slab, least=(0.0,) + (-np.inf,) * 9, family=family)
+
+    def _rests(self, j: int) -> None:
+        columns, unit = [], []
+        common: list[list[Array]] = [[], [], []]
+        for t, s in enumerate(self.joints[j]):
+            own, shared = friction.resting(s.v, s.step_s, self.slow[j])
+            for k in range(3):
+                common[k].append(shared[k])
+            for number, rest in enumerate(own):
+                for k, (first, x) in enumerate(rest):
+                    by = [np.zeros(len(o.v)) for o in self.joints[j]]
+                    by[t][first : first + len(x)] = x
+                    columns.append(self.add(f"{self.names[j]} rest {t} {number} {k}", 0.0, {j: by}))
+                    unit.append(1.0 / np.sqrt(3.0 * (1 + k)))
+        if columns:
+            self.out.families.append(list(columns))
+        for k in range(3):
+            columns.append(self.add(f"{self.names[j]} turning {k}", 0.0, {j: common[k]}))
+            unit.append(0.5)
+        self.out.resting.append((columns, np.array(unit)))
+
+
+def _horizontal(gravity: Array) -> Array:
+    """Two horizontal axes, shape (2, 3)."""
+    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
+
+
+def _with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
+    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
+    total = max(mass + float(load[0]), 0.05 * mass)
+    centre = (mass * com + load[1:4]) / total
+    xx, yy, zz, xy, xz, yz = load[4:]
+    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def about(c: Array) -> Array:
+        return c @ c * np.eye(3) - np.outer(c, c)
+
+    return total, centre, inertia + mass * about(com) + more - total * about(centre)

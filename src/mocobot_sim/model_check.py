@@ -1,0 +1,96 @@
+"""What a model's file, with all that it includes, would make MuJoCo read and hold: told before MuJoCo reads it."""
+
+import re
+from collections.abc import Mapping
+from math import prod
+from pathlib import Path
+from xml.parsers import expat
+
+from estimator.errors import InputError
+from estimator.inputs import JSON_BYTES, open_input, printable, read_input
+
+MOST_ELEMENTS, MOST_POINTS = 100_000, 1 << 24
+"""Of a model, copies included; and of one height field or texture."""
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def check_model(path: Path) -> None:
+    """Find out that a model is boundless, or that a file it names is a pipe or a device.
+
+    Raises:
+        InputError: it is, it cannot be read, or it is not well-formed XML.
+    """
+    _Check(path).run()
+
+
+class _Check:
+    def __init__(self, path: Path) -> None:
+        self._path, self._todo, self._seen = path, [path], set[Path]()
+        self._elements, self._copies = 0, [1]
+        self._folders, self._named = {""}, set[str]()
+
+    def run(self) -> None:
+        while self._todo:
+            file = self._todo.pop()
+            if file.resolve() in self._seen:
+                raise InputError(f"{self._path}: includes {file.name} twice")
+            self._seen.add(file.resolve())
+            parser = expat.ParserCreate()
+            parser.StartElementHandler, parser.EndElementHandler = self._start, lambda _: self._copies.pop()
+            parser.StartDoctypeDeclHandler = self._doctype
+            try:
+                parser.Parse(_COMMENT.sub(b"", read_input(file, JSON_BYTES)), True)
+            except OSError as error:
+                raise InputError(f"{file}: cannot be read ({error.strerror})") from error
+            except expat.ExpatError as error:
+                raise InputError(
+                    f"{file}: not a readable MJCF or URDF, it is not well-formed XML ({error})"
+                ) from error
+        for file in sorted(self._places()):
+            try:
+                with open_input(file) as opened:
+                    head = opened.read(24)
+            except OSError as error:
+                raise InputError(f"{self._path}: {file} cannot be read ({error.strerror})") from error
+            if head.startswith(_PNG):
+                size = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+                self._limit(prod(size), MOST_POINTS, f"{file} has", "pixels")
+
+    def _start(self, tag: str, attributes: Mapping[str, str]) -> None:
+        count = attributes.get("count", "") if tag in ("replicate", "composite", "flexcomp") else ""
+        self._copies.append(self._copies[-1] * prod(map(_whole, count.split())))
+        self._elements += self._copies[-1]
+        what = f"{self._path}: <{tag} {attributes.get('name', ''):.60}>".replace(" >", ">")
+        self._limit(self._elements, MOST_ELEMENTS, f"{what} makes", "elements of the model")
+        for rows, columns in (("nrow", "ncol"), ("width", "height")):
+            if rows in attributes and columns in attributes:
+                points = _whole(attributes[rows]) * _whole(attributes[columns])
+                self._limit(points, MOST_POINTS, f"{what} has", "points")
+        if tag == "size":
+            for key in attributes.keys() - {"memory"}:
+                self._limit(_whole(attributes[key]), MOST_POINTS, f"{what} has {key} of", "entries")
+        files = [value for key, value in attributes.items() if key.startswith("file")]
+        if tag in ("include", "model"):
+            self._todo += [f for name in files if (f := self._path.parent / name).exists()]
+        else:
+            self._named.update(files)
+            self._folders.update(value for key, value in attributes.items() if key.endswith("dir"))
+
+    def _doctype(self, *_: object) -> None:
+        raise InputError(f"{self._path}: declares a document type, which no model does")
+
+    def _limit(self, count: int, most: int, what: str, of: str) -> None:
+        if count > most:
+            raise InputError(f"{printable(what)} {count:,} {of}; at most {most:,} are read")
+
+    def _places(self) -> set[Path]:
+        """What is there under the names of files."""
+        named = {form for name in self._named for form in (name, name.rpartition("/")[2]) if form}
+        places = (self._path.parent / folder / name for folder in self._folders for name in named)
+        return {place for place in places if "\0" not in str(place) and place.exists() and not place.is_dir()}
+
+
+def _whole(text: str) -> int:
+    found = re.match(r"\s*\+?(\d+)", text)
+    return max(int(found[1][:18]), 1) if found else 1

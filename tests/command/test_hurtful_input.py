@@ -1,0 +1,289 @@
+"""Input that could hang, fill the memory, reach the terminal or fail late: one sentence at once, or shown as it is."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from command import refused, run
+from discrepancy.serial.model import load_model
+from estimator.errors import InputError
+from estimator.recording.parquet import write_recording
+from estimator.strict import parse_json, read_json, read_toml
+from invented_calibration import invented_calibration
+from mocobot_logs.map.files import read_map
+from mocobot_logs.open_log import open_log
+from mocobot_report.blocks.html import el, to_bytes
+from mocobot_report.calibration.plots import save_plots
+from mocobot_sim.plots_plain import plain_numbers, plain_words
+from mocobot_sim.scene.payload import load_payload
+from recordings import small_recording
+
+SRC = Path(__file__).resolve().parents[2] / "src"
+ESCAPE = "\x1b[31m"
+
+
+@pytest.fixture(autouse=True)
+def in_time() -> Iterator[None]:
+    """What hangs fails."""
+    signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it hangs"))
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+
+
+@pytest.fixture
+def pipe(tmp_path: Path) -> Path:
+    """Nobody ever writes into it."""
+    os.mkfifo(tmp_path / "pipe.toml")
+    return tmp_path / "pipe.toml"
+
+
+def test_a_pipe_or_a_device_is_no_input(
+    pipe: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_recording(small_recording(rows=150), tmp_path / "rec.parquet")
+    for words in (
+        ("estimate", "rec.parquet", "--config", pipe),
+        ("diagnose", pipe, "--rig", "emps"),
+        ("compare", pipe, pipe),
+        ("inspect", "/dev/zero"),
+        ("simulate", "--payload", pipe.rename(tmp_path / "pipe.xml"), "--out", tmp_path / "out.parquet"),
+    ):
+        os.mkfifo(pipe) if not pipe.exists() else None
+        arguments = [tmp_path / word if word == "rec.parquet" else word for word in words]
+        assert "regular file" in refused(capsys, *arguments), words
+    for read in (read_toml, read_json):
+        with pytest.raises(InputError, match="not a regular file"):
+            read(pipe, "it")
+    (tmp_path / "link.toml").symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=r"link\.toml"):
+        read_map(tmp_path / "link.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = " + "[" * 2_000 + "]" * 2_000, "recursion|levels"),
+        ("a = " + "[" * 100 + "]" * 100, "more than 64 levels"),
+        (".".join("a" * 50_000) + " = 1", "more than 64 parts"),
+        ('[[ "x y" . ' + " . ".join(["b", "'c'"] * 40) + " ]]", "more than 64 parts"),
+        ("a = 0x" + "f" * 20_000, "more than 4096 bits"),
+        ("#" + "a" * (1 << 20), "larger than 1 MiB"),
+    ],
+)
+def test_boundless_toml(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "file.toml"
+    file.write_text(text)
+    begin = time.monotonic()
+    for read in (read_map, lambda path: read_toml(path, "file")):
+        with pytest.raises(InputError, match=said):
+            read(file)
+    assert time.monotonic() - begin < 10.0
+
+
+def test_plain_toml_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "file.toml"
+    file.write_text("# " + "a." * 30 + "\na.b.'c.d' = [[1, 2.5], ['" + "x." * 60 + "']]\n[e]\nf = 0x7fff\n")
+    assert read_toml(file, "file")["a"]["b"]["c.d"][0] == [1, 2.5]
+    with pytest.raises(InputError, match="more than 64 levels"):
+        parse_json("{" + '"a":{' * 70 + "}" * 71, "file")
+
+
+@pytest.mark.parametrize(
+    ("version", "said"),
+    [
+        ("*a9", "it has anchors"),
+        ("0x" + "f" * 20_000, "more than 4096 bits"),
+        ("[" * 50 + "]" * 50, r"version is \["),
+    ],
+)
+def test_boundless_metadata_of_a_bag(tmp_path: Path, version: str, said: str) -> None:
+    bomb = "a0: &a0 [x]\n" + "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 10))
+    head = bomb if version.startswith("*") else ""
+    text = f"{head}rosbag2_bagfile_information:\n  version: {version}\n  storage_identifier: mcap\n"
+    (tmp_path / "metadata.yaml").write_text(text)
+    with pytest.raises(InputError, match=said):
+        open_log(tmp_path)
+
+
+BODY = '<body name="payload"><joint name="j"/><geom size=".1" mass="1"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("before", "inside", "said"),
+    [
+        (
+            '<asset><hfield name="h" nrow="30000" ncol="30000" size="1 1 1 1"/></asset>',
+            "",
+            "900,000,000 points",
+        ),
+        (
+            '<asset><texture name="t" builtin="flat" width="99999" height="9999"/></asset>',
+            "",
+            "999,890,001 points",
+        ),
+        (
+            "",
+            '<replicate count="2000000000" offset="1 0 0"><site/></replicate>',
+            "<replicate> makes|elements",
+        ),
+        ("", '<replicate count="999"><replicate count="999"><site/></replicate></replicate>', "elements"),
+        ("", '<body><composite type="cable" count="9000 9000 1"/></body>', "elements"),
+        ('<size nuserdata="2000000000"/>', "", "nuserdata of 2,000,000,000 entries"),
+        (
+            '<asset><mesh name="m" file="pipe.toml"/></asset>',
+            "",
+            r"pipe\.toml cannot be read \(not a regular file\)",
+        ),
+        ('<include file="pipe.toml"/>', "", r"pipe\.toml: cannot be read \(not a regular file\)"),
+        ('<include file="model.xml"/>', "", r"includes model\.xml twice"),
+        ("<a", "", "not well-formed XML"),
+    ],
+)
+def test_boundless_models(pipe: Path, tmp_path: Path, before: str, inside: str, said: str) -> None:
+    file = tmp_path / "model.xml"
+    file.write_text(f"<mujoco>{before}<worldbody>{BODY}{inside}</worldbody></mujoco>")
+    for read in (load_model, load_payload):
+        with pytest.raises(InputError, match=said):
+            read(file)
+    file.write_text(f"<mujoco><worldbody>{BODY}</worldbody></mujoco>".replace('"j"', '"j&#10;OK"'))
+    with pytest.raises(InputError, match="must have a printable name"):
+        load_model(file)
+    file.write_text(f"<mujoco><!-- a -- b --><worldbody>{BODY}</worldbody></mujoco>")
+    assert load_model(file).joints == ("j",)
+
+
+def test_a_height_field_in_a_picture_and_entities(tmp_path: Path) -> None:
+    size = (30_000).to_bytes(4, "big")
+    (tmp_path / "h.png").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + 2 * size)
+    file = tmp_path / "model.xml"
+    file.write_text(
+        f'<mujoco><asset><hfield name="h" file="h.png" size="1 1 1 1"/></asset><worldbody>{BODY}</worldbody></mujoco>'
+    )
+    with pytest.raises(InputError, match="900,000,000 pixels"):
+        load_model(file)
+    file.write_text('<!DOCTYPE m [<!ENTITY x SYSTEM "/etc/hostname">]><mujoco model="&x;"/>')
+    for read in (load_model, load_payload):
+        with pytest.raises(InputError, match="document type"):
+            read(file)
+
+
+def test_a_truth_that_cannot_be_read_is_told_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_recording(small_recording(rows=150), tmp_path / "rec.parquet")
+    (tmp_path / "rec.truth.json").write_text("[" * 200_000)
+    assert "rec.truth.json: not valid JSON" in refused(capsys, "diagnose", tmp_path / "rec.parquet")
+
+
+def test_help_in_a_narrow_terminal() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "mocobot", "--help"], env=os.environ | {"COLUMNS": "5"}, capture_output=True, timeout=60,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert b"estimate" in done.stdout
+
+
+def test_control_characters_are_shown_escaped(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = "\\x1b[31m"
+    assert shown in refused(capsys, "inspect", tmp_path / f"{ESCAPE}.csv")
+    monkeypatch.setattr("mocobot.commands.effects.run", lambda _: print(f"é {ESCAPE}\n\tx"))
+    assert run(capsys, "effects") == (0, f"é {shown}\n\tx\n", "")
+    file = tmp_path / "log.csv"
+    file.write_text("time\u00a0[s],x\n" + "".join(f"{k / 100},{k}\n" for k in range(300)), encoding="utf-8")
+    code, draft, _ = run(capsys, "map", file)
+    assert (code, tomllib.loads(draft)["time"]["column"]) == (0, "time\u00a0[s]")
+    assert shown.encode() in to_bytes(el("p", ESCAPE, title=ESCAPE))
+
+
+def test_names_like_formulas_are_drawn_as_they_are(tmp_path: Path) -> None:
+    found = invented_calibration()
+    names = (r"$\frac{$_x", "_y$", f"$${ESCAPE}", "日$^_$")
+    trials = tuple(replace(trial, name=names[k % len(names)]) for k, trial in enumerate(found.trials))
+    assert len(save_plots(replace(found, trials=trials), tmp_path)) == 3
+    with plain_words():
+        figure = Figure()
+        axis = figure.subplots()
+        axis.set_xscale("log")
+        axis.set_xlim(2e-4, 3e3)
+        plain_numbers(axis.xaxis)
+        axis.set_title("$a_b$")
+        FigureCanvasAgg(figure).draw()
+        assert "0.001" in [label.get_text() for label in axis.get_xticklabels()]
+        assert not axis.title.get_parse_math()
+
+
+def test_every_picture_and_every_pool_is_of_that_kind() -> None:
+    texts = {path: path.read_text(encoding="utf-8") for path in SRC.rglob("*.py")}
+    drawn = [text for text in texts.values() if "FigureCanvasAgg(" in text]
+    assert len(drawn) >= 5
+    assert all("@plain_words()" in text or "parse_math=False" in text for text in drawn)
+    pools = [text for text in texts.values() if " Parallel(" in text]
+    assert len(pools) >= 3
+    assert all("**ends_with_this()" in text for text in pools)
+
+
+COMMAND = """
+import sys, time, mocobot.cli
+from pathlib import Path
+from estimator.files import whole_folder
+def run(_):
+    with whole_folder(Path(sys.argv[1]), "x") as folder:
+        (folder / "a").touch()
+        print("ready", flush=True)
+        time.sleep(60)
+mocobot.cli._command = lambda _: run
+mocobot.cli.main(["effects"])
+"""
+POOL = """
+import os, sys, time
+from joblib import Parallel, delayed
+from estimator.processes import ends_with_this
+def work(_):
+    os.write(1, f"{os.getpid()}\\n".encode())
+    time.sleep(60)
+Parallel(n_jobs=2, **ends_with_this())(delayed(work)(k) for k in range(2))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_command_that_is_told_to_end_clears_away_what_it_began(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, tmp_path / "new" / "out"], stdout=subprocess.PIPE, text=True
+    )
+    with process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        assert len(list((tmp_path / "new").iterdir())) == 1
+        process.send_signal(number)
+        assert process.wait(30) == 128 + number
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_workers_end_with_a_parent_that_is_killed() -> None:
+    process = subprocess.Popen([sys.executable, "-c", POOL], stdout=subprocess.PIPE, text=True)
+    with process:
+        assert process.stdout is not None
+        workers = [int(process.stdout.readline()) for _ in range(2)]
+        process.kill()
+    until = time.monotonic() + 20.0
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < until, "workers go on"
+        time.sleep(0.2)
