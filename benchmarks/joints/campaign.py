@@ -33,7 +33,7 @@ from joints.foreign import make, thinned
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 KINDS = ("clean", "single", "clean", "single", "pairs")
-"""Of successive sets of the panda."""
+"""Kinds of successive sets of the panda."""
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
         "load_friction")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)

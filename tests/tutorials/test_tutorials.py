@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
 SAID = {
-    "estimate_and_replay": ("replay.rrd is complete", "flags: none", "inertia 1.00 Izz"),
+    "estimate_and_replay": ("replay.rrd is complete", "flags: none", "holds alone: standard errors"),
     "hide_and_find": ("explained", "Robot 2, joint 1: the torque sensor reads 0.08"),
     "your_own_log": ("robot 2: theta_x has the wrong sign", "nothing to complain about"),
 }

@@ -55,7 +55,7 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Of columns x ~ N(0, S) and noise of one variance for each channel and band.
+    """Posterior of columns x ~ N(0, S), with noise of one variance for each channel and band.
 
     Attributes:
         cells: the problem.
@@ -106,7 +106,7 @@ class Posterior:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the values, shape (K, K)."""
+        """Covariance of the values, shape (K, K)."""
         s, L, _ = self._factor
         (potri,) = get_lapack_funcs(("potri",), (L,))
         inverse, _ = potri(L, lower=1)

@@ -17,7 +17,7 @@ from discrepancy.serial.rows.signals import Signals
 from estimator.arrays import Array
 
 PLAIN = 3.0
-"""Of a cause's prior standard deviation, with which its values are fitted."""
+"""Values are fitted with so many times their prior standard deviation, so that it shrinks nothing."""
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Columns around whose values the problem is made linear again."""

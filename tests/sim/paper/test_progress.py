@@ -29,7 +29,7 @@ def _work(share: Array, amount: float) -> None:
 def test_other_processes_fill_shares() -> None:
     told: list[float] = []
     with shares(3, told.append) as done, Parallel(n_jobs=2) as pool:
-        assert told == [0.0]
+        assert set(told) == {0.0}
         pool(delayed(_work)(done[k : k + 1], amount) for k, amount in enumerate((0.25, 0.5, 1.0)))
     assert told[-1] == 1.75
 
