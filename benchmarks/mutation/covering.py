@@ -25,7 +25,7 @@ from mutation.mutants import Mutant
 
 TOP = Path(__file__).resolve().parents[2]
 PACKAGES = ("estimator", "mocobot_inspect")
-TESTS = ("tests/estimator", "tests/inspect")
+TESTS = ("-m", "not slow", "tests/estimator", "tests/inspect", "tests/command/test_folders.py")
 TREE = ("src", "tests", "benchmarks", "models", "scenarios", "docs", "pyproject.toml", "README.md")
 MEMORY_B = 8 << 30
 FORK = multiprocessing.get_context("fork")

@@ -325,3 +325,19 @@ def test_a_slow_joint_with_a_coarse_encoder_is_neither_stuck_nor_clipped() -> No
     values[:, 3] = np.round(0.3 * np.sin(2 * np.pi * 0.05 * time) / 0.05) * 0.05
     assert np.mean(np.diff(values[:, 3]) == 0) > 0.98
     assert frozen(values, RATE) == []
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_a_rare_movement_to_a_round_peak_is_not_clipped(cut: bool) -> None:
+    """It goes there in steps of 1 and slows down before it, or does not and is cut off."""
+    values = motion(60.0, noise=0.0)
+    x, way = (
+        np.zeros(6000),
+        np.array([1.0, 2.0, 3.0, 4.0, 5.0, 5.5] if cut else [1.0, 2.0, 3.0, 4.0, 4.1, 4.2]),
+    )
+    peak = np.r_[way, np.full(20, way[-1]), way[::-1]]
+    for k, start in enumerate((500, 1500, 2500, 3500, 4500, 5500)):
+        x[start : start + len(peak)] = (-1) ** k * peak
+    values[:, 8] = x
+    found = [one for one in frozen(values, RATE) if one.kind == "clipped" and one.channel == 8]
+    assert [one.value for one in found] == ([-5.5] * 3 + [5.5] * 3) * cut

@@ -237,3 +237,15 @@ def test_without_rotation_nothing_is_claimed(trials: dict[str, Recording]) -> No
         signals(dataclasses.replace(whole, time=time, ref=None, **still | {"tau": -still["tau"]}))
     ).found
     assert found.mistake.sentence() == "all robots: tau has the wrong sign"
+
+
+@pytest.mark.parametrize("robot", [0, 2])
+def test_the_noisiest_robot_says_what_noise_explains(trials: dict[str, Recording], robot: int) -> None:
+    samples = np.concatenate([trials["a"].phi, trials["a"].theta, trials["a"].tau], axis=2)
+    noise = np.tile(np.repeat([ENCODER, ENCODER, TORQUE], 3), (3, 1))
+    plain = look(signals_of("joint", [samples], noise)).as_is
+    noise[robot] *= 100.0
+    found = look(signals_of("joint", [samples], noise)).as_is
+    assert found.relative == pytest.approx(plain.relative)
+    for name in ("rotation", "velocity", "force", "moment"):
+        assert found.scaled[name] < 0.7 * plain.scaled[name]

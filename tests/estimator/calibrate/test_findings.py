@@ -32,6 +32,8 @@ def test_good_recordings_have_none(team: Team) -> None:
     calibration = calibrate(team[2])
     assert calibration.findings == ()
     assert max(max(trial.after) for trial in calibration.trials) < 1.2
+    for trial in calibration.trials:  # six numbers a row of each other robot's flange, and six of the wrench
+        assert trial.count[0] == 2 * trial.count[1] > 0
 
 
 @pytest.mark.parametrize(

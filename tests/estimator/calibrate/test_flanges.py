@@ -116,6 +116,8 @@ def test_results_move_into_the_frames_of_the_drawing() -> None:
     np.testing.assert_allclose(found.grasps.p_1i, build_team("c").X_1i.translation, atol=1e-5)
     Rx = Rotation.from_rotvec([truth[0], 0.0, 0.0])
     np.testing.assert_allclose(found.parameters[1:4], Rx.apply(held.parameters[1:4]), atol=1e-4)
+    assert found.parameters[0] == held.parameters[0]
+    assert found.covariance[-10, -10] == pytest.approx(held.covariance[-10, -10], rel=1e-6)
     back = calibration_from_dict(calibration_to_dict(named))
     np.testing.assert_array_equal(back.units.x, named.units.x)
 

@@ -155,6 +155,10 @@ def test_balance_of_wrenches(force: float, moment: float | None, flags: list[str
 def test_the_lever_of_one_robot_is_a_metre() -> None:
     assert balance_flags("trial", 0.0, 0.049, single_robot()) == []
     assert len(balance_flags("trial", 0.0, 0.051, single_robot())) == 1
+    values = single_robot().to_dict()
+    assert values.pop("pairs") == values.pop("covariance") == []
+    assert values.pop("angular_motion_radps") == values.pop("linear_motion_mps") == [0.0]
+    assert values == {"angular_residual_radps": [[0.0]], "linear_residual_mps": [[0.0]]}
 
 
 def test_balance_of_what_is_known() -> None:

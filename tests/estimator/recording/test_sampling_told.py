@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
+from estimator.calibrate.equations.sensing import Resolution
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.sampling import Sampling
-from recordings import DESIGN, metadata
+from recordings import DESIGN, metadata, small_recording
 
 TOLD = Sampling(
     400.0, 0.25, 2e-4, 0.02, False, "interpolated", "joint", (1e-4,) * 3 + (2e-4,) * 3 + (0.01, 0.0, 0.02)
@@ -87,3 +88,12 @@ def test_versions(changes: dict[str, Any], version: int) -> None:
     for other in (0, 6):
         with pytest.raises(InputError, match=r"^there: .*version"):
             RecordingMetadata.from_json(json.dumps(json.loads(text) | {"version": other}), "there")
+
+
+def test_readings_that_a_sample_is_made_of() -> None:
+    """At 100 Hz of 400 and of 50 Hz: a quarter of a reading's variance, and twice."""
+    slow, untold = replace(TOLD, native_hz=50.0), small_recording()
+    found = Resolution.of(small_recording(sampling=(TOLD, slow, TOLD)))
+    np.testing.assert_allclose(found.share, [[0.25], [2.0], [0.25]])
+    np.testing.assert_allclose(found.step, np.tile(TOLD.steps, (3, 1)))
+    np.testing.assert_allclose(Resolution.of(untold).share, np.ones((3, 1)))
