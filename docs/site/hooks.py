@@ -25,7 +25,7 @@ REFERENCE = {
     ),
     "Estimate, calibrate, compare": ("mocobot.api.estimation", "mocobot.api.calibration", "mocobot.api.comparison"),
     "Inspect and diagnose": ("mocobot.api.inspection", "mocobot.api.diagnosis"),
-    "Convert and replay": ("mocobot.api.conversion", "mocobot.api.replay"),
+    "Convert and replay": ("mocobot.api.conversion", "mocobot.api.replay", "estimator.inputs"),
     "Errors": ("estimator.errors", "mocobot_sim.errors"),
 }  # fmt: skip
 """Pages of the reference, and where the modules are whose public names they show; mocobot's own modules have theirs."""
