@@ -174,7 +174,7 @@ def _trials(path: Path) -> tuple[Json, ...]:
         return ()
     trials = Fields(read_json(path, "the checks of the trials"), ("trials",), str(path)).list("trials")
     for k, values in enumerate(trials):
-        trial = Fields(values, ("name", *TRIAL_KEYS), f"{path}: trials[{k}]")
+        trial = Fields(values, ("name", *TRIAL_KEYS), f"{path}: trials[{k}]", ("damping_ratio",))
         trial.text("name")
         for key in TRIAL_KEYS:
             trial.number(key, 0.0)

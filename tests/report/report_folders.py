@@ -53,6 +53,7 @@ def paper_folder(folder: Path, presets: tuple[str, ...] = ("ideal", "nominal", "
     scores[presets[0]]["b"]["p1c_m"] = scores[presets[0]]["b"]["p1c_percent"] = None
     trial = {
         "rotation_deg": 8.0,
+        "damping_ratio": 0.35,
         "torque_Nm": 12.0,
         "rod_error_m": 3e-6,
         "weld_error_m": 2e-6,
