@@ -17,8 +17,9 @@ from estimator.recording.parquet_claims import claimed_bytes
 from recordings import small_recording
 
 LIMIT = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+import atexit, resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))  # libraries reserve more than they use
+atexit.register(lambda: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 from mocobot.cli import main
 main(sys.argv[1:])
 """
@@ -51,6 +52,7 @@ def test_a_bomb_is_refused_in_bounded_memory(bomb: Path, command: str) -> None:
     assert done.returncode == 2
     assert done.stderr.startswith(f"mocobot: {bomb}: unpacks to at least 8.67")
     assert "GiB, which --max-unpacked GIB changes" in done.stderr
+    assert int(done.stdout.split()[-1]) < 1 << 20  # KiB in use at the peak
 
 
 def test_the_option_changes_the_limit(bomb: Path, tmp_path: Path) -> None:
