@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
+
+from discrepancy.result.traces import Trace
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.rows.signals import Signals
+from discrepancy.serial.servo.motor import Motor
+from estimator.arrays import Array
+
+Verdict = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -94,3 +103,118 @@ class Finding:
     folds: tuple[float, ...] = ()
     in_sample: float = 0.0
     held_out: float | None = None
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """A kind whose members are off by more than three tolerances, all alike.
+
+    Attributes:
+        cause: name in the tables of causes.
+        factor: root mean square of how far they are off over their tolerances.
+        tolerance: by parameter name.
+        members: the farthest off first.
+    """
+
+    cause: str
+    factor: float
+    tolerance: Mapping[str, float]
+    members: tuple[Member, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Foretold:
+    """How well the torques of one trial are foretold by the others.
+
+    Attributes:
+        trial: its name.
+        before, after: root mean squares of measured minus foretold torque without and with the findings, as the other
+            trials have them, shape (J,) [N m or N].
+        noise: of the rows, shape (J,).
+        torque: root mean square of the measured torque, shape (J,).
+        chi2_before, chi2_after: squares over the noise's variance, per row.
+    """
+
+    trial: str
+    before: Array
+    after: Array
+    noise: Array
+    torque: Array
+    chi2_before: float
+    chi2_after: float
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What one more cause would gain.
+
+    Attributes:
+        cause, place, joint: as of findings.
+        nats: log odds over nothing.
+    """
+
+    cause: str
+    place: str
+    joint: int | None
+    nats: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What would have been noticed nine times in ten.
+
+    Attributes:
+        cause, place, joint: as of findings.
+        sizes: by parameter name; None where these logs say nothing of it.
+    """
+
+    cause: str
+    place: str
+    joint: int | None
+    sizes: Mapping[str, float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class JointVerdict:
+    """What logs say of a model of a robot of joints.
+
+    Attributes:
+        model: the robot as described.
+        parts: the trials: smoothed logs, or parts of one.
+        trials: their names.
+        motors: drives that tell no torque, and what they give by what they were given.
+        reference: names of the trials of the robot while it was well.
+        verdict: one of the five.
+        findings: in the order of their worth.
+        suspected: those that are too improbable to be named.
+        scatter: kinds that are off everywhere.
+        foretold: one a trial, each by the others; by all of them where there is one trial only (``validated``).
+        validated: whether there are two trials at least.
+        chi2_per_n: squares over the noise's variance per row, as modelled, with tolerances, and with the findings.
+        before, after: what one more cause would gain with nothing found, and with what is found.
+        limits: what would have been noticed.
+        notes: sentences.
+        finished: whether the search came to its end.
+        by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
+        traces: residuals by trial, for pictures.
+    """
+
+    model: SerialModel
+    parts: Sequence[Signals]
+    trials: tuple[str, ...]
+    motors: tuple[Motor, ...]
+    reference: tuple[str, ...]
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+    suspected: tuple[Finding, ...]
+    scatter: tuple[Scatter, ...]
+    foretold: tuple[Foretold, ...]
+    validated: bool
+    chi2_per_n: tuple[float, float, float]
+    before: tuple[Offer, ...]
+    after: tuple[Offer, ...]
+    limits: tuple[Limit, ...]
+    notes: tuple[str, ...]
+    finished: bool
+    by_the_others: Callable[[int], tuple[Finding, ...]]
+    traces: Callable[[], list[Trace]]
