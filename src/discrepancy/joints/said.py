@@ -35,7 +35,7 @@ def joint_in_words(joint: int, called: str) -> str:
 
 def link_in_words(body: str) -> str:
     """``link hand``; the name alone where that says it is a link."""
-    return body if re.match("link", body, re.IGNORECASE) else f"link {body}"
+    return body if re.search(r"\blink", body, re.IGNORECASE) else f"link {body}"
 
 
 def titled(title: str, place: str = "") -> str:
