@@ -176,9 +176,10 @@ class _Told:
             text = titled(text, place)
         else:
             text = cause.sentence(said)
-        trial = (
-            f" in {self.verdict.trials[f.event.trial]}" if f.event and len(self.verdict.trials) > 1 else ""
-        )
+        if len(at) > 1:
+            text = f"{titled(cause.title, ALL) if cause else f.cause}: {text}"
+        trials = self.verdict.trials
+        trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."
 
     def one_of_told(self, f: Finding, cause: str, place: str) -> Values:

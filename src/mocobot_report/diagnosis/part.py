@@ -21,6 +21,7 @@ from discrepancy.result.read import (
 )
 from discrepancy.result.remains import farthest, remains, remedy, sizes_of
 from discrepancy.result.text import NEAREST, NOTHING_WRONG_HERE, SAID
+from discrepancy.result.text_gain import foretold_torques
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
@@ -406,7 +407,8 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
     if gain and gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
         interval = f"95 %: {percent(low)} to {percent(high)}" if low is not None and high is not None else ""
-        out.append(("excess error of the response removed", percent(gain["removed"]["share"]), interval))
+        of = "foretold torques" if foretold_torques(gain) else "response"
+        out.append((f"excess error of the {of} removed", percent(gain["removed"]["share"]), interval))
     elif values["not_simulated"]:
         out.append(("closed loop", "not simulated", tidy(str(values["not_simulated"]))))
     return out
