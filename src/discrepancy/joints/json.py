@@ -162,11 +162,11 @@ class _Told:
         errors = {name: entry["se"] for name, entry in parameters.items() if entry["se"] is not None}
         when = {"start_s": f.event.start_s, "duration_s": f.event.duration_s} if f.event else {}
         at = [member.joint - 1 for member in f.members if member.joint is not None]
-        sliding = [j for j in at if self.model.slides[j]]
-        slide = bool(at) and sliding == at
+        slide = bool(at) and all(self.model.slides[j] for j in at)
         if len(at) > 1:
-            told = "joint" if slide or not sliding else "joint that turns"
-            place = f"the typical {told} (median of {len(at) - (0 if slide else len(sliding))})"
+            mixed = len({tuple(member.values) for member in f.members}) > 1  # slides have other units
+            count = len(at) - sum(map(bool, self.model.slides[at])) if mixed else len(at)
+            place = f"the typical joint{' that turns' if mixed else ''} (median of {count})"
         said = Said({**numbers, **f.shape, **when}, errors, place, slide, self.than)
         cause = WORDS.get(f.cause)
         if cause is None or cause.sentence is None:
