@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
-from discrepancy.joints.problem import JointProblem, joint_problem, smoothed
+from discrepancy.joints.problem import Given, JointProblem, joint_problem
+from discrepancy.joints.trials import Trials, trials_of
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
@@ -39,8 +41,8 @@ class Outcome:
 
 
 def diagnose(
-    model: SerialModel, logs: Sequence[JointLog], settings: Settings = SETTINGS,
-    say: Callable[[str], object] = lambda _: None,
+    model: SerialModel, logs: Sequence[JointLog] | Trials, settings: Settings = SETTINGS,
+    say: Callable[[str], object] = lambda _: None, given: Given | None = None,
 ) -> Outcome:  # fmt: skip
     """The likeliest causes of what a model leaves of its robot's torques.
 
@@ -49,20 +51,24 @@ def diagnose(
 
     Args:
         model: the robot as described.
-        logs: of its joints, with torques.
+        logs: of its joints, with torques, or trials of them.
         settings: numbers of the engine.
         say: takes a line about each step.
+        given: what the problem takes besides.
     """
-    smooth = smoothed(model, logs)
-    problem = joint_problem(model, smooth)
+    smooth = (logs if isinstance(logs, Trials) else trials_of(model, logs)).runs
+    problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say)
     first = Outcome(problem, search, search.run(search.fixed(())))
-    around = _around(first, model, smooth, settings, say, None)
+    if given is not None and given.changed is not None:
+        return first  # what is wrong in all logs has no values of its own to be linear around
+    again = partial(_around, model=model, smooth=smooth, settings=settings, say=say, given=given)
+    around = again(first, floor=None)
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, around.search.run(around.state))
         if found.state.keys == around.state.keys:
             return found
-        other = _around(found, model, smooth, settings, say, around.search.floor)
+        other = again(found, floor=around.search.floor)
         if other.state.evidence < around.state.evidence + settings.need_nats:
             break  # linear around itself, the new set is no likelier
         around = other
@@ -70,8 +76,8 @@ def diagnose(
 
 
 def _around(
-    found: Outcome, model: SerialModel, smooth: Sequence[Signals], settings: Settings, say: Callable[[str], object],
-    floor: Array | None,
+    found: Outcome, *, model: SerialModel, smooth: Sequence[Signals], settings: Settings,
+    say: Callable[[str], object], given: Given | None, floor: Array | None,
 ) -> Outcome:  # fmt: skip
     """The same set, linear around its own values; noise about a floor, or about one of its own."""
     x = found.state.posterior.mean
@@ -80,7 +86,7 @@ def _around(
         for i, label in enumerate(found.problem.labels)
         if x[i] and any(word in f" {label}" for word in MOVED) and "{" not in label
     }
-    problem = joint_problem(model, smooth, values)
+    problem = joint_problem(model, smooth, values, given)
     if floor is None:
         floor = floor_of(problem, problem.slabs(), settings)
     search = Search(problem, floor, settings, say)

@@ -100,7 +100,7 @@ def test_the_verdict_does_not_depend_on_the_rate(folder: Path) -> None:
 def test_friction_at_rest_is_that_of_all_terms_together(folder: Path) -> None:
     """Coulomb friction of 2 N m, less 1.5 N m of Stribeck friction: what is left at rest is 0.5 N m."""
     model = arm_model(folder)
-    linear = problem.joint_problem(model, problem.smoothed(model, [arm_log(rubs(0.5), 9)]))
+    linear = problem.joint_problem(model, trials_of(model, [arm_log(rubs(0.5), 9)]).runs)
 
     def rests(**amounts: float) -> np.ndarray:
         values, chosen = np.zeros(linear.cells.count), []
