@@ -42,6 +42,11 @@ class Linear(Protocol):
         ...
 
     @property
+    def sensors(self) -> Array | None:
+        """Variances of the sensors' noise, shape (C, bands), or None where it is not known."""
+        ...
+
+    @property
     def families(self) -> Sequence[Sequence[int]]:
         """Columns of random effects whose common spread is learnt."""
         ...
@@ -294,13 +299,18 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
     """
     cells = problem.cells
     power = np.array([c.squares for c in cells.channels]) / cells.rows
-    # From below: noise that explains everything is a solution, too.
-    start = np.broadcast_to(power.min(axis=1, keepdims=True), power.shape)
-    p = Posterior(cells, slabs, start)
-    for _ in range(
-        settings.floor_steps
-    ):  # expectation and maximisation: MacKay's step is not safe with more columns than rows
+    least = problem.sensors
+    if least is None:
+        least = np.broadcast_to(settings.least_floor * power.min(axis=1, keepdims=True), power.shape)
+    # From below: noise that explains everything is a solution, too. Expectation and maximisation: MacKay's step is not
+    # safe with more columns than rows.
+    p = Posterior(cells, slabs, least)
+    for _ in range(settings.floor_steps):
         left, fitted = cells.left(p.mean, p.covariance)
-        p = Posterior(cells, slabs, np.maximum((left + fitted) / cells.rows, settings.least_floor * start))
+        better = np.maximum((left + fitted) / cells.rows, least)
+        settled = np.all(np.abs(np.log(better / p.variance)) < settings.floor_change)
+        p = Posterior(cells, slabs, better)
+        if settled:
+            break
     log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
     return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])

@@ -56,11 +56,12 @@ def diagnose(
         say: takes a line about each step.
         given: what the problem takes besides.
     """
-    smooth = (logs if isinstance(logs, Trials) else trials_of(model, logs)).runs
+    trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
+    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise)
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say)
     first = Outcome(problem, search, search.run(search.fixed(())))
-    if given is not None and given.changed is not None:
+    if given.changed is not None:
         return first  # what is wrong in all logs has no values of its own to be linear around
     again = partial(_around, model=model, smooth=smooth, settings=settings, say=say, given=given)
     around = again(first, floor=None)

@@ -70,6 +70,7 @@ class JointProblem:
             for.
         resting: columns of friction at rest by joint, and their standard deviations per newton metre.
         residual: measured torques less those of the model as it is, shape (W, J) a log.
+        sensors: variances of their noise, shape (C, bands); None: not known.
         channel: of each joint with torques.
         changed: number of logs in which something may have acted; None: all.
         dry_in_all: by joint, the column of dry friction that a reference has, too.
@@ -88,6 +89,7 @@ class JointProblem:
     resting: list[tuple[list[int], Array]] = field(default_factory=list)
     pushed: list[Array] = field(default_factory=list)
     residual: list[Array] = field(default_factory=list)
+    sensors: Array | None = None
     channel: Mapping[int, int] = field(default_factory=dict)
     changed: int | None = None
     dry_in_all: dict[int, int] = field(default_factory=dict)
@@ -249,6 +251,7 @@ class Given:
         back_emf: joints whose drives lose torque to the speed while they are on.
         excluded: causes that are left out.
         tolerances: standard deviations by cause and parameter in place of the usual ones.
+        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
     """
 
     changed: int | None = None
@@ -257,6 +260,7 @@ class Given:
     back_emf: frozenset[int] = frozenset()
     excluded: frozenset[str] = frozenset()
     tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    noise: Sequence[Array] | None = None
 
 
 class _Builder:
@@ -414,7 +418,19 @@ class _Builder:
         out.cells = self._cells(self.residual)
         out.cells.add(out.rows(out.series))
         out.residual = self.residual
+        if self.more.noise is not None:
+            out.sensors = self._sensors(self.more.noise)
         return out
+
+    def _sensors(self, noise: Sequence[Array]) -> Array:
+        """Variances of the sensors' noise by channel and band, shape (C, bands)."""
+        band = np.concatenate([self.bands.of_trial(t) for t in range(len(noise))])
+        rows = np.bincount(band, minlength=len(self.bands.edges_hz) - 1)
+        power = [
+            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise]) ** 2, len(rows))
+            for j in self.channel
+        ]
+        return np.array(power) / np.maximum(rows, 1)
 
     def _apart(self, changed: int) -> None:
         """Causes act in the first signals only; what may be wrong with the model in all is a column besides."""
@@ -568,13 +584,8 @@ class _Builder:
         def column(label: str, tolerance: float, change: Array) -> int:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
-        mass = column(
-            f"{n} mass share",
-            INERTIA
-            if "link_mass" not in self.more.tolerances
-            else self.sd("link_mass", "excess_kg", 0.0) / max(float(m), 1e-6),
-            inertial_parameters(m, c, zero),
-        )
+        spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
+        mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
         self.group("link_mass", n, [mass], [1.0], family=family)
         coms = []
         for k in range(3):

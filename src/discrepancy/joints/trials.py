@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.joints.noise import sensor_noise
 from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
@@ -45,6 +46,7 @@ class Trials:
         motors: drives that tell no torque, and what they give by what they were given.
         parts: for each part its run and the samples of it.
         names: of the parts.
+        noise: a draw of what the sensors add to the residual of each run, shape (W, J).
     """
 
     runs: tuple[Signals, ...]
@@ -53,6 +55,7 @@ class Trials:
     motors: tuple[Motor, ...]
     parts: tuple[tuple[int, slice], ...]
     names: tuple[str, ...]
+    noise: tuple[Array, ...]
 
     @property
     def signals(self) -> tuple[Signals, ...]:
@@ -81,8 +84,11 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
     whole = [Signals.of(log, tree, inverse) for log in every]
     typical = np.sqrt(np.mean([np.mean(s.dq**2, axis=0) for s in whole], axis=0))
     whole = [replace(s, typical=np.maximum(typical, LEAST_SPEED)) for s in whole]
-    cut = [[part_of(s, run) for run in _runs(s, joints)] for s in whole]
+    at = [_runs(s, joints) for s in whole]
+    cut = [[part_of(s, run) for run in own] for s, own in zip(whole, at, strict=True)]
     runs = [run for own in cut for run in own]
+    loud = [sensor_noise(s) for s in whole]
+    noise = tuple(x[run] for x, own in zip(loud, at, strict=True) for run in own)
     changed = sum(len(own) for own in cut[: len(logs)])
     number = PARTS if len(runs) == 1 else 1
     parts = []
@@ -91,7 +97,7 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
         edges = np.linspace(0, len(s.time), most + 1).astype(int)
         parts += [(k, slice(int(a), int(b))) for a, b in itertools.pairwise(edges)]
     names = tuple(_name(runs[k], at, whole=len(parts) == len(every)) for k, at in parts)
-    return Trials(tuple(runs), changed, joints, motors, tuple(parts), names)
+    return Trials(tuple(runs), changed, joints, motors, tuple(parts), names, noise)
 
 
 def part_of(s: Signals, at: slice) -> Signals:

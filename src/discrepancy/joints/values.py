@@ -48,14 +48,13 @@ def parameter_name(name: str, *, slide: bool) -> str:
 
 
 def physical(
-    problem: JointProblem, group: Group, columns: tuple[int, ...], x: Array, covariance: Array
+    problem: JointProblem, group: Group, x: Array, covariance: Array
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Values and standard errors by name.
 
     Args:
         problem: of the group.
-        group: a cause at a place.
-        columns: of one of its members.
+        group: a cause at a place, or one of its members at that.
         x, covariance: of these columns, shapes (k,) and (k, k).
     """
     names = NAMES[group.cause]
@@ -68,14 +67,13 @@ def physical(
             for e, step in ((1e-4 * s * np.eye(len(x))[k], 1e-4 * s) for k, s in enumerate(size + 1e-12))
         ])  # fmt: skip
         x, covariance = value, J @ covariance @ J.T
-    place = problem.labels[columns[0]].split(" ")[0] if columns and columns[0] < len(problem.labels) else ""
-    joint = group.place if group.place in problem.model.joints else place
+    joints = problem.model.joints
     slide = (
         group.cause not in ROBOTS
-        and joint in problem.model.joints
-        and bool(problem.model.slides[problem.model.joints.index(joint)])
+        and group.place in joints
+        and problem.model.slides[joints.index(group.place)]
     )
-    names = tuple(parameter_name(n, slide=slide) for n in names)
+    names = tuple(parameter_name(n, slide=bool(slide)) for n in names)
     se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return dict(zip(names, map(float, x), strict=True)), dict(zip(names, map(float, se), strict=True))
 

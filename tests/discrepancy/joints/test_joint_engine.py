@@ -13,6 +13,7 @@ from discrepancy.evidence.odds import odds_of
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import causes, problem
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
+from discrepancy.joints.trials import trials_of
 from followed_arm import Change, arm_log, arm_model, rubs
 
 
