@@ -33,11 +33,13 @@ class Outcome:
         problem: linear around what was found.
         search: on it.
         state: the likeliest set.
+        nothing: the search on the problem that is linear around the model as it is; None: this one is.
     """
 
     problem: JointProblem
     search: Search
     state: State
+    nothing: Search | None = None
 
 
 def diagnose(
@@ -68,12 +70,13 @@ def diagnose(
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, around.search.run(around.state))
         if found.state.keys == around.state.keys:
-            return found
+            around = found
+            break
         other = again(found, floor=around.search.floor)
         if other.state.evidence < around.state.evidence + settings.need_nats:
             break  # linear around itself, the new set is no likelier
         around = other
-    return around
+    return replace(around, nothing=search)
 
 
 def _around(

@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.evidence.odds import Odds, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
-from discrepancy.evidence.search import Chosen, State
+from discrepancy.evidence.search import Chosen, Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import Outcome, diagnose
 from discrepancy.joints.findings import (
@@ -109,9 +109,10 @@ class _Judge:
         findings = [f for o in kept for f in self._findings(o)]
         findings = self._with_worth(findings, kept)
         scatter = self._scatter()
-        chi2 = self._chi2([o.chosen for o in kept])
+        chi2 = self._chi2()
         foretold = self._foretold([o.chosen for o in kept])
-        nothing = self.search.fixed(())
+        plain = self.outcome.nothing or self.search
+        nothing = plain.fixed(())
         logs = [s.log for s in self.trials.runs]
         return JointVerdict(
             model=self.model,
@@ -126,8 +127,8 @@ class _Judge:
             foretold=tuple(foretold),
             validated=len(self.parts.cells) > 1,
             chi2_per_n=chi2,
-            before=tuple(self._offers(nothing)),
-            after=tuple(self._offers(self.state)),
+            before=tuple(self._offers(plain, nothing)),
+            after=tuple(self._offers(self.search, self.state)),
             limits=tuple(self._limits()),
             notes=(*notes, *resting(logs), *self._notes()),
             finished=True,
@@ -220,9 +221,14 @@ class _Judge:
 
     # --- what they are worth
 
-    def _prior(self, chosen: Sequence[Chosen]) -> Array:
-        """Variances with some of the found causes in the model."""
+    def _prior(self, chosen: Sequence[Chosen], *, tolerated: bool = True) -> Array:
+        """Variances with some of the found causes in the model; without tolerances on request."""
         prior = self.parts.prior.copy()
+        if not tolerated:
+            own = {k for c in chosen for k in c.group.columns}
+            kept = self.parts.local.copy()
+            kept[self.parts.columns_of(sorted(own))] = True
+            return np.where(kept, prior, 0.0)
         kept = {k for c in chosen for k in (*c.group.columns, *c.forms)}
         nominal = self.problem.prior(chosen, self.state.posterior.mean)
         for c in self.state.chosen:
@@ -232,7 +238,7 @@ class _Judge:
 
     def _with_worth(self, findings: list[Finding], kept: Sequence[Odds]) -> list[Finding]:
         """Findings with the shares of the misfit that they remove one after another, and nats by part."""
-        steps = [self._prior([o.chosen for o in kept[:k]]) for k in range(len(kept) + 1)]
+        steps = [self._prior([o.chosen for o in kept[:k]], tolerated=False) for k in range(len(kept) + 1)]
         whole = self.parts.but(None)
         variance = self.state.posterior.variance
         left = []
@@ -272,7 +278,7 @@ class _Judge:
         return tuple(out)
 
     def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
-        both = [self.parts.foretold(self._prior(chosen)) for chosen in ((), kept)]
+        both = [self.parts.foretold(prior) for prior in (self._prior((), tolerated=False), self._prior(kept))]
         variance, rows = self.state.posterior.variance, [c.rows for c in self.parts.cells]
         for t, name in enumerate(self.trials.names[: self._changed]):
             sides, chi2 = [], []
@@ -289,17 +295,17 @@ class _Judge:
             torque[self.trials.joints] = np.sqrt(np.mean(own**2, axis=0))[self.trials.joints]
             yield Foretold(name, sides[0], sides[1], noise, torque, chi2[0], chi2[1])
 
-    def _chi2(self, kept: Sequence[Chosen]) -> tuple[float, float, float]:
+    def _chi2(self) -> tuple[float, float, float]:
         """Squares left over the floor's variance, per row: as modelled, with tolerances, with the causes."""
-        cells, floor = self.problem.cells, self.search.floor
-        zero = np.zeros((cells.count, cells.count))
-        nominal, _ = cells.left(np.zeros(cells.count), zero)
-        out = [float(np.sum(nominal / floor) / cells.rows.sum())]
-        for chosen in ((), self.state.chosen):
-            state = self.search.value(chosen, None)
-            left, fitted = cells.left(state.posterior.mean, state.posterior.covariance)
-            free = np.maximum(cells.rows - fitted / state.posterior.variance, 0.05 * cells.rows)
-            out.append(float(np.sum(left / floor) / free.sum()))
+        plain = self.outcome.nothing or self.search
+        cells = plain.problem.cells
+        nominal = np.array([c.squares for c in cells.channels])
+        out = [float(np.sum(nominal / plain.floor) / cells.rows.sum())]
+        for search, state in ((plain, plain.fixed(())), (self.search, self.state)):
+            cells, p = search.problem.cells, state.posterior
+            left, fitted = cells.left(p.mean, p.covariance)
+            free = np.maximum(cells.rows - fitted / p.variance, 0.05 * cells.rows)
+            out.append(float(np.sum(left / search.floor) / free.sum()))
         return out[0], out[1], out[2]
 
     def _word(
@@ -343,8 +349,8 @@ class _Judge:
         values, errors = physical(self.problem, g, p.mean[k], p.covariance[np.ix_(k, k)])
         yield Member(g.place, self._joint(g.place), values, errors)
 
-    def _offers(self, state: State) -> Iterator[Offer]:
-        for nats, chosen in self.search.offers(state)[:OFFERS]:
+    def _offers(self, search: Search, state: State) -> Iterator[Offer]:
+        for nats, chosen in search.offers(state)[:OFFERS]:
             g = chosen.group
             yield Offer(g.cause, g.place, self._joint(g.place), nats)
 
