@@ -49,8 +49,8 @@ PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 """Durations of pushes that are tried [s], standard deviation of their force [N], the frequency whose noise ranks them
 [Hz], and how many are weighed exactly."""
 BEGIN_S = 1.0
-"""Pushes are looked for from here on. Derived: what swings at 3 Hz with a damping ratio of 0.1 when a log begins has died
-to 15 %; in a stand or a soft joint it looks like a push."""
+"""Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
+died to 15 %; in a stand or a soft joint it looks like a push."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
 
