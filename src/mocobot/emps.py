@@ -11,9 +11,9 @@ from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Step, format_staircase
 from discrepancy.emps.staircase import staircase as stairs
 from discrepancy.engine.diagnose import When
+from discrepancy.result.diagnosed import Diagnosed
 from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
-from mocobot.api.public import public
 
 __all__ = ["Step", "diagnose", "format_staircase", "staircase"]
 
@@ -43,7 +43,7 @@ def diagnose(
         read_emps(Path(recording)), known, tuple(exclude),
         closed_loop=closed_loop, laws=laws, jobs=jobs, say=say, simulated=simulated,
     )  # fmt: skip
-    return public(Diagnosis, found)
+    return Diagnosis(found)
 
 
 def staircase(
@@ -61,12 +61,14 @@ def staircase(
     """
     elsewhere = None
     if other is not None:
-        own = [(f.candidate, f.values) for f in other.diagnosis.causes if f.candidate.cause in different]
+        own = [
+            (f.candidate, f.values) for f in other.found.diagnosis.causes if f.candidate.cause in different
+        ]
         elsewhere = _axis(other), own
-    return stairs(_axis(diagnosis), diagnosis.diagnosis.explanation, elsewhere)
+    return stairs(_axis(diagnosis), diagnosis.found.diagnosis.explanation, elsewhere)
 
 
 def _axis(diagnosis: Diagnosis) -> EmpsRig:
-    if not isinstance(diagnosis.rig, EmpsRig):
+    if not isinstance(diagnosis.found, Diagnosed) or not isinstance(diagnosis.found.rig, EmpsRig):
         raise InputError("the diagnosis is not one of the EMPS axis")
-    return diagnosis.rig
+    return diagnosis.found.rig

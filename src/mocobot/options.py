@@ -114,6 +114,8 @@ class Diagnose:
     force: Force = False
     strict: Flag = False
     """Exit with 1 if the verdict is neither consistent nor explained."""
+    verbose: Flag = False
+    """With --model: print all that report.txt says."""
     jobs: int = 2
     """Parallel processes."""
     scheduler: Scheduler = None

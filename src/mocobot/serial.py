@@ -190,8 +190,7 @@ def diagnose(
         InputError: model, logs, map, tolerances, causes or odds that cannot be used.
     """
     robot = _model(model)
-    return public(
-        Diagnosis,
+    return Diagnosis(
         diagnosed(
             robot,
             read_logs(logs, robot, map=map),
@@ -203,7 +202,7 @@ def diagnose(
             closed_loop=closed_loop,
             jobs=jobs,
             say=say,
-        ),
+        )
     )
 
 

@@ -108,7 +108,7 @@ BROKEN = [
     (estimate_folder, edited("est.json", without("mass")), ("est.json", "not a complete estimate")),
     (diagnosis_folder, cut(DIAGNOSIS), (DIAGNOSIS, "not valid JSON")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"version": 1}),
-     ("version 1", "reads version 2")),
+     ("version 1", "reads versions 2 and 3")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"format": "x"}),
      ("not a diagnosis", "mocobot-diagnosis")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"verdict": "guilty"}),

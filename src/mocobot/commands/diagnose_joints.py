@@ -51,9 +51,11 @@ def run(options: Diagnose, model: Path) -> None:
             if folder is not None:
                 say("write")
                 found.write_into(folder, provenance=made_with)
-    print(found)  # after the folder is in place: whoever reads may close the pipe
+    print(
+        found.verbose_text() if options.verbose else found
+    )  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
-    verdict = found.diagnosis.verdict
+    verdict = found.to_dict()["verdict"]
     if options.strict and verdict not in ("consistent", "explained"):
         raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
