@@ -203,7 +203,7 @@ class Convert:
     """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
-    """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset."""
+    """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz, .mat or .parquet file, or a LeRobot dataset."""
     out: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="OUT")]
     """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a new rosbag2 folder if it has no suffix."""
     force: Force = False
