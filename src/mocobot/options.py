@@ -101,14 +101,12 @@ class Diagnose:
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
-    named can be validated. One MAT file with --rig emps; logs of a robot's joints with --model."""
+    named can be validated. Logs of a robot's joints with --model."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
     """Map of the logs that are no recordings; found out if not given. With --model, log.toml beside log or model."""
     model: Model = None
     reference: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...")] = ()
     """With --model: logs of the same robot while it was well; what is off there, too, is no news."""
-    rig: Literal["team", "emps"] = "team"
-    """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for diagnosis.json, report.txt, the extended model and plots."""
     force: Force = False

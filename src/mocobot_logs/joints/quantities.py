@@ -50,7 +50,7 @@ COMMANDS = ("command", "motor_command")
 DUTIES = ("duty", "motor_voltage")
 
 COUNTS, RATED = "counts", {"%": 0.01, "permille": 0.001, "V": 1.0}
-"""Units that need a number more: ``counts_per_turn`` or ``full_scale``; ``rated``, and the share of it that is one unit."""
+"""Units that need a number more: ``counts_per_turn`` or ``full_scale``; ``rated``, with the share of it that one is."""
 _TURNING: dict[str, dict[str, float]] = {
     "position": {"rad": 1.0, "deg": math.pi / 180.0, "turn": 2.0 * math.pi},
     "velocity": {

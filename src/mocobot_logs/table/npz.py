@@ -123,9 +123,7 @@ class NpzTable(Table):
         file = stack.enter_context(archive.open(array.member))
         read_exactly(file, array.start)
         if _is_columnwise(array):
-            whole = np.frombuffer(read_exactly(file, array.size), array.dtype).reshape(
-                array.shape, order="F"
-            )
+            whole = np.frombuffer(read_exactly(file, array.size), array.dtype).reshape(array.shape, order="F")
             done = 0
 
             def next_loaded(count: int) -> NDArray:

@@ -29,7 +29,7 @@ from mocobot_report.diagnosis.gain import gain_section
 from mocobot_report.diagnosis.keys import cause_name, chance_of, share_of
 from mocobot_report.folder import Diagnosed
 from mocobot_report.sources import sources
-from mocobot_view.pictures.shots import axis_shot, diagnosis_shot
+from mocobot_view.pictures.shots import diagnosis_shot
 
 Values = Mapping[str, Any]
 
@@ -309,18 +309,17 @@ MEANING = {
 }
 
 
-def is_axis(diagnosed: Diagnosed) -> bool:
-    """Whether the EMPS axis was diagnosed, not a team."""
+def is_robot(diagnosed: Diagnosed) -> bool:
+    """Whether logs of one robot's joints were diagnosed, not a team's recordings."""
     provenance = diagnosed.provenance
     options = provenance.get("options") if isinstance(provenance, dict) else None
-    if isinstance(options, dict) and "rig" in options:
-        return options["rig"] == "emps"
-    return not (diagnosed.values["gain"] or {}).get("estimates")
+    told = isinstance(options, dict) and options.get("model") is not None
+    return told or diagnosed.values.get("rollouts") is not None
 
 
 def title(diagnosed: Diagnosed) -> str:
     """The verdict in a word or two, and what it is of."""
-    of = " of the EMPS axis" if is_axis(diagnosed) else ""
+    of = " of a robot" if is_robot(diagnosed) else ""
     return f"Diagnosis{of}: {VERDICTS[diagnosed.values['verdict']].lower()}"
 
 
@@ -328,8 +327,12 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     """Verdict, causes in words, and what they are worth."""
     values = diagnosed.values
     count = len(values["recordings"])
-    if is_axis(diagnosed):
-        what = f"One recording of a real axis (the EMPS benchmark), in {count} blocks that validate each other, is"
+    if is_robot(diagnosed):
+        what = (
+            "A log of a robot's joints is"
+            if count == 1
+            else f"Logs of a robot's joints, in {count} parts, are"
+        )
     elif count == 1:
         what = "One recording of a team that carries a payload is"
     else:
@@ -413,8 +416,6 @@ def sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
 
 
 def _picture(book: Book, diagnosed: Diagnosed) -> Node | None:
-    if is_axis(diagnosed):
-        return book.gallery.ask([("The axis", partial(axis_shot, ASPECT))])
     estimates = (diagnosed.values["gain"] or {}).get("estimates")
     if not estimates:
         return None
