@@ -105,7 +105,7 @@ def si_factor(
     needed = None
     if unit == COUNTS:
         needed = "full_scale" if kind == "duty" else "counts_per_turn"
-    elif unit in RATED and kind != "duty":
+    elif unit in RATED and kind in ("effort", "current"):
         needed = "rated"
     given = {"counts_per_turn": counts_per_turn, "full_scale": full_scale, "rated": rated}
     for name, value in given.items():
