@@ -97,12 +97,16 @@ class Search:
         floor: of the noise, shape (C, bands).
         settings: numbers.
         say: takes a line about each step.
+        stop: whether to end with what there is.
+        best: the last set that was taken, for whoever breaks a search off.
     """
 
     problem: Linear
     floor: Array
     settings: Settings = SETTINGS
     say: Callable[[str], object] = lambda _: None
+    stop: Callable[[], bool] = lambda: False
+    best: State | None = None
     against: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -167,7 +171,9 @@ class Search:
     def run(self, state: State) -> State:
         """The likeliest set from another on."""
         state = self._pruned(self._settled(state), fresh=False)
-        while len(state.chosen) < self.settings.most_causes:
+        while len(state.chosen) < self.settings.most_causes and not self.stop():
+            self.best = state
+            self.say(f"{len(state.chosen)} found, looking for more")
             grown = self._grown(state) or self._exchanged(state)
             if grown is None:
                 break

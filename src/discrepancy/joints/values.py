@@ -8,43 +8,16 @@ from typing import Any
 import numpy as np
 
 from discrepancy.evidence.posterior import Group
-from discrepancy.joints.causes import CAUSES
+from discrepancy.joints.causes import CAUSES, OTHERS
 from discrepancy.joints.problem import JointProblem, horizontal
+from discrepancy.joints.said import parameter_name
 from discrepancy.serial.mechanics.tree import Tree
 from estimator.arrays import Array
 
-AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
-NAMES: Mapping[str, tuple[str, ...]] = {
-    **{cause.name: cause.parameters for cause in CAUSES},
-    "joint_zero": ("zero_rad",),
-    "link_length": ("x_m", "y_m", "z_m"),
-    "coupled_drive": ("coulomb_Nm", "viscous_Nms_per_rad", "armature_kgm2"),
-    "elasticity": ("compliance_rad_per_Nm",),
-    "back_emf": ("braking_Nms_per_rad",),
-    "gravity_direction": ("tilt_1_rad", "tilt_2_rad"),
-    "gravity_compensation": ("share",),
-    "link_mass": ("excess_kg",),
-    "link_com": ("x_m", "y_m", "z_m"),
-    "link_inertia": ("share",),
-    "payload": ("mass_kg", "x_m", "y_m", "z_m", *(f"inertia_{a}_kgm2" for a in AXES)),
-    "push": ("x_N", "y_N", "z_N"),
-    "unlisted": (),
-}
-SLIDES = (("Nms_per_rad", "Ns_per_m"), ("rad_per_Nm", "m_per_N"), ("Nm_per_rad", "N_per_m"), ("_kgm2", "_kg"),
-          ("_Nm", "_N"), ("_rad", "_m"))  # fmt: skip
-"""Endings of names of joints that turn, and of those that slide."""
+NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
 ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push")
 LEAST_KG = 1e-3
 """Mass of a payload below which it has no centre."""
-
-
-def parameter_name(name: str, *, slide: bool) -> str:
-    """A parameter's name with the unit that it has at a joint that turns or slides."""
-    if slide:
-        for turns, slides in SLIDES:
-            if name.endswith(turns):
-                return name.removesuffix(turns) + slides
-    return name
 
 
 def physical(

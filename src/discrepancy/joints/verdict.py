@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -12,7 +14,7 @@ from discrepancy.evidence.odds import Odds, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
-from discrepancy.joints.diagnose import Outcome, diagnose
+from discrepancy.joints.diagnose import Outcome, Until, diagnose
 from discrepancy.joints.findings import (
     Event,
     Finding,
@@ -56,6 +58,7 @@ def judged(
     excluded: Sequence[str] = (),
     tolerances: Mapping[str, Mapping[str, float]] | None = None,
     settings: Settings = SETTINGS,
+    seconds: float | None = None,
     say: Say = lambda _: None,
 ) -> JointVerdict:
     """Find out what a model of a robot of joints gets wrong.
@@ -67,11 +70,14 @@ def judged(
         excluded: causes left out of the tables.
         tolerances: standard deviations by cause and parameter of a healthy robot in place of the usual ones.
         settings: numbers of the engine.
+        seconds: after which the search ends with what it has.
         say: takes a line about each step.
 
     Raises:
         InputError: a log cannot be used, or a cause to be excluded does not exist.
     """
+    until = Until(math.inf if seconds is None else time.monotonic() + seconds)
+    say("smoothing the logs")
     trials = trials_of(model, logs, reference)
     volts = driven_by_voltage(trials.motors, len(model.joints))
     switched = all(s.enabled is not None and not s.enabled.all() for s in trials.runs)
@@ -83,7 +89,7 @@ def judged(
         excluded_from(NAMES, excluded),
         tolerances or {},
     )
-    outcome = diagnose(model, trials, settings, say, given)
+    outcome = diagnose(model, trials, settings, say, given, until)
     say("weighing what else each cause may be")
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)
@@ -131,7 +137,7 @@ class _Judge:
             after=tuple(self._offers(self.search, self.state)),
             limits=tuple(self._limits()),
             notes=(*notes, *resting(logs), *self._notes()),
-            finished=True,
+            finished=self.outcome.finished,
             by_the_others=self.by_the_others,
             traces=self.traces,
         )

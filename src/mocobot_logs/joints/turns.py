@@ -33,5 +33,7 @@ def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
             out = out.copy() if out is values else out
             out[known, c] = np.unwrap(x)
             times = "once" if jumps == 1 else f"{jumps} times"
-            notes.append(f"{name} is told within one turn; {times} it jumps by a full turn, which is taken out.")
+            notes.append(
+                f"{name} is told within one turn; {times} it jumps by a full turn, which is taken out."
+            )
     return out, notes
