@@ -32,7 +32,7 @@ def no_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_page_is_written_replaced_and_says_why_there_are_no_pictures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = diagnosis_folder(tmp_path / "axis", axis=True)
+    folder = estimate_folder(tmp_path / "estimate")
     code, out, err = run(capsys, folder)
     page = folder / "report.html"
     assert (code, err) == (0, "")
@@ -50,7 +50,7 @@ def test_page_is_written_replaced_and_says_why_there_are_no_pictures(
     other = tmp_path / "for you.html"
     assert run(capsys, folder, "--out", other)[0] == 0
     assert other.read_bytes() == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["axis", "for you.html"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["estimate", "for you.html"]
 
 
 def test_folder_without_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,7 +38,7 @@ from mocobot_report.diagnosis.gain import gain_section
 from mocobot_report.diagnosis.keys import cause_name, chance_of, numbers_of, sentence_of, share_of
 from mocobot_report.folder import Diagnosed
 from mocobot_report.sources import sources
-from mocobot_view.pictures.shots import axis_shot, diagnosis_shot
+from mocobot_view.pictures.shots import diagnosis_shot
 
 Values = Mapping[str, Any]
 
@@ -323,22 +323,19 @@ OF_JOINTS = {
 """The same of one robot of joints, where that is said otherwise."""
 
 
-def is_axis(diagnosed: Diagnosed) -> bool:
-    """Whether the EMPS axis was diagnosed, not a team."""
+def is_robot(diagnosed: Diagnosed) -> bool:
+    """Whether logs of one robot's joints were diagnosed, not a team's recordings."""
     if is_of_joints(diagnosed.values):
-        return False
+        return True
     provenance = diagnosed.provenance
     options = provenance.get("options") if isinstance(provenance, dict) else None
-    if isinstance(options, dict) and "rig" in options:
-        return options["rig"] == "emps"
-    return not (diagnosed.values["gain"] or {}).get("estimates")
+    told = isinstance(options, dict) and options.get("model") is not None
+    return told or diagnosed.values.get("rollouts") is not None
 
 
 def title(diagnosed: Diagnosed) -> str:
     """The verdict in a word or two, and what it is of."""
-    of = (
-        " of the EMPS axis" if is_axis(diagnosed) else " of a robot" if is_of_joints(diagnosed.values) else ""
-    )
+    of = " of a robot" if is_robot(diagnosed) else ""
     return f"Diagnosis{of}: {VERDICTS[diagnosed.values['verdict']].lower()}"
 
 
@@ -346,12 +343,10 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     """Verdict, causes in words, and what they are worth."""
     values = diagnosed.values
     count = len(values["recordings"])
-    joints, simulation = is_of_joints(values), "simulation"
+    joints, simulation = is_robot(diagnosed), "simulation"
     if joints:
         what, simulation = f"{count} trials of a robot's joints are", "robot's model"
         what = "One trial of a robot's joints is" if count == 1 else what
-    elif is_axis(diagnosed):
-        what = f"One recording of a real axis (the EMPS benchmark), in {count} blocks that validate each other, is"
     elif count == 1:
         what = "One recording of a team that carries a payload is"
     else:
@@ -437,8 +432,6 @@ def sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
 
 
 def _picture(book: Book, diagnosed: Diagnosed) -> Node | None:
-    if is_axis(diagnosed):
-        return book.gallery.ask([("The axis", partial(axis_shot, ASPECT))])
     estimates = (diagnosed.values["gain"] or {}).get("estimates")
     if not estimates:
         return None

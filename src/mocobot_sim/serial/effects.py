@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
-from scipy.special import hyp2f1
 
 from estimator.arrays import Array
-from mocobot_sim.serial.law import direction
+from mocobot_sim.serial.law import CREEP, direction
 
 
 @dataclass(frozen=True)
@@ -20,38 +18,44 @@ class RobotEffect:
 
     Attributes:
         cause: such as ``stribeck``.
-        joint: which joint, from 1; None of the whole robot.
-        partner: the other joint of a coupled drive.
+        joint: which joint, from 1; None of a body that no joint moves, and of the whole robot.
+        partner: the other joint of a coupled drive, from 1.
         parameters: numbers, by name with the unit as suffix.
+        body: name of the body that it is about, where it is about one; empty: the one that the joint moves.
     """
 
     cause: str
     joint: int | None
     partner: int | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    body: str = ""
 
-    def number(self, stem: str) -> float:
-        """The number whose name begins so, whatever its unit.
+    def number(self, *stems: str) -> float:
+        """The number that is named so, or whose name begins so, whatever its unit.
 
         Raises:
             KeyError: there is none, or more than one.
         """
-        (name,) = (n for n in self.parameters if n == stem or n.startswith(f"{stem}_"))
-        return float(self.parameters[name])
+        named = [n for n in self.parameters if n in stems or n.startswith(tuple(f"{s}_" for s in stems))]
+        if len(named) != 1:
+            raise KeyError(stems)
+        return float(self.parameters[named[0]])
 
 
-def resistances(effects: list[RobotEffect], q: Array, v: Array, damping: Array) -> Array:
+def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Array, dry: Array) -> Array:
     """Torques that effects take from their joints' drives beyond what the model does, shape (J,) [N m or N].
 
-    What rubs never drives: fitted viscous friction that is a little below zero, the model's own with it, is none.
+    What rubs never drives: fitted friction that is a little below zero, the model's own with it, is none.
 
     Args:
         effects: any; those of ``SMOOTH`` count.
         q: joint positions [rad or m], shape (J,).
         v: speeds, shape (J,).
         damping: the model's own [N m s/rad or N s/m], shape (J,).
+        dry: dry friction, the model's own with it; what is below zero takes from the viscous friction, shape (J,).
     """
-    out, rubbing = np.zeros(len(q)), np.zeros(len(q))
+    out = np.zeros(len(q))
+    rubbing = np.minimum(dry, 0.0) * np.tanh(v / CREEP)
     for effect in effects:
         if effect.cause in SMOOTH and effect.joint is not None:
             j = effect.joint - 1
@@ -60,7 +64,7 @@ def resistances(effects: list[RobotEffect], q: Array, v: Array, damping: Array) 
     return out + np.where((rubbing + damping * v) * v < 0.0, -damping * v, rubbing)
 
 
-def dry_levels(effects: list[RobotEffect], v: Array, load: Array, time: float) -> Array:
+def dry_levels(effects: Sequence[RobotEffect], v: Array, load: Array, time: float) -> Array:
     """Dry friction beyond the model's at every joint, shape (J,) [N m or N]; it may be less than that.
 
     Args:
@@ -98,35 +102,16 @@ def _stribeck(e: RobotEffect, v: float, load: float, time: float) -> float:
 
 
 def _sublinear(e: RobotEffect, v: float, load: float, time: float) -> float:
-    # A power of the speed less its own best straight line between 0 and twice the typical speed: with moments
-    # a = 2^(n+1)/(n+1) and b = 2^(n+2)/(n+2), that line is 2 a - 3 b / 2 + (3 b / 2 - 3 a / 2) u.
-    # Below the speed w it is viscous: u (u^2 + w^2)^((n - 1) / 2).
-    n, typical = e.number("exponent"), e.number("typical")
-    u, w = abs(v) / typical, e.number("thins") / typical
-    a, b = _moments(n, w)
-    power = u * (u * u + w * w) ** (0.5 * (n - 1.0)) if u else 0.0
-    return e.number("bend") * (power - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
-
-
-@lru_cache
-def _moments(n: float, w: float) -> tuple[float, float]:
-    """Integrals from 0 to 2 of u^k (u^2 + w^2)^((n - 1) / 2), k = 1 and 2 (Gradshteyn and Ryzhik, 3.194.1)."""
-    if not w:
-        return 2.0 ** (n + 1.0) / (n + 1.0), 2.0 ** (n + 2.0) / (n + 2.0)
-    first = ((4.0 + w * w) ** (0.5 * (n + 1.0)) - w ** (n + 1.0)) / (n + 1.0)
-    return first, 8.0 / 3.0 * w ** (n - 1.0) * float(hyp2f1(0.5 * (1.0 - n), 1.5, 2.5, -4.0 / (w * w)))
+    return e.number("bend") * math.log1p(abs(v) / e.number("thins"))
 
 
 def _load_friction(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("share") * (abs(load) - e.number("load"))
+    return e.number("share") * abs(load)
 
 
 def _warming(e: RobotEffect, v: float, load: float, time: float) -> float:
-    # Counted from its mean between 0 and ``until``, which is as much friction as there is without it.
-    over, until = e.number("over"), e.number("until")
-    mean = (1.0 - math.exp(-until / over)) * over / until
-    power = (abs(v) / e.number("typical")) ** e.number("exponent")
-    return e.number("more") * power * (math.exp(-time / over) - mean)
+    more = e.number("more_Nm", "more_N") + e.number("more_Nms", "more_Ns") * abs(v)
+    return more * math.exp(-time / e.number("over"))
 
 
 def _ripple(e: RobotEffect, q: float, v: float) -> float:
@@ -139,7 +124,7 @@ def _counterbalance(e: RobotEffect, q: float, v: float) -> float:
 
 
 def _spring(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("stiffness") * (q - e.number("neutral"))
+    return e.number("stiffness") * (q - e.number("middle")) + e.number("offset")
 
 
 SMOOTH: dict[str, Callable[[RobotEffect, float, float], float]] = {

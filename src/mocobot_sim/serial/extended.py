@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -78,9 +79,9 @@ def put(taken: Mapping[Path, str], spec: mujoco.MjSpec, folder: Path) -> None:
         shutil.copyfile(source, folder / ASSETS / name)
 
 
-FORMAT, VERSION = "mocobot-extended-robot", 2
+FORMAT, VERSION = "mocobot-extended-robot", 3
 SCENE, NUMBERS, README = "robot.xml", "effects.json", "README.md"
-KEYS = ("cause", "joint", "partner", "parameters", "law", "in")
+KEYS = ("cause", "joint", "partner", "body", "parameters", "law", "in")
 LAW = "law"
 CHANGED = ", which is what has changed since the reference; what is wrong with the model in both is not in it"
 LEAST_LOSS = 1e-12
@@ -133,15 +134,9 @@ def write_extended(
 
 def _entry(effect: Effect) -> dict[str, Any]:
     if isinstance(effect, JointLaw):
-        return {
-            "cause": LAW,
-            "joint": effect.joint,
-            "partner": None,
-            "parameters": {},
-            "law": effect.to_dict(),
-        }
-    own = {"cause": effect.cause, "joint": effect.joint, "partner": effect.partner}
-    return own | {"parameters": dict(effect.parameters), "law": None}
+        plain = RobotEffect(LAW, effect.joint)
+        return asdict(plain) | {"law": effect.to_dict()}
+    return asdict(effect) | {"parameters": dict(effect.parameters), "law": None}
 
 
 def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
@@ -158,8 +153,10 @@ def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
         ("format", "version", "causes", "recordings"),
         str(path),
     )
-    if (file.values["format"], file.values["version"]) != (FORMAT, VERSION):
-        file.refuse("format", f"{FORMAT!r}, with version {VERSION}")
+    if file.values["format"] != FORMAT:
+        file.refuse("format", repr(FORMAT))
+    if file.values["version"] != VERSION:
+        file.refuse("version", f"{VERSION}: diagnose again to have the folder written by this release")
     where = f"{path}: causes"
     entries = [Fields(item, KEYS, where) for item in file.list("causes")]
     return [_effect(e, where) for e in entries if e.values["in"] == NUMBERS]
@@ -170,7 +167,7 @@ def _effect(entry: Fields, where: str) -> RobotEffect | ActingLaw:
     if values["cause"] == LAW:
         return ActingLaw(JointLaw.of_dict(values["law"], where))
     numbers = {k: float(v) for k, v in values["parameters"].items()}
-    return RobotEffect(values["cause"], values["joint"], values["partner"], numbers)
+    return RobotEffect(values["cause"], values["joint"], values["partner"], numbers, values["body"])
 
 
 def step(
@@ -190,13 +187,14 @@ def step(
     # What the gears pass on: gravity, springs and the bodies' inertia, but nothing that rubs, and no rotors.
     inertia = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, inertia, before)
-    load = inertia - model.dof_armature * before + data.qfrc_bias - data.qfrc_spring
-    taken = resistances(listed, data.qpos, data.qvel, model.dof_damping)
+    load = inertia - model.dof_armature * before + data.qfrc_bias - data.qfrc_spring - data.qfrc_gravcomp
+    dry = model.dof_frictionloss + dry_levels(rubbing, data.qvel, load, data.time)
+    taken = resistances(listed, data.qpos, data.qvel, model.dof_damping, dry)
     state = State(data.time, model.opt.timestep, data.qpos, data.qvel, before, load, torque)
     for acting in (effect for effect in effects if isinstance(effect, ActingLaw)):
         taken[acting.law.joint - 1] += acting.torque(state)
     data.qfrc_applied[:] = torque - taken
-    _rub(model, data, dry_levels(rubbing, data.qvel, load, data.time))
+    _rub(data, dry)
     mujoco.mj_step2(model, data)
 
 
@@ -209,12 +207,11 @@ def _with_rows(model: mujoco.MjModel, data: mujoco.MjData, rubbing: Sequence[Rob
     model.dof_frictionloss[own] = said
 
 
-def _rub(model: mujoco.MjModel, data: mujoco.MjData, level: Array) -> None:
-    """Dry friction beyond the model's in MuJoCo's own rows: it stops a joint and never drives it."""
-    if level.any():
+def _rub(data: mujoco.MjData, dry: Array) -> None:
+    """Dry friction in MuJoCo's own rows: it stops a joint and never drives it."""
+    if dry.any():
         at = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
-        dof = data.efc_id[at]
-        data.efc_frictionloss[at] = np.maximum(model.dof_frictionloss[dof] + level[dof], 0.0)
+        data.efc_frictionloss[at] = np.maximum(dry[data.efc_id[at]], 0.0)
         if data.nisland:  # each is solved from a copy
             data.iefc_frictionloss[:] = data.efc_frictionloss[data.map_iefc2efc]
 
@@ -225,7 +222,9 @@ def _readme(effects: Sequence[Effect], places: Sequence[str], more: str) -> str:
         for e, place in zip(effects, places, strict=True)
     ]
     table = (
-        "\n".join(["| cause | joint | parameters | in |", "|---|---|---|---|", *rows]) if rows else "None."
+        "\n".join(["| cause | joint or body | parameters | in |", "|---|---|---|---|", *rows])
+        if rows
+        else "None."
     )
     return f"""# Extended robot
 
@@ -253,4 +252,4 @@ def _row(effect: Effect) -> str:
     each = (
         f"`{n}` = {v:.6g}" if isinstance(v, float) else f"`{n}` = {v}" for n, v in numbers.items() if v != ""
     )
-    return f"`{entry['cause']}` | {entry['joint'] or ''} | {', '.join(each)}"
+    return f"`{entry['cause']}` | {entry['joint'] or entry['body']} | {', '.join(each)}"

@@ -101,13 +101,31 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
     """
     model = spec.compile()
     if effect.cause == "gravity_direction":
-        spec.option.gravity = _tilted(np.array(model.opt.gravity), effect)
+        spec.option.gravity = [effect.number(axis) for axis in "xyz"]
         return True
-    if effect.joint is None:
+    if effect.cause == "gravity_compensation":
+        if model.jnt_actgravcomp.any():  # it would come from actuators, which are off
+            return False
+        for body in spec.bodies[1:]:
+            body.gravcomp += effect.number("share")
+        return True
+    if effect.joint is None and not effect.body:
         return False
-    at = effect.joint - 1
-    joint = spec.joint(model.joint(at).name)
-    body = joint.parent
+    joint = None if effect.joint is None else spec.joint(model.joint(effect.joint - 1).name)
+    body = spec.body(effect.body) if effect.body else joint.parent
+    index = model.body(effect.body).id if effect.body else int(model.jnt_bodyid[effect.joint - 1])
+    if effect.cause == "link_length":
+        body.pos = np.array(body.pos) + [effect.number(axis) for axis in "xyz"]
+        return True
+    if effect.cause in ("link_mass", "link_com", "link_inertia", "payload"):
+        return _inertial(spec, body, inertial_of(model, index), effect)
+    return joint is not None and _at_joint(spec, joint, model, effect)
+
+
+def _at_joint(
+    spec: mujoco.MjSpec, joint: mujoco.MjsJoint, model: mujoco.MjModel, effect: RobotEffect
+) -> bool:
+    at = model.joint(joint.name).id
     if effect.cause in DRY:
         joint.solref_friction, joint.solimp_friction = list(SOLREF), list(SOLIMP)
     if effect.cause == "friction":
@@ -121,27 +139,18 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
     elif effect.cause == "armature":
         joint.armature = max(float(joint.armature) + effect.number("armature"), 0.0)
     elif effect.cause == "spring":
-        if effect.number("stiffness") < 0 or model.jnt_stiffness[at]:
+        most = effect.number("stiffness")
+        if most <= 0 or model.jnt_stiffness[at]:
             return False
         stiffness = np.array(joint.stiffness, dtype=float).reshape(-1)
-        stiffness[0] = effect.number("stiffness")
-        joint.stiffness = stiffness if stiffness.size > 1 else stiffness[0]
-        joint.springref = _as_written(spec, joint, effect.number("neutral"))
+        stiffness[0] = most
+        joint.stiffness = stiffness if stiffness.size > 1 else most
+        joint.springref = _as_written(spec, joint, effect.number("middle") - effect.number("offset") / most)
     elif effect.cause == "joint_zero":
         # It stands farther than it reads: in the pose of the drawing it reads that much less.
         joint.ref = float(joint.ref) - _as_written(spec, joint, effect.number("zero"))
     elif effect.cause == "coupled_drive":
         return _coupled(spec, model, effect)
-    elif effect.cause == "link_length":
-        body.pos = np.array(body.pos) + [effect.number(axis) for axis in "xyz"]
-    elif effect.cause in ("link_mass", "link_com", "link_inertia"):
-        return _inertial(spec, body, model, int(model.jnt_bodyid[at]), effect)
-    elif effect.cause == "payload":
-        keep_inertials(spec, model)
-        load = body.add_body(name=f"payload_at_{body.name}")
-        ball = effect.number("mass") * effect.number("gyration") ** 2 * np.eye(3)
-        centre = np.array([effect.number(axis) for axis in "xyz"])
-        set_inertial(load, effect.number("mass"), centre, real_inertia(ball + _moments(effect)))
     else:
         return False
     return True
@@ -170,33 +179,39 @@ def _as_written(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) ->
 
 
 def _inertial(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, model: mujoco.MjModel, index: int, effect: RobotEffect
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, own: tuple[float, Array, Array], effect: RobotEffect
 ) -> bool:
-    mass, centre, inertia = inertial_of(model, index)
-    if effect.cause == "link_mass":
-        if mass + effect.number("excess") <= 0.0:
+    mass, centre, inertia = own
+    if effect.cause == "payload":
+        load, at = effect.number("mass"), np.array([effect.number(axis) for axis in "xyz"])
+        if mass + load <= 0.0:
             return False
-        inertia = inertia * (1.0 + effect.number("excess") / mass)  # denser or less dense
+        if load > 0.0:
+            keep_inertials(spec, spec.compile())
+            more = body.add_body(name=f"payload_at_{body.name}")
+            set_inertial(more, load, at, real_inertia(_moments(effect)))
+            return True
+        total = (mass * centre + load * at) / (mass + load)
+        moved = mass * _spread(centre - total) + load * _spread(at - total)
+        mass, centre, inertia = mass + load, total, inertia + moved + _moments(effect)
+    elif effect.cause == "link_mass":
         mass += effect.number("excess")
     elif effect.cause == "link_com":
         centre = centre + [effect.number(axis) for axis in "xyz"]
     else:
-        inertia = inertia + _moments(effect)
-    keep_inertials(spec, model)
+        inertia = inertia * (1.0 + effect.number("share"))
+    if mass <= 0.0 or np.trace(inertia) < 0.0:
+        return False
+    keep_inertials(spec, spec.compile())
     set_inertial(body, mass, centre, inertia)
     return True
 
 
-def _moments(effect: RobotEffect) -> np.ndarray:
+def _spread(way: Array) -> Array:
+    """Inertia of a point mass of 1 kg about a point that is so far away [m], shape (3, 3)."""
+    return way @ way * np.eye(3) - np.outer(way, way)
+
+
+def _moments(effect: RobotEffect) -> Array:
     xx, yy, zz, xy, xz, yz = (effect.number(f"inertia_{axes}") for axes in INERTIA)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _tilted(gravity: np.ndarray, effect: RobotEffect) -> np.ndarray:
-    """Gravity in the frame of a base that is turned about two horizontal axes."""
-    up = -gravity / np.linalg.norm(gravity)
-    axis = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
-    first = axis - up * (axis @ up)
-    first /= np.linalg.norm(first)
-    turn = effect.number("tilt_1") * first + effect.number("tilt_2") * np.cross(up, first)
-    return Rotation.from_rotvec(turn).inv().apply(gravity)

@@ -1,0 +1,79 @@
+"""Findings as effects of the simulator, and the model with them in it, to take away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from discrepancy.joints.findings import Finding, JointVerdict, Member
+from discrepancy.joints.problem import _horizontal as horizontal
+from discrepancy.serial.model import SerialModel, load_spec
+from mocobot_sim.scene.named_files import check_named
+from mocobot_sim.serial.effects import RobotEffect
+from mocobot_sim.serial.extended import write_extended as write
+
+LINKS = ("link_mass", "link_com", "link_inertia", "link_length", "payload")
+LATE = ("gravity_compensation",)
+"""What acts on all masses, and so goes into a model after them."""
+
+
+def effects_of(finding: Finding, model: SerialModel) -> list[RobotEffect]:
+    """A finding as the simulator's effects, one a member.
+
+    Args:
+        finding: with values in physical units.
+        model: that it is about.
+    """
+    return [_effect(finding, member, model) for member in finding.members]
+
+
+def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[Finding, RobotEffect]]:
+    """Effects in the order in which they go into a model, each with its finding."""
+    pairs = [(finding, effect) for finding in findings for effect in effects_of(finding, model)]
+    return sorted(pairs, key=lambda pair: pair[1].cause in LATE)
+
+
+def write_extended(verdict: JointVerdict, folder: Path) -> None:
+    """Write the model with the findings in it into a new folder.
+
+    Raises:
+        InputError: the folder cannot be written, MuJoCo refuses the model, or files in it are not its own.
+    """
+    effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
+    spec = load_spec(verdict.model.path)
+    check_named(verdict.model.path, assets=False)
+    write(spec, effects, folder, verdict.trials, reference=bool(verdict.reference))
+
+
+def label(finding: Finding) -> str:
+    """The cause and its place in words."""
+    return f"{finding.cause.replace('_', ' ')} ({finding.place})"
+
+
+def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect:
+    # Shares of what is typical are told beside what they amount to.
+    numbers = {name: x for name, x in finding.shape.items() if name != "share"} | dict(member.values)
+    if finding.event is not None:
+        numbers |= {"start_s": finding.event.start_s, "duration_s": finding.event.duration_s}
+    if finding.cause == "torque_scale":
+        numbers = {"bend": 0.0} | numbers
+    if finding.cause == "gravity_direction":
+        gravity = np.array(model.model.opt.gravity)
+        way = np.array([numbers["tilt_1_rad"], numbers["tilt_2_rad"]]) @ horizontal(gravity)
+        turned = Rotation.from_rotvec(-way).apply(gravity)
+        numbers |= dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, turned), strict=True))
+    joint, body = member.joint, ""
+    if finding.cause in LINKS and joint is None:
+        joint, body = _link(member.place, model)
+    return RobotEffect(finding.cause, joint, finding.partner, numbers, body)
+
+
+def _link(place: str, model: SerialModel) -> tuple[int | None, str]:
+    """The joint that moves a link, from 1; the link's own name where none moves it."""
+    for names in (model.bodies, model.joints):
+        if place in names:
+            return names.index(place) + 1, ""
+    return None, place

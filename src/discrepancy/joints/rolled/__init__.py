@@ -1,0 +1,1 @@
+"""The model and the extended model simulated, and held against the logs."""
