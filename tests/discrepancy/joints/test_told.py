@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,8 +14,9 @@ import pytest
 from command import refused, run
 from diagnosed import check_finite, small_diagnosis
 from discrepancy.cause_names.serial import NAMES
+from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS
-from discrepancy.joints.findings import Finding, Limit
+from discrepancy.joints.findings import Finding, Limit, Offer
 from discrepancy.joints.json import verdict_to_dict
 from discrepancy.joints.said import Said, parameter_name
 from discrepancy.joints.text import format_verdict
@@ -57,15 +56,12 @@ def table(text: str) -> list[str]:
 def writes_models(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """In place of what writes the extended model: where it would go."""
     asked: list[Path] = []
-    module = SimpleNamespace(write_extended=lambda verdict, folder: asked.append(folder))
-    monkeypatch.setitem(sys.modules, "discrepancy.joints.effects", module)
+    monkeypatch.setattr(diagnosed, "write_extended", lambda verdict, folder: asked.append(folder))
     return asked
 
 
 def made(folder: Path, findings: Sequence[Finding] = (), **more: Any) -> Diagnosis:
-    from discrepancy.joints.diagnosed import JointDiagnosed
-
-    return Diagnosis(JointDiagnosed(joint_verdict(folder, findings, **more)))
+    return Diagnosis(diagnosed.JointDiagnosed(joint_verdict(folder, findings, **more)))
 
 
 # --- words
@@ -174,6 +170,15 @@ def test_a_joint_without_torques_is_left_out(tmp_path: Path) -> None:
     told = values(tmp_path, [friction_everywhere()], foretold=(one,))
     assert list(told["gain"]["units"]) == ["turn torque", "lift torque"]
     check_finite(told)
+
+
+def test_a_candidate_is_listed_once_in_its_likeliest_shape(tmp_path: Path) -> None:
+    offers = [Offer("stribeck", "turn", 1, nats) for nats in (20.0, 31.0, 5.0)]
+    offers.append(Offer("spring", "turn", 1, -2.0))
+    listed = values(tmp_path, before=tuple(offers))["evidence"]["before"]
+    assert [(entry["name"], entry["nats"]) for entry in listed] == [
+        ("Stribeck friction in joint 1 (turn)", 31.0)
+    ]
 
 
 def test_coupled_joints_and_places_of_links(tmp_path: Path) -> None:
@@ -323,7 +328,7 @@ def test_why_there_is_no_extended_model(tmp_path: Path, monkeypatch: pytest.Monk
     def refuse(verdict: object, folder: Path) -> None:
         raise InputError("the friction would be negative")
 
-    monkeypatch.setitem(sys.modules, "discrepancy.joints.effects", SimpleNamespace(write_extended=refuse))
+    monkeypatch.setattr(diagnosed, "write_extended", refuse)
     made(tmp_path, [friction_everywhere()]).write(tmp_path / "out")
     said = (tmp_path / "out" / "report.txt").read_text()
     assert "There is no extended model: the friction would be negative." in said
