@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.joints.findings import Finding, JointVerdict, Member
-from discrepancy.joints.problem import _horizontal as horizontal
+from discrepancy.joints.problem import horizontal
 from discrepancy.serial.model import SerialModel, load_spec
 from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.serial.effects import RobotEffect

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 from discrepancy import rules
@@ -146,38 +147,31 @@ def _table(values: Values, *, verbose: bool) -> list[str]:
     if not rows:
         return []
     head: Row = (["place"], ["what"], ["size +- standard error"], "probability")
-    widths = [
-        min(most, max(len(line) for row in (head, *rows) for line in row[k]))
-        for k, most in enumerate((PLACES, WHATS))
-    ]
+    widths = [max(len(line) for row in (head, *rows) for line in row[k]) for k in range(3)]
     last = max(len(row[3]) for row in (head, *rows))
-    room = WIDTH - sum(widths) - last - 3 * len(GAP)
-    widths.append(min(room, max(len(line) for row in (head, *rows) for line in row[2])))
-    out = ["", *_lines(head, widths, last), "-" * (sum(widths) + last + 3 * len(GAP))]
-    out += [line for row in (*named, *off) for line in _lines(row, widths, last)]
+    widths[:2] = [min(widths[0], PLACES), min(widths[1], WHATS)]
+    widths[2] = min(widths[2], WIDTH - sum(widths[:2]) - last - 3 * len(GAP))
+    across = sum(widths) + last + 3 * len(GAP)
+    lines = ["", *_lines(head, widths, last), "-" * across]
+    lines += [line for row in (*named, *off) for line in _lines(row, widths, last)]
     if suspected:
-        text = "-- suspected, too improbable to be named "
-        out.append(text.ljust(sum(widths) + last + 3 * len(GAP), "-"))
-        out += [line for row in suspected for line in _lines(row, widths, last)]
-    return out
+        lines.append("-- suspected, too improbable to be named ".ljust(across, "-"))
+        lines += [line for row in suspected for line in _lines(row, widths, last)]
+    return lines
 
 
-def _lines(row: Row, widths: Sequence[int], last: int) -> list[str]:
+def _lines(row: Row, widths: Sequence[int], last: int) -> Iterable[str]:
     """A row as lines; what is too wide for its column goes on below."""
-    cells = [
-        [
-            part
-            for line in row[k]
-            for part in textwrap.wrap(line, widths[k], subsequent_indent="  ", break_on_hyphens=False) or [""]
-        ]
-        for k in range(3)
-    ]
-    out = []
-    for i in range(max(map(len, cells))):
-        parts = [cell[i].replace(TOGETHER, " ") if i < len(cell) else "" for cell in cells]
-        text = GAP.join(f"{part:<{width}}" for part, width in zip(parts, widths, strict=True))
-        out.append(f"{text}{GAP}{row[3] if i == 0 else '':>{last}}".rstrip())
-    return out
+    cells = [[part for line in row[k] for part in _folded(line, widths[k])] for k in range(3)]
+    for i, parts in enumerate(zip_longest(*cells, fillvalue="")):
+        padded = (
+            f"{part.replace(TOGETHER, ' '):<{width}}" for part, width in zip(parts, widths, strict=True)
+        )
+        yield f"{GAP.join(padded)}{GAP}{row[3] if i == 0 else '':>{last}}".rstrip()
+
+
+def _folded(line: str, width: int) -> list[str]:
+    return textwrap.wrap(line, width, subsequent_indent="  ", break_on_hyphens=False) or [""]
 
 
 def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
