@@ -16,7 +16,7 @@ from discrepancy.joints.findings import Finding, Foretold, JointVerdict, Limit, 
 from discrepancy.joints.said import Said, joint_in_words, link_in_words, titled
 from discrepancy.result.json import plain
 from discrepancy.result.read import FORMAT, VERSION
-from discrepancy.result.remains import of_scatter, scatter_sentence
+from discrepancy.result.remains import scatter_sentence
 from discrepancy.serial.model import SerialModel
 from estimator.arrays import Array
 
@@ -56,7 +56,9 @@ def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = 
         },
         "notes": list(v.notes),
     }  # fmt: skip
-    remains = of_scatter(values)
+    kinds, remains = ", ".join(entry["kind"] for entry in values["scatter"]), []
+    if kinds and v.verdict != "miscalibrated":
+        remains = [f"Besides, all places alike are off by more than their tolerances: {kinds}."]
     if left > rules.CLEAN_CHI2_PER_N:
         where = values["residual"]["signature"]["sentence"].replace("The torque", "the torque").rstrip(".")
         more = f"A misfit of chi2/n {three_digits(left)} of {three_digits(modelled)} remains; {where}."

@@ -29,12 +29,14 @@ from discrepancy.result.text_rollouts import rollout_lines
 Values = Mapping[str, Any]
 MOST_NAMED = 4
 """Findings that the second sentence lists."""
+MOST_ALIKE = 3
+"""Causes of one finding that it lists."""
 LEAST_NATS = 1.0
 """Gains below are not told."""
 MOST_PLACES = 12
 """Rows of a kind that is off everywhere."""
-PLACES, WHATS, GAP = 24, 34, "  "
-"""Widest columns, and what is between columns."""
+PLACES, WHATS, LEAST_WHAT, SIZES, GAP = 24, 34, 22, 38, "  "
+"""Widest columns of places and of what there is, the narrowest of that, room for sizes, and what is between columns."""
 TOGETHER = "\N{NO-BREAK SPACE}"
 """Between words that stay in one line of a cell."""
 Row = tuple[list[str], list[str], list[str], str]
@@ -93,11 +95,9 @@ def _found(values: Values) -> str:
 
 
 def _either(cause: Values) -> str:
-    told = [entry["name"] for entry in cause.get("told", ())]
-    others = [name for name in told if name != cause["name"]]
-    if len(others) > 2:
-        return f"{cause['name']} or {len(others)} others"
-    return " or ".join([cause["name"], *others])
+    """All of the smallest set that holds 90 %, the likeliest first, and what was fitted."""
+    names = list(dict.fromkeys([*(entry["name"] for entry in cause["told"]), cause["name"]]))
+    return " or ".join(names) if len(names) <= MOST_ALIKE else f"{names[0]} or {len(names) - 1} others"
 
 
 def _gain(values: Values) -> Iterable[str]:
@@ -116,7 +116,7 @@ def _gain(values: Values) -> Iterable[str]:
 
 
 def _advice(values: Values) -> Iterable[str]:
-    open_ = [cause for cause in values["causes"] if len(cause.get("told", ())) > 1 and cause["separate"]]
+    open_ = [cause for cause in values["causes"] if len(cause["told"]) > 1 and cause["separate"]]
     if not values["finished"]:
         yield "Let the search come to its end before you rely on this."
     elif open_:
@@ -150,7 +150,9 @@ def _table(values: Values, *, verbose: bool) -> list[str]:
     widths = [max(len(line) for row in (head, *rows) for line in row[k]) for k in range(3)]
     last = max(len(row[3]) for row in (head, *rows))
     widths[:2] = [min(widths[0], PLACES), min(widths[1], WHATS)]
-    widths[2] = min(widths[2], WIDTH - sum(widths[:2]) - last - 3 * len(GAP))
+    room = WIDTH - widths[0] - last - 3 * len(GAP)
+    widths[1] = max(min(widths[1], room - min(widths[2], SIZES)), min(widths[1], LEAST_WHAT))
+    widths[2] = min(widths[2], room - widths[1])
     across = sum(widths) + last + 3 * len(GAP)
     lines = ["", *_lines(head, widths, last), "-" * across]
     lines += [line for row in (*named, *off) for line in _lines(row, widths, last)]
@@ -176,8 +178,7 @@ def _folded(line: str, width: int) -> list[str]:
 
 def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
     """A finding; a kind with a row for every joint."""
-    what = [_what(cause["kind"]), *_ors(cause)]
-    chance = _chance(cause["probability"])
+    what, chance = _whats(cause), _chance(cause["probability"])
     members = cause.get("members") or [cause]
     if len(members) == 1:
         sizes = _sizes(members[0]["parameters"], verbose=verbose)
@@ -220,16 +221,17 @@ def _what(kind: str) -> str:
     return re.sub(r" (in|of|at) (a joint|a link|two joints)\b", "", kind)
 
 
-def _ors(cause: Values) -> list[str]:
-    """What else may be there, of the smallest set that holds 90 %."""
+def _whats(cause: Values) -> list[str]:
+    """The cause that was fitted, and what else the smallest set that holds 90 % has."""
     chances = {rival["name"]: rival["probability"] for rival in cause["alternatives"]}
-    out = []
-    for entry in cause.get("told", ()):
+    others = [entry for entry in cause["told"] if entry["name"] != cause["name"]]
+    what = _what(cause["kind"])
+    out = [what if len(others) < max(len(cause["told"]), 1) else f"(fitted as {what})"]
+    for entry in others:
         unlisted = entry["cause"] == "unlisted"
-        if entry["name"] != cause["name"]:
-            chance = cause["instead"]["unlisted"] if unlisted else chances.get(entry["name"])
-            name = "something unlisted" if unlisted else entry["name"]
-            out.append(f"or {name}{'' if chance is None else f' ({_chance(chance)})'}")
+        chance = cause["instead"]["unlisted"] if unlisted else chances.get(entry["name"])
+        share = "" if chance is None else f" ({_chance(chance).replace(' ', TOGETHER)})"
+        out.append(f"or {'something unlisted' if unlisted else entry['name']}{share}")
     return out
 
 
