@@ -118,6 +118,8 @@ class _Told:
         """An entry of ``causes`` and ``suspected``."""
         f, several = finding, len(finding.members) > 1
         at = self.at(f.cause, f.place, f.joint, f.partner)
+        if f.of:
+            at |= {"name": f"{at['name']} by its {f.of}"}
         event = f.event and {
             "trial": f.event.trial + 1,
             "start_s": f.event.start_s,
