@@ -340,6 +340,7 @@ def commanded(rubs: float, kp: float = 40.0, kv: float = 2.0) -> JointLog:
     )  # fmt: skip
 
 
+@pytest.mark.usefixtures("few_starts")
 def test_closed_loop_of_mujocos_own_servo(tmp_path: Path) -> None:
     """Where the model is right the loop follows the log; friction that it lacks shows, and is gone once it is named."""
     model = read(tmp_path, TURNTABLE)
