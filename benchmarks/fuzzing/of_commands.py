@@ -8,11 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from scipy.io import savemat
-
 import mocobot
-from discrepancy.emps.recording.reader import read_emps
 from discrepancy.serial.model import load_model
 from discrepancy.team.tolerances import read_tolerances
 from estimator.errors import InputError
@@ -54,12 +50,6 @@ def _copy(model: str) -> Callable[[Path], object]:
     return lambda path: shutil.copyfile(MODELS / model, path)
 
 
-def _axis(path: Path) -> None:
-    time = np.arange(1100) / 200.0
-    series = {"t": time, "qm": np.sin(time), "qg": np.sin(time), "vir": np.cos(time)}
-    savemat(path, series | {"gtau": 35.0, "kp": 160.0, "kv": 240.0})
-
-
 def _estimate(path: Path) -> None:
     mocobot.estimate(mocobot.simulate("b", "static")).write(path)
 
@@ -89,6 +79,5 @@ KINDS = {
     ),
     "arm": Kind("arm.xml", _copy("xl330/xl330.xml"), load_model),
     "map of an arm": Kind("arm.toml", _copy("xl330/log.toml"), _joint_map),
-    "axis": Kind("axis.mat", _axis, read_emps),
     "estimate": Kind("estimate.json", _estimate, lambda path: compare(path, path)),
 }  # fmt: skip

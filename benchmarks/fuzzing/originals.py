@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pcsv
 import pyarrow.parquet as pq
+from scipy.io import savemat
 
 from estimator.arm.design import load_design
 from estimator.recording.metadata import RecordingMetadata
@@ -23,6 +24,8 @@ FORMATS = (
     "csv",
     "npz",
     "npz packed",
+    "mat",
+    "mat packed",
     "parquet",
     "parquet foreign",
     "lerobot data",
@@ -71,6 +74,10 @@ def write_original(kind: str, folder: Path, rows: int = 200) -> tuple[Path, Path
         arrays = {name: getattr(recording, name) for name in ("time", "phi", "theta", "tau", "ref")}
         save(folder / "log.npz", mocobot=np.array(recording.metadata.to_json()), **arrays)
         return _same(folder / "log.npz")
+    if kind.startswith("mat"):
+        arrays = {name: getattr(recording, name) for name in ("time", "phi", "theta", "tau", "ref")}
+        savemat(folder / "log.mat", arrays, do_compression=kind.endswith("packed"))
+        return _same(folder / "log.mat")
     if kind == "parquet":
         write_recording(recording, folder / "log.parquet")
         return _same(folder / "log.parquet")

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from estimator.recording.parquet import read_recording as read_recording
     from estimator.recording.parquet import write_recording as write_recording
     from mocobot import bases as bases
-    from mocobot import emps as emps
     from mocobot import guiding as guiding
     from mocobot import pictures as pictures
     from mocobot import robots as robots
@@ -67,7 +66,7 @@ _NAMES = {
     "estimator.recording.model": "Recording",
     "estimator.recording.parquet": "read_recording write_recording",
     "estimator.inputs": "set_max_unpacked",
-    "mocobot": "bases emps guiding pictures robots serial trajectories",
+    "mocobot": "bases guiding pictures robots serial trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
     "mocobot.api.comparison": "Comparison compare",
     "mocobot.api.conversion": "Conversion convert convert_parts",

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
-from discrepancy.cause_names import emps, serial, team
+from discrepancy.cause_names import serial, team
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
@@ -138,8 +138,6 @@ def check_calibrate(options: opt.Calibrate) -> None:
     _check_read(files)
 
 
-CAUSES = {"team": team.NAMES, "emps": emps.NAMES}
-"""Names of causes by rig."""
 TRUTH = "the truth beside a simulated recording"
 
 
@@ -159,19 +157,15 @@ def check_diagnose(options: opt.Diagnose) -> None:
         inputs = [*options.rec, *_given(options.tolerances), *map_file(options.map)]
         inputs += calibration_file(options.calibration)
         check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
-    _check_rig(options)
-    _check_excluded(options.exclude, CAUSES[options.rig])
+    _check_excluded(options.exclude, team.NAMES)
     check_there(options.rec)
-    if options.rig == "team":
-        check_formats(options.rec)
-        for path in filter(Path.exists, map(truth_path, options.rec)):
-            read_json(path, TRUTH)  # what it says, nobody asks before the verdict
+    check_formats(options.rec)
+    for path in filter(Path.exists, map(truth_path, options.rec)):
+        read_json(path, TRUTH)  # what it says, nobody asks before the verdict
 
 
 def _check_joints(options: opt.Diagnose, model: Path) -> None:
     """What can be refused of logs of one robot's joints, but for maps that nobody named."""
-    if options.rig != "team":
-        raise InputError(f"--model and --rig {options.rig} are both given; choose one")
     check_no_team(options, ("calibration", "scheduler"))
     logs = [*options.rec, *options.reference]
     check_recordings(logs)
@@ -180,22 +174,6 @@ def _check_joints(options: opt.Diagnose, model: Path) -> None:
         check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
     _check_excluded(options.exclude, serial.NAMES)
     _check_read(logs, model)
-
-
-def _check_rig(options: opt.Diagnose) -> None:
-    if options.rig == "emps" and options.map is not None:
-        raise InputError("--map is for logs of a team; the emps rig reads its benchmark's MAT file")
-    if options.rig == "emps" and options.calibration is not None:
-        raise InputError("--calibration is of a team's robots; the emps rig has none")
-    if options.rig == "team":
-        for path in options.rec:
-            if path.suffix == ".mat":
-                raise InputError(f"{path}: is a MAT file; --rig emps reads those of the EMPS benchmark")
-    elif len(options.rec) > 1:
-        raise InputError(
-            f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
-            "each other"
-        )
 
 
 def _check_excluded(excluded: Sequence[str], causes: Sequence[str]) -> None:

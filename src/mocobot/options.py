@@ -101,19 +101,21 @@ class Diagnose:
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
-    named can be validated. One MAT file with --rig emps; logs of a robot's joints with --model."""
+    named can be validated. Logs of a robot's joints with --model."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
     """Map of the logs that are no recordings; found out if not given. With --model, log.toml beside log or model."""
     model: Model = None
     reference: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...")] = ()
     """With --model: logs of the same robot while it was well; what is off there, too, is no news."""
-    rig: Literal["team", "emps"] = "team"
-    """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for diagnosis.json, report.txt, the extended model and plots."""
     force: Force = False
     strict: Flag = False
     """Exit with 1 if the verdict is neither consistent nor explained."""
+    verbose: Flag = False
+    """With --model: print all that report.txt says."""
+    seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
+    """With --model: end after this time with the best verdict so far, as Ctrl-C does."""
     jobs: int = 2
     """Parallel processes."""
     scheduler: Scheduler = None
@@ -203,7 +205,7 @@ class Convert:
     """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
-    """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset."""
+    """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz, .mat or .parquet file, or a LeRobot dataset."""
     out: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="OUT")]
     """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a new rosbag2 folder if it has no suffix."""
     force: Force = False

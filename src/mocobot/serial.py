@@ -6,13 +6,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from discrepancy import rules
 from discrepancy.causes.tolerances_file import read_tolerances
-from discrepancy.engine.diagnose import When
-from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.diagnosis import diagnose_serial
+from discrepancy.joints.diagnosed import JointDiagnosed
+from discrepancy.joints.rolled.told import rolled_out
+from discrepancy.joints.values import NAMES
+from discrepancy.joints.verdict import judged
 from discrepancy.serial.mechanics.motion import Motion
 from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.mechanics.regressor import body_regressor
@@ -164,10 +163,8 @@ def diagnose(
     reference: GivenLogs = (),
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
-    laws: When = "auto",
-    odds: float = rules.PRIOR_ODDS,
     closed_loop: bool = True,
-    jobs: int = 1,
+    seconds: float | None = None,
     say: Callable[[str], object] = lambda _: None,
 ) -> Diagnosis:
     """Find out what a robot's model gets wrong, or what changed between two days.
@@ -179,53 +176,37 @@ def diagnose(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         tolerances: TOML file: how far a robot may be off without that being news.
         exclude: causes not to consider.
-        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or
-            a cause is not sure, ``"always"`` or ``"never"``; with a reference they are not looked for.
-        odds: of any cause being there before the data are seen, at all its places together.
         closed_loop: whether to roll the model out, without and with what is found.
-        jobs: parallel processes.
-        say: takes the name of the stage that begins.
+        seconds: after which the search ends with what it has; None for its own end.
+        say: takes a line about what is being done.
 
     Raises:
-        InputError: model, logs, map, tolerances, causes or odds that cannot be used.
+        InputError: model, logs, map, tolerances or causes that cannot be used.
     """
     robot = _model(model)
-    return public(
-        Diagnosis,
-        diagnosed(
-            robot,
-            read_logs(logs, robot, map=map),
-            read_logs(reference, robot, map=map),
-            serial_tolerances(Path(tolerances) if tolerances is not None else None),
-            tuple(exclude),
-            laws=laws,
-            odds=odds,
-            closed_loop=closed_loop,
-            jobs=jobs,
-            say=say,
-        ),
+    found = diagnosed(
+        robot,
+        read_logs(logs, robot, map=map),
+        read_logs(reference, robot, map=map),
+        serial_tolerances(Path(tolerances) if tolerances is not None else None),
+        tuple(exclude),
+        closed_loop=closed_loop,
+        seconds=seconds,
+        say=say,
     )
+    return Diagnosis(found)
 
 
 def diagnosed(
     model: SerialModel, logs: list[JointLog], reference: list[JointLog],
     tolerances: Mapping[str, Mapping[str, float]] | None, exclude: tuple[str, ...],
-    *, laws: When, odds: float, closed_loop: bool, jobs: int, say: Callable[[str], object],
-) -> Any:  # fmt: skip
-    """``diagnose_serial``, with the reference where there is one."""
-    more: dict[str, Any] = {"reference": reference} if reference else {}
-    return diagnose_serial(
-        model,
-        logs,
-        tolerances,
-        exclude,
-        laws=laws,
-        odds=odds,
-        closed_loop=closed_loop,
-        jobs=jobs,
-        say=say,
-        **more,
+    *, closed_loop: bool, seconds: float | None, say: Callable[[str], object],
+) -> JointDiagnosed:  # fmt: skip
+    """The verdict, with rollouts on request."""
+    verdict = judged(
+        model, logs, reference=reference, excluded=exclude, tolerances=tolerances, seconds=seconds, say=say
     )
+    return JointDiagnosed(verdict, rolled_out(verdict, say) if closed_loop else None)
 
 
 def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:
@@ -236,8 +217,7 @@ def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:
     """
     if path is None:
         return None
-    none = {name: dict.fromkeys(cause.parameters, 0.0) for name, cause in CAUSES.items()}
-    given = read_tolerances(path, none)
+    given = read_tolerances(path, {name: dict.fromkeys(names, 0.0) for name, names in NAMES.items()})
     return {name: values for name, values in given.items() if any(values.values())}
 
 

@@ -31,11 +31,11 @@ def output_kind(path: Path) -> OutputKind:
     return kind
 
 
-Kind = Literal["bag", "csv", "npz", "parquet", "lerobot"]
+Kind = Literal["bag", "csv", "mat", "npz", "parquet", "lerobot"]
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 FORMATS = (
-    "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a .parquet file or a LeRobot "
-    "dataset"
+    "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a MATLAB file (.mat), a "
+    ".parquet file or a LeRobot dataset"
 )
 MCAP, SQLITE, ROS1 = b"\x89MCAP0\r\n", b"SQLite format 3\x00", b"#ROSBAG"
 """First bytes of a bag's files."""
@@ -46,6 +46,7 @@ DATASET_INFO = Path("meta") / "info.json"
 PARQUET = b"PAR1"
 """First and last bytes of every Parquet file (parquet.apache.org/docs/file-format)."""
 ZIP = b"PK\x03\x04", b"PK\x05\x06"
+MATLAB = b"MATL"
 
 
 def log_kind(path: Path) -> Kind:
@@ -84,6 +85,8 @@ def log_kind(path: Path) -> Kind:
     suffix = path.suffix.lower()
     if suffix in TEXT_SUFFIXES:
         return "csv"
+    if head == MATLAB or suffix == ".mat":
+        return "mat"
     if is_bag(path):
         return "bag"
     if suffix in (".npz", ".parquet", ".mcap", ".db3"):

@@ -15,6 +15,7 @@ from mocobot_logs.map.parse import MAX_ROBOTS
 from mocobot_logs.readings import Readings
 from mocobot_logs.table.csv import CsvTable
 from mocobot_logs.table.lerobot import LeRobotTable
+from mocobot_logs.table.mat import MatTable
 from mocobot_logs.table.npz import NpzTable
 from mocobot_logs.table.parquet import ParquetTable
 from mocobot_logs.table.table import Table, TableSource
@@ -83,6 +84,8 @@ def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = No
         return CsvTable(path, options, name)
     if kind == "npz":
         return NpzTable(path, name)
+    if kind == "mat":
+        return MatTable(path, name)
     if kind == "lerobot":
         return LeRobotTable(path, name, episode)
     return ParquetTable(path, name)
@@ -94,7 +97,7 @@ def _default_map(table: Table) -> LogMap:
         return _own_map(table, table.metadata)
     names = table.shapes.keys() | table.aliases.keys()
     arrays, wrist_arrays = {"phi", "theta", "tau"} <= names, {"h", "theta", "force"} <= names
-    if isinstance(table, NpzTable) and (arrays or wrist_arrays):
+    if isinstance(table, NpzTable | MatTable) and (arrays or wrist_arrays):
         return builtin_map("mocobot-arrays" if arrays else "mocobot-arrays-wrist")
     wrist = "omnid1.h_x" in names and "omnid1.phi1" not in names
     return builtin_map("mocobot-wrist" if wrist else "mocobot")

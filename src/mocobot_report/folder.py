@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from discrepancy.joints.text import format_verdict
 from discrepancy.result.read import FORMAT as DIAGNOSIS
 from discrepancy.result.read import parse_diagnosis
 from discrepancy.result.text import format_diagnosis
@@ -203,7 +204,10 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
         raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
     parse_diagnosis(values, path)
     with complete(path, "not a complete diagnosis"):
-        format_diagnosis(values)  # touches most keys that a report has to show
+        if values.get("machine") == "joints":  # the text touches most keys that a report has to show
+            format_verdict(values, verbose=True)
+        else:
+            format_diagnosis(values)
     file = path.parent / RESIDUALS
     traces, channels = load_traces(file) if file.is_file() else ([], [])
     if traces and [trace.name for trace in traces] != list(values["recordings"]):

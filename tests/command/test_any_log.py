@@ -111,8 +111,6 @@ def test_diagnose(folder: Path, log: Path, capsys: pytest.CaptureFixture[str]) -
     assert text.splitlines()[0].startswith("my.csv: read as 3 robots")
     assert "CONSISTENT" in text
     assert sorted(path.name for path in folder.iterdir()) == before
-    message = refused(capsys, "diagnose", "--rig", "emps", "--map", "my.toml", "my.csv")
-    assert "--map is for logs of a team" in message
 
 
 @pytest.mark.parametrize("command", ["estimate", "diagnose"])

@@ -45,7 +45,7 @@ def test_every_public_name_is_documented_and_no_other() -> None:
 
 
 def test_every_public_name_is_there_and_says_what_it_is() -> None:
-    assert set(modules()) == {"bases", "emps", "guiding", "pictures", "robots", "serial", "trajectories"}
+    assert set(modules()) == {"bases", "guiding", "pictures", "robots", "serial", "trajectories"}
     for name in public():
         found: object = mocobot
         for part in name.split("."):

@@ -20,7 +20,7 @@ from log_files import write_text
 from mocobot_logs.bag.write import write_bag
 from recordings import small_recording
 
-LOGS = "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a .parquet file or a LeRobot dataset"  # noqa: E501
+LOGS = "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a MATLAB file (.mat), a .parquet file or a LeRobot dataset"  # noqa: E501
 RESULTS = "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of `mocobot calibrate --out`, campaign.json of `mocobot campaign --out`, or JSON files of `mocobot estimate --out`"  # noqa: E501
 FORCE = "exists; give --force to replace it, or name another file"
 INSIDE = "cannot be written (.../rec.parquet is a file)"
@@ -121,12 +121,9 @@ OPTIONS = {
     "diagnose rec.parquet --exclude ghost": "cause 'ghost' does not exist; the causes are phi_zero, theta_zero, ...",
     "diagnose rec.parquet rec.parquet": "rec.parquet is given twice, and would count twice",
     "diagnose rec.parquet --jobs 0": "jobs is 0; it must be at least 1",
-    "diagnose rec.parquet --rig car": "--rig is 'car'; it must be one of team, emps",
+    "diagnose rec.parquet --laws rarely": "--laws is 'rarely'; it must be one of auto, always, never",
     "diagnose rec.parquet --tolerances none.toml":
         "none.toml: not a readable file of tolerances (No such file or directory)",
-    "diagnose --rig emps rec.parquet": "rec.parquet: is not a MATLAB file that can be read",
-    "diagnose --rig emps data.mat other.mat":
-        "2 recordings are given; the emps rig takes one and cuts it into blocks that validate each other",
     "convert log.csv new.parquet --rate fast": "--rate is 'fast'; it must be a number",
     "convert log.csv new.parquet --rate 1000":
         "log.csv: robot 1: samples come 0.01 s apart, at 100 Hz; for a recording of 1000 Hz 250 to 20000 Hz are "
@@ -330,7 +327,7 @@ LINES = {
     **{f"inspect {file} --json new.json": sentence for file, sentence in INSPECTED.items()},
     **{f"replay {file} --save new.rrd": sentence for file, sentence in LOGS_ONLY.items()},
     "report log.csv --out new.html": LOGS_ONLY["log.csv"],
-    "diagnose data.mat": "data.mat: is a MAT file; --rig emps reads those of the EMPS benchmark",
+    "diagnose data.mat": "data.mat: is not a MATLAB file of level 5, or a damaged one; save it with -v7",
 }
 
 

@@ -56,7 +56,7 @@ def test_a_pipe_or_a_device_is_no_input(
     write_recording(small_recording(rows=150), tmp_path / "rec.parquet")
     for words in (
         ("estimate", "rec.parquet", "--config", pipe),
-        ("diagnose", pipe, "--rig", "emps"),
+        ("diagnose", pipe),
         ("compare", pipe, pipe),
         ("inspect", "/dev/zero"),
         ("simulate", "--payload", pipe.rename(tmp_path / "pipe.xml"), "--out", tmp_path / "out.parquet"),

@@ -102,9 +102,6 @@ REFUSED = {
     "log as its reference": (
         ["diagnose", "{log}", "--reference", "{log}", "--model", "{model}"], "is given twice", []
     ),
-    "another rig": (
-        ["diagnose", "{log}", "--model", "{model}", "--rig", "emps"], "--model and --rig emps are both given", []
-    ),
     "reference without model": (["diagnose", "{log}", "--reference", "{log}"], "--reference goes with --model", []),
     "unknown cause": (
         ["diagnose", "{log}", "--model", "{model}", "--exclude", "sorcery"], "cause 'sorcery' does not exist", []

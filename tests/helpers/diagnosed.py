@@ -26,16 +26,16 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain",
         "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes", "places", "prior_odds",
-        "rollouts", "foretold",
+        "rollouts", "foretold", "machine", "finished",
     }  # fmt: skip
-    assert (values["format"], values["version"]) == ("mocobot-diagnosis", 2)
+    assert (values["format"], values["version"]) == ("mocobot-diagnosis", 3)
     assert values["verdict"] in VERDICTS
     if values["verdict"] != "unexplained":
         assert bool(values["causes"]) == (values["verdict"] in ("explained", "partly_explained"))
     for cause in values["causes"]:
         assert set(cause) == PLACE | {
             "sentence", "parameters", "explained", "probability", "over_nothing", "share_left", "instead", "folds",
-            "shape", "separate", "alternatives", "law",
+            "shape", "separate", "alternatives", "law", "members",
         }  # fmt: skip
         _check_place(cause)
         assert (cause["law"] is not None) == (cause["cause"] == "law")
@@ -196,6 +196,7 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "shape": {},
         "separate": "A known weight separates them.",
         "law": None,
+        "members": [],
         "alternatives": [
             {
                 **rival,
@@ -217,7 +218,9 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
     trial = {"before": before, "after": after}
     values = {
         "format": "mocobot-diagnosis",
-        "version": 2,
+        "version": 3,
+        "machine": "team",
+        "finished": True,
         "recordings": ["one", "two"],
         "verdict": verdict,
         "causes": [cause] if "explained" in verdict and verdict != "unexplained" else [],

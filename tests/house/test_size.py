@@ -26,7 +26,6 @@ MOST_LINES = 700
 MOST_ARGUMENTS = 7
 """Arguments of one function, without ``self`` and ``cls``."""
 LONG_CALLS = {
-    "discrepancy.emps.diagnosis.diagnose_emps": 9,
     "discrepancy.engine.diagnose.diagnose": 9,
     "discrepancy.inference.offer.propose.proposals": 8,
     "discrepancy.serial.diagnosis.diagnose_serial": 10,
@@ -47,7 +46,6 @@ LONG_CALLS = {
     "mocobot.api.simulation._simulated": 14,
     "mocobot.api.simulation.simulate": 14,
     "mocobot.api.simulation.simulate_trials": 13,
-    "mocobot.emps.diagnose": 8,
     "mocobot.serial.diagnose": 11,
     "mocobot.serial.diagnosed": 10,
     "mocobot_logs.convert.convert": 8,

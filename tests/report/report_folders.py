@@ -114,17 +114,17 @@ def estimate_folder(folder: Path, label: str | None = NASTY) -> Path:
     return folder
 
 
-def channels(axis: bool = False) -> list[Channel]:
-    """Of a team of two, or of the EMPS axis."""
-    if axis:
-        return [Channel("force", "axis", None, "N"), Channel("voltage", "loop", None, "V")]
+def channels(robot: bool = False) -> list[Channel]:
+    """Of a team of two, or of a robot with one slide."""
+    if robot:
+        return [Channel("slide force", "joint 1", None, "N")]
     names = (("grasp 2 rotation", "rad"), ("grasp 2 position", "m"), ("force", "N"), ("moment", "N m"))
     return [Channel(f"{name} {a}", "kinematic", None, unit) for name, unit in names for a in "xyz"]
 
 
-def trace(name: str, axis: bool = False, holds: int = 3, seed: int = 0) -> Trace:
+def trace(name: str, robot: bool = False, holds: int = 3, seed: int = 0) -> Trace:
     """White noise after, ten times as much before, with a pause, and a few holds at the end."""
-    rng, count = np.random.default_rng(seed), len(channels(axis))
+    rng, count = np.random.default_rng(seed), len(channels(robot))
     time = np.arange(ROWS) / RATE_HZ + np.where(np.arange(ROWS) >= ROWS // 2, 4.0, 0.0)
     time = np.concatenate([time, time[-1] + 5.0 * np.arange(1, holds + 1)])
     white = rng.standard_normal((len(time), count))
@@ -135,7 +135,7 @@ def trace(name: str, axis: bool = False, holds: int = 3, seed: int = 0) -> Trace
     )
 
 
-def diagnosis_folder(folder: Path, verdict: str = "explained", axis: bool = False) -> Path:
+def diagnosis_folder(folder: Path, verdict: str = "explained", robot: bool = False) -> Path:
     """A diagnosis of two trials with residuals and an extended model's file."""
     folder.mkdir()
     values = small_diagnosis(verdict)
@@ -148,21 +148,21 @@ def diagnosis_folder(folder: Path, verdict: str = "explained", axis: bool = Fals
         size = 1.1 if part is values["residual"] else 90.0
         part["signature"] = {
             "chi2_per_n": size, "sentence": "chi2/n is 1.", "kind": {},
-            "channel": {c.name: size for c in channels(axis)}, "trial": dict.fromkeys(names, size),
+            "channel": {c.name: size for c in channels(robot)}, "trial": dict.fromkeys(names, size),
             "along": {"robot 2's torque channel 1": 0.9, NASTY: 0.05},
         }  # fmt: skip
-    if axis:
+    if robot:
         values["gain"] = None
         values["not_simulated"] = "the closed loop was left out on request"
     values["provenance"] = provenance(
-        "diagnose", {"rig": "emps" if axis else "team", "closed_loop": not axis}
+        "diagnose", {"model": "slide.xml" if robot else None, "closed_loop": not robot}
     )
     values["provenance"]["files"] = [
         {"name": "one.parquet", "path": "data/one.parquet", "bytes": 3, "sha256": "0" * 64}
     ]
     _write(folder / "diagnosis.json", values)
     save_traces(
-        [trace(n, axis, seed=k) for k, n in enumerate(names)], channels(axis), folder / "residuals.npz"
+        [trace(n, robot, seed=k) for k, n in enumerate(names)], channels(robot), folder / "residuals.npz"
     )
     (folder / "extended").mkdir()
     (folder / "extended" / "team.xml").write_text("<mujoco/>")

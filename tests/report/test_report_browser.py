@@ -18,7 +18,7 @@ MAKE: dict[str, Callable[[Path], Path]] = {
     "estimate": estimate_folder,
     "diagnosis": diagnosis_folder,
     "calibration": calibration_folder,
-    "axis": lambda folder: diagnosis_folder(folder, "consistent", axis=True),
+    "robot": lambda folder: diagnosis_folder(folder, "consistent", robot=True),
 }
 CONTRAST = """() => {
   const channel = (v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;

@@ -32,7 +32,7 @@ def no_renderer(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_page_is_written_replaced_and_says_why_there_are_no_pictures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = diagnosis_folder(tmp_path / "axis", axis=True)
+    folder = estimate_folder(tmp_path / "estimate")
     code, out, err = run(capsys, folder)
     page = folder / "report.html"
     assert (code, err) == (0, "")
@@ -50,7 +50,7 @@ def test_page_is_written_replaced_and_says_why_there_are_no_pictures(
     other = tmp_path / "for you.html"
     assert run(capsys, folder, "--out", other)[0] == 0
     assert other.read_bytes() == before
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["axis", "for you.html"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["estimate", "for you.html"]
 
 
 def test_folder_without_a_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,7 +108,7 @@ BROKEN = [
     (estimate_folder, edited("est.json", without("mass")), ("est.json", "not a complete estimate")),
     (diagnosis_folder, cut(DIAGNOSIS), (DIAGNOSIS, "not valid JSON")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"version": 1}),
-     ("version 1", "reads version 2")),
+     ("version 1", "reads versions 2 and 3")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"format": "x"}),
      ("not a diagnosis", "mocobot-diagnosis")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"verdict": "guilty"}),

@@ -88,17 +88,16 @@ def test_parameters_carry_their_units() -> None:
 
 
 def test_every_parameter_of_the_catalogues_has_a_unit() -> None:
-    from discrepancy.emps.causes import CAUSES as AXIS
     from discrepancy.team.causes import CAUSES as TEAM
 
-    names = {name for cause in [*TEAM.values(), *AXIS.values()] for name in cause.parameters}
+    names = {name for cause in TEAM.values() for name in cause.parameters}
     assert len(names) > 25
     assert {name for name in names if not parameter(name)[1]} == {"scale"}
 
 
 def test_trials_have_short_and_distinct_names() -> None:
-    given_names = ["/a/b/trial1.parquet", "c\\trial1.parquet", "trial1", ".parquet", "EMPS 0.2-6 s"]
-    assert short_names(given_names) == ["trial1", "trial1 (2)", "trial1 (3)", "trial", "EMPS 0.2-6 s"]
+    given_names = ["/a/b/trial1.parquet", "c\\trial1.parquet", "trial1", ".parquet", "arm 0.2-6 s"]
+    assert short_names(given_names) == ["trial1", "trial1 (2)", "trial1 (3)", "trial", "arm 0.2-6 s"]
 
 
 @settings(deadline=None)

@@ -102,7 +102,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, no_pictures: pytest.Monkey
         "paper": paper_folder(root / "paper"),
         "estimate": estimate_folder(root / "estimate"),
         "diagnosis": diagnosis_folder(root / "diagnosis"),
-        "axis": diagnosis_folder(root / "axis", "consistent", axis=True),
+        "robot": diagnosis_folder(root / "robot", "consistent", robot=True),
         "calibration": calibration_folder(root / "calibration"),
     }
     for folder in made.values():
@@ -385,7 +385,7 @@ def test_options_are_shown_as_they_were_given(pages: dict[str, Reader]) -> None:
     """0 is a number, and no "no"."""
     assert "option seed 0" in pages["paper"].rows()
     assert "option closed_loop yes" in pages["diagnosis"].rows()
-    assert "option closed_loop no" in pages["axis"].rows()
+    assert "option closed_loop no" in pages["robot"].rows()
 
 
 def test_causes_are_read_in_words(pages: dict[str, Reader]) -> None:

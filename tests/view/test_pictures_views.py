@@ -26,13 +26,12 @@ from mocobot_view.pictures.render import Shot, render_shots
 from mocobot_view.pictures.shots import (
     FOVY,
     MeasuredTeam,
-    axis_shot,
     diagnosis_shot,
     estimate_shot,
     measured_team,
     team_shot,
 )
-from mocobot_view.pictures.views import diagnosis_view, emps_view, estimate_view, team_view
+from mocobot_view.pictures.views import diagnosis_view, estimate_view, team_view
 from rendering import made
 from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate
 
@@ -197,7 +196,6 @@ def test_everything_is_in_the_picture(placed_a: Placed) -> None:
     for shot in (
         *(team_shot(payload, ASPECT) for payload in "abcd"),
         estimate_shot(placed_a.recording(payload="a"), whole_estimate(placed_a), truth_of(placed_a)),
-        axis_shot(ASPECT),
     ):
         data = mujoco.MjData(shot.model)
         data.qpos[:] = shot.qpos
@@ -220,14 +218,14 @@ def test_pictures_show_it_all_and_are_made_in_one_process(
 ) -> None:
     recording, estimate = placed_a.recording(payload=None), whole_estimate(placed_a)
     shots = [
-        team_shot("a"), estimate_shot(recording, estimate), diagnosis_shot(recording, estimate, [FRICTION]), axis_shot()
+        team_shot("a"), estimate_shot(recording, estimate), diagnosis_shot(recording, estimate, [FRICTION])
     ]  # fmt: skip
     calls = []
     run = subprocess.run
     monkeypatch.setattr(render_module.subprocess, "run", lambda *a, **k: (calls.append(a), run(*a, **k))[1])
-    team, estimated, diagnosed, axis = pictures_or_skip(shots)
+    team, estimated, diagnosed = pictures_or_skip(shots)
     assert len(calls) == 1
-    for picture in (team, estimated, diagnosed, axis):
+    for picture in (team, estimated, diagnosed):
         assert picture.shape == (HEIGHT, WIDTH, 3)
         assert picture.std() > 20.0
         assert picture.min() < 60
@@ -270,7 +268,6 @@ def test_views_are_pictures_or_one_sentence(placed_a: Placed, monkeypatch: pytes
             team_view("b", 160, 100),
             estimate_view(recording, estimate, 160, 100, truth=truth_of(placed_a), time_s=1.0),
             diagnosis_view(recording, estimate, [FRICTION], 160, 100),
-            emps_view(160, 100),
         ]
 
     for view in views():

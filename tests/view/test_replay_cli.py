@@ -243,7 +243,7 @@ def test_bad_truth(
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (put("emps", "format"), "not a diagnosis"),
+        (put("estimate", "format"), "not a diagnosis"),
         (
             put("maybe", "verdict"),
             "verdict is 'maybe'; it must be one of consistent, miscalibrated, explained",

@@ -1,4 +1,4 @@
-"""Names of a tree's causes, each that of its file in ``discrepancy.serial.causes``."""
+"""Names of the causes of a robot of joints, as the tables of ``discrepancy.joints.causes`` have them."""
 
 NAMES = (
     "friction",
@@ -19,7 +19,6 @@ NAMES = (
     "spring",
     "counterbalance",
     "elasticity",
-    "backlash",
     "payload",
     "link_mass",
     "link_com",

@@ -79,7 +79,7 @@ class Cells:
     bands: Bands
     channels: list[Channel]
     count: int = 0
-    _order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     @classmethod
     def of(cls, bands: Bands, residual: Sequence[Array]) -> Cells:
@@ -108,7 +108,7 @@ class Cells:
         seen: dict[int, list[tuple[int, Array]]] = {}
         for k, one in enumerate(series):
             for c, x in one.items():
-                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x)[self._order]))
+                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x)[self.order]))
         for c, found in seen.items():
             self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
         self.count += len(series)
@@ -142,7 +142,7 @@ class Cells:
         for channel, own in zip(self.channels, variance, strict=True):
             left = channel.y - channel.X @ x[channel.columns]
             rows = np.empty_like(left)
-            rows[self._order] = left / np.repeat(own, np.diff(channel.starts))
+            rows[self.order] = left / np.repeat(own, np.diff(channel.starts))
             spectra.append(rows)
         out, first = [], 0
         for t, length in enumerate(self.bands.lengths):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -128,6 +129,11 @@ class Posterior:
         G, b, _ = self._weighted
         U = solve_triangular(L, s[:, None] * G[self.active], lower=True, check_finite=False)
         return G - U.T @ U, b - U.T @ z
+
+    def errors_of(self, columns: Sequence[int]) -> Array:
+        """Standard errors of columns that have no prior of their own, each beside everything else, shape (k,)."""
+        R, _ = self._conditional
+        return 1.0 / np.sqrt(np.maximum(np.diag(R)[list(columns)], 1e-30))
 
     def gain(self, group: Group, octaves: int) -> tuple[float, float]:
         """Log evidence that more variance of a group's columns adds, averaged over scales, and the best scale.

@@ -42,6 +42,11 @@ class Linear(Protocol):
         ...
 
     @property
+    def sensors(self) -> Array | None:
+        """Variances of the sensors' noise, shape (C, bands), or None where it is not known."""
+        ...
+
+    @property
     def families(self) -> Sequence[Sequence[int]]:
         """Columns of random effects whose common spread is learnt."""
         ...
@@ -92,12 +97,16 @@ class Search:
         floor: of the noise, shape (C, bands).
         settings: numbers.
         say: takes a line about each step.
+        stop: whether to end with what there is.
+        best: the last set that was taken, for whoever breaks a search off.
     """
 
     problem: Linear
     floor: Array
     settings: Settings = SETTINGS
     say: Callable[[str], object] = lambda _: None
+    stop: Callable[[], bool] = lambda: False
+    best: State | None = None
     against: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -162,7 +171,9 @@ class Search:
     def run(self, state: State) -> State:
         """The likeliest set from another on."""
         state = self._pruned(self._settled(state), fresh=False)
-        while len(state.chosen) < self.settings.most_causes:
+        while len(state.chosen) < self.settings.most_causes and not self.stop():
+            self.best = state
+            self.say(f"{len(state.chosen)} found, looking for more")
             grown = self._grown(state) or self._exchanged(state)
             if grown is None:
                 break
@@ -294,13 +305,18 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
     """
     cells = problem.cells
     power = np.array([c.squares for c in cells.channels]) / cells.rows
-    # From below: noise that explains everything is a solution, too.
-    start = np.broadcast_to(power.min(axis=1, keepdims=True), power.shape)
-    p = Posterior(cells, slabs, start)
-    for _ in range(
-        settings.floor_steps
-    ):  # expectation and maximisation: MacKay's step is not safe with more columns than rows
+    least = problem.sensors
+    if least is None:
+        least = np.broadcast_to(settings.least_floor * power.min(axis=1, keepdims=True), power.shape)
+    # From below: noise that explains everything is a solution, too. Expectation and maximisation: MacKay's step is not
+    # safe with more columns than rows.
+    p = Posterior(cells, slabs, least)
+    for _ in range(settings.floor_steps):
         left, fitted = cells.left(p.mean, p.covariance)
-        p = Posterior(cells, slabs, np.maximum((left + fitted) / cells.rows, settings.least_floor * start))
+        better = np.maximum((left + fitted) / cells.rows, least)
+        settled = np.all(np.abs(np.log(better / p.variance)) < settings.floor_change)
+        p = Posterior(cells, slabs, better)
+        if settled:
+            break
     log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
     return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])

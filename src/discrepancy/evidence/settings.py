@@ -22,12 +22,14 @@ class Settings:
         settle_steps: times that is repeated at most for a set that is taken.
         start_steps: the same where nothing was learnt before.
         floor_steps: the same for the noise that the whole dictionary leaves.
+        floor_change: relative change of its variances below which that has settled.
         rounds: times the problem is made linear again.
         event_steps: times the instants of an event are moved.
         open_nats: log odds of a listed cause over something unlisted at its place, before the data are seen.
         within_nats: linear gain below the best beyond which a rival is not weighed (15: 3e-7 of its odds).
         most_rivals: rivals that are weighed exactly.
-        least_floor: least noise variance over that of the quietest band, in which there is noise at least.
+        clean_chi2: squares left over the floor's variance, per row, up to which nothing is left to explain.
+        least_floor: least noise variance over the power of the quietest band, where the sensors' noise is not known.
     """
 
     floor_rows: float = 20.0
@@ -41,12 +43,14 @@ class Settings:
     noise_steps: int = 2
     settle_steps: int = 8
     start_steps: int = 8
-    floor_steps: int = 15
+    floor_steps: int = 40
+    floor_change: float = 0.05
     rounds: int = 3
     event_steps: int = 4
     open_nats: float = 1.0
     within_nats: float = 15.0
     most_rivals: int = 8
+    clean_chi2: float = 1.5
     least_floor: float = 0.1
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from discrepancy.joints.said import Said
 from estimator.arrays import Array
 
 Shape = Mapping[str, float]
@@ -74,6 +75,8 @@ class JointCause:
         positive: parameters that, with the model's own, cannot be negative.
         kind: whether all joints may have it alike: a cause of the robot.
         rubs: whether friction at rest has the first parameter in it.
+        sentence: what it does, with its numbers and place; None for a list of the numbers.
+        separate: the experiment that parts it from what looks like it.
     """
 
     name: str
@@ -85,6 +88,19 @@ class JointCause:
     positive: tuple[str, ...] = ()
     kind: bool = False
     rubs: bool = False
+    sentence: Callable[[Said], str] | None = None
+    separate: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class OtherCause:
+    """One cause that is more than columns of one joint; attributes as of ``JointCause``."""
+
+    name: str
+    title: str
+    parameters: tuple[str, ...]
+    sentence: Callable[[Said], str]
+    separate: str
 
 
 def _faded(s: JointSignals, h: Shape) -> Array:
@@ -96,6 +112,26 @@ def _scaled(s: JointSignals, h: Shape) -> Array:
     return s.asked * (1.0 + h["bend"] * (np.abs(s.asked) / typical - 1.0))
 
 
+def _bent(n: Said) -> str:
+    if not n.value("bend"):
+        return ""
+    more = "more" if n.value("bend") > 0.0 else "less"
+    load, share = n.also(" of {}", "typical_load_Nm", "N m"), 100.0 * abs(n.value("bend"))
+    return f", and at twice its typical load{load} {share:.2g} % of that {more}"
+
+
+def _neutral(n: Said) -> str:
+    at = n.value("middle_rad") - n.value("offset_Nm") / (n.value(STIFFNESS) or 1.0)
+    return f"{at:.3g} {'m' if n.slide else 'rad'}"
+
+
+def _again(n: Said) -> str:
+    turns = n.value("turns")
+    return f"every {2.0 * np.pi / turns:.3g} m" if n.slide and turns else f"{turns:.4g} times in a turn"
+
+
+VISCOUS, ASYMMETRY = "viscous_Nms_per_rad", "asymmetry_Nms_per_rad"
+WARM, STIFFNESS = "more_Nms_per_rad", "stiffness_Nm_per_rad"
 SHARES = ({"share": 0.1}, {"share": 0.3}, {"share": 1.0})
 SPEEDS = ({"share": 0.05}, {"share": 0.1}, {"share": 0.2})
 CAUSES = (
@@ -103,62 +139,222 @@ CAUSES = (
         "friction", "friction in {joint}", ("coulomb_Nm", "viscous_Nms_per_rad"),
         lambda s, h: (s.direction, s.v), lambda z, h: (z.torque, z.torque / z.speed),
         positive=("coulomb_Nm", "viscous_Nms_per_rad"), kind=True, rubs=True,
+        sentence=lambda n: (
+            f"{n.place} rubs with {n('coulomb_Nm', 'N m')} {n.either('coulomb_Nm', 'more', 'less')} {n.than} (Coulomb) "
+            f"and {n(VISCOUS, 'N m s/rad')} {n.either(VISCOUS, 'more', 'less')} (viscous)"
+        ),
+        separate="Move at several steady speeds in either direction.",
     ),
     JointCause(
         "torque_offset", "offset of the torque of {joint}", ("offset_Nm",),
         lambda s, h: (np.ones_like(s.q),), lambda z, h: (z.torque,), kind=True,
+        sentence=lambda n: (
+            f"the torque of {n.place} reads {n('offset_Nm', 'N m')} {n.either('offset_Nm', 'too much', 'too little')}"
+        ),
+        separate="Read the torque without power.",
     ),
     JointCause(
         "armature", "rotor inertia of {joint}", ("armature_kgm2",),
         lambda s, h: (s.a,), lambda z, h: (z.torque / z.acceleration,), positive=("armature_kgm2",), kind=True,
+        sentence=lambda n: (
+            f"the rotor of {n.place} adds {n('armature_kgm2', 'kg m^2')} "
+            f"{n.either('armature_kgm2', 'more', 'less')} {n.than}"
+        ),
+        separate="Move this joint alone, fast and a short way, in a pose where gravity does not load it.",
     ),
     JointCause(
         "torque_scale", "scale of the torque of {joint}", ("scale",),
         lambda s, h: (_scaled(s, h),), lambda z, h: (0.5,), ({"bend": 0.0}, {"bend": -0.1}, {"bend": 0.1}), kind=True,
+        sentence=lambda n: (
+            f"the torque of {n.place} reads {n('scale', '%', 100.0)} {n.either('scale', 'too much', 'too little')}"
+            + _bent(n)
+        ),
+        separate="Put a known weight on the arm.",
     ),
     JointCause(
         "torque_delay", "delay of the torque of {joint}", ("delay_s",),
         lambda s, h: (-np.gradient(s.torque, s.step_s),), lambda z, h: (0.02,), kind=True,
+        sentence=lambda n: (
+            f"the torque of {n.place} comes {n('delay_s', 'ms', 1e3)} {n.either('delay_s', 'late', 'early')}"
+        ),
+        separate="Clamp the joint and step its torque.",
     ),
     JointCause(
         "stribeck", "Stribeck friction in {joint}", ("excess_Nm",),
         lambda s, h: (s.direction * np.exp(-np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
         SPEEDS, rubs=True,
+        sentence=lambda n: (
+            f"near standstill {n.place} rubs with {n('excess_Nm', 'N m')} {n.either('excess_Nm', 'more', 'less')} "
+            f"than in fast motion{n.also(', fading over {}', 'fade_rad_per_s', 'rad/s')}"
+        ),
+        separate="Move steadily at low speeds.",
     ),
     JointCause(
         "asymmetric_coulomb", "Coulomb friction in {joint} that differs by direction", ("asymmetry_Nm",),
         lambda s, h: (np.abs(s.direction),), lambda z, h: (z.torque,),
+        sentence=lambda n: (
+            f"dry friction of {n.place} is {n('asymmetry_Nm', 'N m')} "
+            f"{n.either('asymmetry_Nm', 'larger', 'smaller')} forwards and as much "
+            f"{n.either('asymmetry_Nm', 'smaller', 'larger')} backwards"
+        ),
+        separate="From rest, raise the torque slowly in either direction until the joint breaks loose.",
     ),
     JointCause(
         "asymmetric_viscous", "viscous friction in {joint} that differs by direction", ("asymmetry_Nms_per_rad",),
         lambda s, h: (np.abs(s.v),), lambda z, h: (z.torque / z.speed,),
+        sentence=lambda n: (
+            f"viscous friction of {n.place} is {n(ASYMMETRY, 'N m s/rad')} {n.either(ASYMMETRY, 'larger', 'smaller')} "
+            f"forwards and as much {n.either(ASYMMETRY, 'smaller', 'larger')} backwards"
+        ),
+        separate="Move at several steady speeds in either direction.",
     ),
     JointCause(
         "sublinear_friction", "sublinear friction in {joint}", ("bend_Nm",),
         lambda s, h: (s.direction * np.log1p(np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
         SHARES,
+        sentence=lambda n: (
+            f"friction of {n.place} {n.either('bend_Nm', 'grows', 'falls')} by {n('bend_Nm', 'N m')} times the "
+            f"logarithm of 1 + speed{n.also(' over {}', 'thins_rad_per_s', 'rad/s')}"
+        ),
+        separate="Move at several steady speeds: friction over speed bends.",
     ),
     JointCause(
         "load_friction", "friction by load in {joint}", ("share",),
         lambda s, h: (s.direction * np.abs(s.load),), lambda z, h: (0.3,),
+        sentence=lambda n: (
+            f"friction of {n.place} {n.either('share', 'grows', 'falls')} by {n('share', '%', 100.0)} of its load"
+        ),
+        separate="Repeat one steady motion under several loads.",
     ),
     JointCause(
         "warming", "fading friction in {joint}", ("more_Nm", "more_Nms_per_rad"),
         lambda s, h: (s.direction * _faded(s, h), s.v * _faded(s, h)), lambda z, h: (z.torque, z.torque / z.speed),
         SHARES, rubs=True,
+        sentence=lambda n: (
+            f"when a log begins {n.place} rubs with {n('more_Nm', 'N m')} {n.either('more_Nm', 'more', 'less')} "
+            f"(Coulomb) and {n(WARM, 'N m s/rad')} {n.either(WARM, 'more', 'less')} (viscous) than later"
+            f"{n.also(', fading over {}', 'over_s', 's')}"
+        ),
+        separate="Repeat the same motion until the joint is warm.",
     ),
     JointCause(
         "spring", "spring at {joint}", ("stiffness_Nm_per_rad", "offset_Nm"),
         lambda s, h: (s.q - s.span.middle, np.ones_like(s.q)), lambda z, h: (2.0 * z.torque / z.travel, z.torque),
+        sentence=lambda n: (
+            f"a spring of {n(STIFFNESS, 'N m/rad')} {n.either(STIFFNESS, 'pulls', 'pushes')} {n.place} "
+            f"{n.either(STIFFNESS, 'back to', 'away from')} {_neutral(n)}"
+        ),
+        separate="Move slowly over the whole range.",
     ),
     JointCause(
         "counterbalance", "counterbalance of {joint}", ("cosine_Nm", "sine_Nm"),
         lambda s, h: (np.cos(s.q), np.sin(s.q)), lambda z, h: (z.torque, z.torque),
+        sentence=lambda n: (
+            f"a torque on {n.place} goes with its angle, {n('cosine_Nm', 'N m', signed=True)} (cosine) and "
+            f"{n('sine_Nm', 'N m', signed=True)} (sine)"
+        ),
+        separate="Move slowly over the whole range.",
     ),
     JointCause(
         "ripple", "torque ripple in {joint}", ("cosine_Nm", "sine_Nm"),
         lambda s, h: (np.cos(h["turns"] * s.q), np.sin(h["turns"] * s.q)), lambda z, h: (z.torque, z.torque),
         ({"turns": 2.0}, {"turns": 3.0}, {"turns": 4.0}, {"turns": 6.0}),
+        sentence=lambda n: (
+            f"a torque in {n.place} repeats {_again(n)}, with {n('cosine_Nm', 'N m', signed=True)} (cosine) and "
+            f"{n('sine_Nm', 'N m', signed=True)} (sine)"
+        ),
+        separate="Pass the same way at several speeds: what depends on the place stays there.",
     ),
 )  # fmt: skip
 """At one joint."""
+AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
+POINT = ("x_m", "y_m", "z_m")
+OTHERS = (
+    OtherCause(
+        "joint_zero", "zero of {joint}", ("zero_rad",),
+        lambda n: (
+            f"{n.place} stands {n('zero_rad', 'mrad', 1e3)} {n.either('zero_rad', 'farther', 'less far')} than it reads"
+        ),
+        "Compare with a mark, or an inclinometer on the link.",
+    ),
+    OtherCause(
+        "link_length", "seat of {joint} on the link before it", POINT,
+        lambda n: f"{n.place} sits off by {n.point('mm', 1e3)} on the link before it",
+        "Measure it with a gauge.",
+    ),
+    OtherCause(
+        "coupled_drive", "coupled drive of {pair}", ("coulomb_Nm", VISCOUS, "armature_kgm2"),
+        lambda n: (
+            f"a motor turns with the {'difference' if n.value('ratio') < 0.0 else 'sum'} of {n.place}: it rubs with "
+            f"{n('coulomb_Nm', 'N m', signed=True)} (Coulomb) and {n(VISCOUS, 'N m s/rad', signed=True)} (viscous), "
+            f"and its rotor adds {n('armature_kgm2', 'kg m^2', signed=True)}"
+        ),
+        "Move one of the two joints alone.",
+    ),
+    OtherCause(
+        "elasticity", "elasticity of {joint}", ("compliance_rad_per_Nm",),
+        lambda n: f"{n.place} yields by {n('compliance_rad_per_Nm', 'mrad per N m', 1e3)} behind its encoder",
+        "Hold the motor, load the link with a known torque, and read a dial gauge.",
+    ),
+    OtherCause(
+        "back_emf", "back-EMF in {joint}", ("braking_Nms_per_rad",),
+        lambda n: (
+            f"the motor of {n.place} loses {n('braking_Nms_per_rad', 'N m s/rad')} to its speed while its drive is on"
+        ),
+        "Repeat the motion with the drive off, such as a fall.",
+    ),
+    OtherCause(
+        "gravity_direction", "tilt of the base", ("tilt_1_rad", "tilt_2_rad"),
+        lambda n: (
+            f"the base is tilted by {n('tilt_1_rad', 'mrad', 1e3, signed=True)} and "
+            f"{n('tilt_2_rad', 'mrad', 1e3, signed=True)} about the two horizontal axes"
+        ),
+        "Put a level on the base.",
+    ),
+    OtherCause(
+        "gravity_compensation", "missing gravity compensation", ("share",),
+        lambda n: f"{n('share', '%', 100.0, signed=True)} of gravity's torque is missing in the log",
+        "Read the torques at rest in several poses.",
+    ),
+    OtherCause(
+        "link_mass", "mass of {link}", ("excess_kg",),
+        lambda n: f"{n.place} has {n('excess_kg', 'kg')} {n.either('excess_kg', 'more', 'less')} {n.than}",
+        "Weigh the link; or use a known weight, if torques may be off in scale.",
+    ),
+    OtherCause(
+        "link_com", "centre of mass of {link}", POINT,
+        lambda n: f"the centre of mass of {n.place} is off by {n.point('mm', 1e3)}",
+        "Balance the link on an edge.",
+    ),
+    OtherCause(
+        "link_inertia", "inertia of {link}", ("share",),
+        lambda n: (
+            f"the inertia of {n.place} is {n('share', '%', 100.0)} {n.either('share', 'larger', 'smaller')} {n.than}"
+        ),
+        "Swing the link as a pendulum.",
+    ),
+    OtherCause(
+        "payload", "payload at {link}", ("mass_kg", *POINT, *(f"inertia_{axes}_kgm2" for axes in AXES)),
+        lambda n: (
+            f"{n.place} carries {n('mass_kg', 'kg')} {n.either('mass_kg', 'more', 'less')} {n.than}, centred at "
+            f"{n.point('mm', 1e3)} of its frame"
+        ),
+        "Repeat the motion without it.",
+    ),
+    OtherCause(
+        "push", "push on the last link", ("x_N", "y_N", "z_N"),
+        lambda n: (
+            f"something pushed the last link with {n.point('N', 1.0)}{n.also(' from {} on', 'start_s', 's')}"
+            f"{n.also(' for {}', 'duration_s', 's')}"
+        ),
+        "Repeat the motion: a push does not repeat.",
+    ),
+    OtherCause(
+        "unlisted", "something unlisted at {joint}", (),
+        lambda n: f"something that no table lists acts at {n.place}",
+        "Move this joint alone, at several speeds, in several poses and under several loads.",
+    ),
+)  # fmt: skip
+"""At a link, at two joints or on the whole robot, and what no table lists."""
+WORDS: dict[str, JointCause | OtherCause] = {cause.name: cause for cause in (*CAUSES, *OTHERS)}
+"""Every cause by its name."""

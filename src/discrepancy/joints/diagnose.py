@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
-from discrepancy.joints.problem import JointProblem, joint_problem, smoothed
+from discrepancy.joints.problem import Given, JointProblem, joint_problem
+from discrepancy.joints.trials import Trials, trials_of
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
@@ -31,16 +35,46 @@ class Outcome:
         problem: linear around what was found.
         search: on it.
         state: the likeliest set.
+        nothing: the search on the problem that is linear around the model as it is; None: this one is.
+        finished: whether the search came to its end.
     """
 
     problem: JointProblem
     search: Search
     state: State
+    nothing: Search | None = None
+    finished: bool = True
+
+
+@dataclass
+class Until:
+    """When a search ends with what it has: after some time, or when the user breaks it off.
+
+    Attributes:
+        end_s: on the monotonic clock [s].
+        broken: whether it has been broken off.
+    """
+
+    end_s: float = math.inf
+    broken: bool = False
+
+    def __call__(self) -> bool:
+        """Whether to end."""
+        self.broken = self.broken or time.monotonic() > self.end_s
+        return self.broken
+
+    def run(self, search: Search, state: State) -> State:
+        """The likeliest set; the best so far where it is broken off."""
+        try:
+            return search.run(state)
+        except KeyboardInterrupt:
+            self.broken = True
+            return search.best or state
 
 
 def diagnose(
-    model: SerialModel, logs: Sequence[JointLog], settings: Settings = SETTINGS,
-    say: Callable[[str], object] = lambda _: None,
+    model: SerialModel, logs: Sequence[JointLog] | Trials, settings: Settings = SETTINGS,
+    say: Callable[[str], object] = lambda _: None, given: Given | None = None, until: Until | None = None,
 ) -> Outcome:  # fmt: skip
     """The likeliest causes of what a model leaves of its robot's torques.
 
@@ -49,29 +83,37 @@ def diagnose(
 
     Args:
         model: the robot as described.
-        logs: of its joints, with torques.
+        logs: of its joints, with torques, or trials of them.
         settings: numbers of the engine.
         say: takes a line about each step.
+        given: what the problem takes besides.
+        until: when to end with the best so far.
     """
-    smooth = smoothed(model, logs)
-    problem = joint_problem(model, smooth)
-    search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say)
-    first = Outcome(problem, search, search.run(search.fixed(())))
-    around = _around(first, model, smooth, settings, say, None)
+    until = until or Until()
+    trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
+    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise)
+    problem = joint_problem(model, smooth, None, given)
+    search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
+    first = Outcome(problem, search, until.run(search, search.fixed(())), finished=not until.broken)
+    if given.changed is not None or until():
+        return first  # what is wrong in all logs has no values of its own to be linear around
+    again = partial(_around, model=model, smooth=smooth, settings=settings, say=say, given=given, until=until)
+    around = again(first, floor=None)
     for _ in range(settings.rounds):
-        found = Outcome(around.problem, around.search, around.search.run(around.state))
-        if found.state.keys == around.state.keys:
-            return found
-        other = _around(found, model, smooth, settings, say, around.search.floor)
+        found = Outcome(around.problem, around.search, until.run(around.search, around.state))
+        if found.state.keys == around.state.keys or until():
+            around = found
+            break
+        other = again(found, floor=around.search.floor)
         if other.state.evidence < around.state.evidence + settings.need_nats:
             break  # linear around itself, the new set is no likelier
         around = other
-    return around
+    return replace(around, nothing=search, finished=not until.broken)
 
 
 def _around(
-    found: Outcome, model: SerialModel, smooth: Sequence[Signals], settings: Settings, say: Callable[[str], object],
-    floor: Array | None,
+    found: Outcome, *, model: SerialModel, smooth: Sequence[Signals], settings: Settings,
+    say: Callable[[str], object], given: Given | None, floor: Array | None, until: Until,
 ) -> Outcome:  # fmt: skip
     """The same set, linear around its own values; noise about a floor, or about one of its own."""
     x = found.state.posterior.mean
@@ -80,10 +122,10 @@ def _around(
         for i, label in enumerate(found.problem.labels)
         if x[i] and any(word in f" {label}" for word in MOVED) and "{" not in label
     }
-    problem = joint_problem(model, smooth, values)
+    problem = joint_problem(model, smooth, values, given)
     if floor is None:
         floor = floor_of(problem, problem.slabs(), settings)
-    search = Search(problem, floor, settings, say)
+    search = Search(problem, floor, settings, say, until)
     chosen = []
     for c in found.state.chosen:
         if c.group.event:

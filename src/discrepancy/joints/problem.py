@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,17 +17,16 @@ from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.serial.causes.elasticity import along
-from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.mechanics.regressor import (
     body_regressor,
     force_torque,
     inertial_parameters,
+    rigid_torque,
     torque_of,
 )
 from discrepancy.serial.mechanics.shift import by_acceleration, by_displacement
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import low_pass
@@ -37,10 +35,10 @@ EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
 """Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
 TOP_SHARE = 0.15
 """Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
-EDGE_S = 0.1
-"""Left out at both ends, where smoothing is spoilt."""
 INERTIA, JOINT, ZERO_RAD, LENGTH_M, TILT_RAD, SCALE, DELAY_S = 0.1, 0.03, 2e-3, 1e-3, 5e-3, 0.02, 5e-4
 """Standard deviations of a healthy robot's numbers; shares of the model's own for inertias, rotors and friction."""
+UNKNOWN_SCALE = 0.1
+"""The same for a torque per unit that was fitted to the model: as much as the masses."""
 LEAST_COM_M = 0.01
 FORM = 0.1
 """Share of the friction that a model names by which that may differ from its law."""
@@ -50,6 +48,9 @@ PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
 PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 """Durations of pushes that are tried [s], standard deviation of their force [N], the frequency whose noise ranks them
 [Hz], and how many are weighed exactly."""
+BEGIN_S = 1.0
+"""Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
+died to 15 %; in a stand or a soft joint it looks like a push."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
 
@@ -69,9 +70,14 @@ class JointProblem:
         series: the columns.
         joints: signals by joint and log.
         dry: dry friction that the model names, shape (J,).
-        pushed: torques per newton on the last link along the world's axes, shape (W, J, 3) a log.
+        pushed: torques per newton on the last link along the world's axes, shape (W, J, 3) a log; empty: none is looked
+            for.
         resting: columns of friction at rest by joint, and their standard deviations per newton metre.
-        rubbing: by group key, which joint's friction its first value is.
+        residual: measured torques less those of the model as it is, shape (W, J) a log.
+        sensors: variances of their noise, shape (C, bands); None: not known.
+        channel: of each joint with torques.
+        changed: number of logs in which something may have acted; None: all.
+        dry_in_all: by joint, the column of dry friction that a reference has, too.
     """
 
     model: SerialModel
@@ -86,6 +92,15 @@ class JointProblem:
     dry: Array = field(default_factory=lambda: np.zeros(0))
     resting: list[tuple[list[int], Array]] = field(default_factory=list)
     pushed: list[Array] = field(default_factory=list)
+    residual: list[Array] = field(default_factory=list)
+    sensors: Array | None = None
+    channel: Mapping[int, int] = field(default_factory=dict)
+    changed: int | None = None
+    dry_in_all: dict[int, int] = field(default_factory=dict)
+
+    def rows(self, series: Sequence[Series]) -> list[Series]:
+        """Columns by channel from columns by joint: joints without torques have none."""
+        return [{self.channel[j]: x for j, x in by.items() if j in self.channel} for by in series]
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Variances of what is always in the model; friction at rest follows the friction there is."""
@@ -100,6 +115,8 @@ class JointProblem:
                     places = self.model.joints if c.group.members else (c.group.place,)
                     for place, member in zip(places, members, strict=True):
                         rubs[index[place]] += values[member[0]]  # with its sign: terms share one torque
+            for j, k in self.dry_in_all.items():
+                rubs[j] += values[k]
         for j, (columns, unit) in enumerate(self.resting):
             S[columns] = (unit * rubs[j]) ** 2
         return S
@@ -122,19 +139,20 @@ class JointProblem:
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]
         found, windows = [], 0
-        for t, score in enumerate(scores):
-            force, rate = self.pushed[t], self.cells.bands.rates_hz[t]
+        for t, score in enumerate(scores[: self.changed] if self.pushed else ()):
+            force, rate = self.pushed[t][:, list(self.channel)], self.cells.bands.rates_hz[t]
             Q = np.einsum("wck,wc->wk", force, score)
             R = np.einsum("wck,wcl,c->wkl", force, force, weight)
             ridge = 1e-9 * np.trace(R.sum(axis=0)) * np.eye(3)
             for seconds in PUSH_S:
                 n = round(seconds * rate)
-                if n < 3 or 4 * n > len(score):
+                if n < 3 or max(4 * n, n + BEGIN_S * rate) > len(score):
                     continue
                 sine = np.sin(np.pi * (np.arange(n) + 0.5) / n)
                 q = fftconvolve(Q, sine[:, None], mode="valid", axes=0)
                 r = fftconvolve(R, (sine**2)[:, None, None], mode="valid", axes=0) + ridge
                 gain = 0.5 * np.einsum("wk,wk->w", q, np.linalg.solve(r, q[..., None])[..., 0])
+                gain[: round(BEGIN_S * rate)] = 0.0
                 windows += len(gain) * 4 // n
                 best = int(np.argmax(gain))
                 found.append((float(gain[best]), t, best, n))
@@ -151,7 +169,7 @@ class JointProblem:
 
     def event(self, group: Group) -> tuple[Group, list[Series]]:
         """A push with its columns: force along the world's axes, half a sine long."""
-        return group, [self._push(group, np.eye(3)[k], 1) for k in range(3)]
+        return group, self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)])
 
     def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
         """The same push a little earlier, later, shorter and longer."""
@@ -170,7 +188,7 @@ class JointProblem:
         ):
             length = round(stretch * n)
             first = round(middle + shift * n - 0.5 * length)
-            if length > 2 and first >= 0 and first + length <= most:
+            if length > 2 and first >= BEGIN_S * rate and first + length <= most:
                 out.append(self.event(self._window(trial, first, length, group.log_prior)))
         return out
 
@@ -191,7 +209,7 @@ class JointProblem:
         """Traces of a cause times smooth functions; none of what inertia and geometry do."""
         if group.event:
             force = 3.0 * values[list(group.columns)]
-            return [self._push(group, force, wave) for wave in (2, 3, 4)]
+            return self.rows([self._push(group, force, wave) for wave in (2, 3, 4)])
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -216,37 +234,54 @@ class JointProblem:
                 slope = [np.gradient(e, s.step_s) for e, s in zip(trace, signals, strict=True)]
                 steep = np.sqrt(np.mean(np.concatenate(slope) ** 2)) + 1e-12
                 out.append({c: [x * size / steep for x in slope]})
-        return out
-
-
-def smoothed(model: SerialModel, logs: Sequence[JointLog]) -> list[Signals]:
-    """Signals of logs with one typical speed for all."""
-    tree = Tree.of(model.model)
-    parts = [Signals.of(log, tree, partial(inverse_torque, model.model)) for log in logs]
-    typical = np.sqrt(np.mean([np.mean(s.dq**2, axis=0) for s in parts], axis=0))
-    return [replace(s, typical=np.maximum(typical, 1e-6)) for s in parts]
+        return self.rows(out)
 
 
 def joint_problem(
-    model: SerialModel, smooth: Sequence[Signals], values: Values | None = None
+    model: SerialModel, smooth: Sequence[Signals], values: Values | None = None, given: Given | None = None
 ) -> JointProblem:
     """The linear problem around some values of its columns, by label; None: the model as it is."""
-    return _Builder(model, list(smooth), values or {}).built()
+    return _Builder(model, list(smooth), values or {}, given or Given()).built()
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a problem takes besides logs and values.
+
+    Attributes:
+        changed: signals in which causes act; those after them are a reference, in which the model may be wrong, too.
+            None: all.
+        joints: which have torques, from 0; None: all.
+        motors: joints whose torque per unit is fitted to the model.
+        back_emf: joints whose drives lose torque to the speed while they are on.
+        excluded: causes that are left out.
+        tolerances: standard deviations by cause and parameter in place of the usual ones.
+        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
+    """
+
+    changed: int | None = None
+    joints: tuple[int, ...] | None = None
+    motors: frozenset[int] = frozenset()
+    back_emf: frozenset[int] = frozenset()
+    excluded: frozenset[str] = frozenset()
+    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    noise: Sequence[Array] | None = None
 
 
 class _Builder:
-    def __init__(self, model: SerialModel, smooth: list[Signals], values: Values) -> None:
-        self.model, self.values, self.names = model, values, model.joints
+    def __init__(self, model: SerialModel, smooth: list[Signals], values: Values, more: Given) -> None:
+        self.model, self.values, self.names, self.more = model, values, model.joints, more
         self.J = len(model.joints)
         self.given = smooth[0].tree
         self.tree = self._tree()
         zero = np.array([values.get(f"{n} zero", 0.0) for n in self.names])
-        self.cut = [self._inside(s) for s in smooth]
+        self.cut = [slice(0, len(s.time)) for s in smooth]
         self.parts = []
         for s in smooth:
             q, inverse = s.q + zero, s.inverse
             if values:
-                inverse = torque_of(self.tree, q, s.dq, s.ddq) + self.given.armature * s.ddq
+                # What a model has besides rigid bodies, such as springs, stays as it is.
+                inverse = inverse + torque_of(self.tree, q, s.dq, s.ddq) - rigid_torque(s.motion)
             self.parts.append(replace(s, tree=self.tree, q=q, inverse=inverse))
         self.slow = REST * self.parts[0].slow
         self.spans = self._spans()
@@ -257,12 +292,12 @@ class _Builder:
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
         self.bands = Bands(rates, [len(r) for r in residual], edges)
         self.residual = residual
-        self.out = JointProblem(model, self.parts, Cells.of(self.bands, residual), joints=self.joints)
+        known = range(self.J) if more.joints is None else more.joints
+        self.channel = {j: c for c, j in enumerate(known)}
+        self.out = JointProblem(
+            model, self.parts, self._cells(residual), joints=self.joints, channel=self.channel
+        )
         self.out.dry = np.array(self.given.coulomb)
-
-    def _inside(self, s: Signals) -> slice:
-        edge = math.ceil(EDGE_S * s.rate_hz)
-        return slice(edge, len(s.time) - edge)
 
     def _tree(self) -> Tree:
         t, v = self.given, self.values
@@ -280,7 +315,7 @@ class _Builder:
         for j, n in enumerate(self.names):
             position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
         gravity = t.gravity.copy()
-        for i, w in enumerate(_horizontal(t.gravity)):
+        for i, w in enumerate(horizontal(t.gravity)):
             gravity = gravity - v.get(f"tilt {i}", 0.0) * np.cross(w, t.gravity)
         return replace(t, mass=mass, com=com, inertia=inertia, position=position, gravity=gravity)
 
@@ -324,6 +359,9 @@ class _Builder:
             self.joints[j].append(one)
         return (torque - asked * (1.0 + of("scale")))[c]
 
+    def _cells(self, residual: Sequence[Array]) -> Cells:
+        return Cells.of(self.bands, [r[:, list(self.channel)] for r in residual])
+
     # --- columns
 
     def add(self, label: str, tolerance: float, by: Series) -> int:
@@ -340,6 +378,10 @@ class _Builder:
     def group(
         self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float] | Array, **more: Any
     ) -> None:
+        if cause in self.more.excluded or not any(
+            j in self.channel for k in columns for j in self.out.series[k]
+        ):
+            return
         sizes = tuple(float(x) for x in slab)
         self.out.groups.append(Group(cause, place, tuple(columns), sizes, **more))
 
@@ -351,17 +393,25 @@ class _Builder:
             self._geometry(j)
         for j in range(self.J):
             self._elasticity(j)
+            if j in self.more.back_emf:
+                self._braking(j)
         self._arm()
         for body in self.tree.links:
             self._link(int(body))
         for j in range(self.J):
             self._rests(j)
         out = self.out
+        out.changed = self.more.changed
         body = int(self.tree.joint_body[self.tree.last_link])
-        out.pushed = [
-            force_torque(s.motion, body, self.tree.com[body])[c]
-            for s, c in zip(self.parts, self.cut, strict=True)
-        ]
+        none = self.more.motors or "push" in self.more.excluded  # a gear that sticks looks like a push
+        out.pushed = (
+            []
+            if none
+            else [
+                force_torque(s.motion, body, self.tree.com[body])[c]
+                for s, c in zip(self.parts, self.cut, strict=True)
+            ]
+        )
         for i, label in enumerate(
             out.labels
         ):  # values count from the model, not from where columns are linear
@@ -369,16 +419,56 @@ class _Builder:
                 for c, x in out.series[i].items():
                     for t, own in enumerate(x):
                         self.residual[t][:, c] += self.values[label] * own
-        out.cells = Cells.of(self.bands, self.residual)
-        out.cells.add(out.series)
+        if self.more.changed is not None:
+            self._apart(self.more.changed)
+        out.cells = self._cells(self.residual)
+        out.cells.add(out.rows(out.series))
+        out.residual = self.residual
+        if self.more.noise is not None:
+            out.sensors = self._sensors(self.more.noise)
         return out
 
-    def _tolerance(self, j: int, parameter: str) -> float:
+    def _sensors(self, noise: Sequence[Array]) -> Array:
+        """Variances of the sensors' noise by channel and band, shape (C, bands)."""
+        band = np.concatenate([self.bands.of_trial(t) for t in range(len(noise))])
+        rows = np.bincount(band, minlength=len(self.bands.edges_hz) - 1)
+        power = [
+            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise]) ** 2, len(rows))
+            for j in self.channel
+        ]
+        return np.array(power) / np.maximum(rows, 1)
+
+    def _apart(self, changed: int) -> None:
+        """Causes act in the first signals only; what may be wrong with the model in all is a column besides."""
+        out, slabs = self.out, np.sqrt(self.out.slabs())
+        local = {k for columns, _ in out.resting for k in columns}
+        for i in range(len(out.labels)):
+            if i in local or not slabs[i]:
+                continue
+            own = out.series[i]
+            self.add(f"{out.labels[i]} in all logs", slabs[i], own)
+            out.tolerance[i] = 0.0
+            if out.labels[i].endswith(" coulomb_Nm"):
+                out.dry_in_all[self.names.index(out.labels[i].removesuffix(" coulomb_Nm"))] = (
+                    len(out.labels) - 1
+                )
+            out.series[i] = {
+                j: [x if t < changed else np.zeros_like(x) for t, x in enumerate(series)]
+                for j, series in own.items()
+            }
+
+    def _tolerance(self, j: int, cause: str, parameter: str) -> float:
         t = self.given
-        return {
+        usual = {
             "coulomb_Nm": JOINT * t.coulomb[j], "viscous_Nms_per_rad": JOINT * t.viscous[j],
-            "armature_kgm2": JOINT * t.armature[j], "scale": SCALE, "delay_s": DELAY_S,
+            "armature_kgm2": JOINT * t.armature[j], "scale": UNKNOWN_SCALE if j in self.more.motors else SCALE,
+            "delay_s": DELAY_S,
         }.get(parameter, 0.0)  # fmt: skip
+        return self.sd(cause, parameter, usual)
+
+    def sd(self, cause: str, parameter: str, usual: float) -> float:
+        """Standard deviation of a healthy robot's number."""
+        return self.more.tolerances.get(cause, {}).get(parameter, usual)
 
     def _joint(self, j: int) -> None:
         n, t = self.names[j], self.given
@@ -398,7 +488,7 @@ class _Builder:
                     if shared and label in self._known:
                         index.append(self._known[label])
                         continue
-                    tolerance = self._tolerance(j, p) if shared else 0.0
+                    tolerance = self._tolerance(j, cause.name, p) if shared else 0.0
                     index.append(self.add(label, tolerance, {j: [c[k] for c in columns]}))
                     self._known[label] = index[-1]
                 least = tuple(-own.get(p, 0.0) if p in cause.positive else -np.inf for p in cause.parameters)
@@ -428,11 +518,19 @@ class _Builder:
 
     def _geometry(self, j: int) -> None:
         n, body = self.names[j], int(self.tree.joint_body[j])
-        zero = self.add(f"{n} zero", ZERO_RAD, self.wide(lambda s: along(s, j, np.ones(len(s.time)))))
+        zero = self.add(
+            f"{n} zero",
+            self.sd("joint_zero", "zero_rad", ZERO_RAD),
+            self.wide(lambda s: along(s, j, np.ones(len(s.time)))),
+        )
         self.group("joint_zero", n, [zero], [0.1])
         moved = {id(s): by_displacement(s.motion, body) for s in self.parts}
         lengths = [
-            self.add(f"{n} length {'xyz'[k]}", LENGTH_M, self.wide(lambda s, k=k: moved[id(s)][:, :, k]))
+            self.add(
+                f"{n} length {'xyz'[k]}",
+                self.sd("link_length", f"{'xyz'[k]}_m", LENGTH_M),
+                self.wide(lambda s, k=k: moved[id(s)][:, :, k]),
+            )
             for k in range(3)
         ]
         self.group("link_length", n, lengths, [0.02] * 3)
@@ -459,14 +557,24 @@ class _Builder:
         k = self.add(f"{self.names[j]} compliance", 0.0, self.wide(series))
         self.group("elasticity", self.names[j], [k], [1e-3], least=(0.0,))
 
+    def _braking(self, j: int) -> None:
+        by = [np.where(s.enabled, s.dq[:, j], 0.0)[c] for s, c in zip(self.parts, self.cut, strict=True)]
+        k = self.add(f"{self.names[j]} braking", 0.0, {j: by})
+        z = self.spans[j]
+        self.group("back_emf", self.names[j], [k], [z.torque / z.speed], least=(0.0,))
+
     def _arm(self) -> None:
         g = self.tree.gravity
         if not g.any():
             return
         by = {id(s): by_acceleration(s.motion) for s in self.parts}
         tilts = [
-            self.add(f"tilt {i}", TILT_RAD, self.wide(lambda s, w=w: by[id(s)] @ np.cross(w, g)))
-            for i, w in enumerate(_horizontal(self.given.gravity))
+            self.add(
+                f"tilt {i}",
+                self.sd("gravity_direction", f"tilt_{i + 1}_rad", TILT_RAD),
+                self.wide(lambda s, w=w: by[id(s)] @ np.cross(w, g)),
+            )
+            for i, w in enumerate(horizontal(self.given.gravity))
         ]
         self.group("gravity_direction", "base", tilts, [0.1] * 2)
         share = self.add("gravity share", 0.0, self.wide(lambda s: by[id(s)] @ g))
@@ -482,7 +590,8 @@ class _Builder:
         def column(label: str, tolerance: float, change: Array) -> int:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
-        mass = column(f"{n} mass share", INERTIA, inertial_parameters(m, c, zero))
+        spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
+        mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
         self.group("link_mass", n, [mass], [1.0], family=family)
         coms = []
         for k in range(3):
@@ -491,10 +600,13 @@ class _Builder:
                 t.mass[body], c - e, zero
             )
             tolerance = INERTIA * max(abs(self.given.com[body][k]), LEAST_COM_M)
+            tolerance = self.sd("link_com", f"{'xyz'[k]}_m", tolerance)
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
         inertia = column(
-            f"{n} inertia share", INERTIA, inertial_parameters(0.0, np.zeros(3), self.given.inertia[body])
+            f"{n} inertia share",
+            self.sd("link_inertia", "share", INERTIA),
+            inertial_parameters(0.0, np.zeros(3), self.given.inertia[body]),
         )
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         if loaded:
@@ -525,7 +637,7 @@ class _Builder:
         self.out.resting.append((columns, np.array(unit)))
 
 
-def _horizontal(gravity: Array) -> Array:
+def horizontal(gravity: Array) -> Array:
     """Two horizontal axes, shape (2, 3)."""
     return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
 

@@ -54,6 +54,10 @@ class Diagnosed:
         """The text report."""
         return format_diagnosis(self._values)
 
+    def verbose_text(self) -> str:
+        """The text report, which is whole in any case."""
+        return str(self)
+
     def write_into(self, folder: Path, **more: Any) -> None:
         """Write extended models, residuals, pictures, JSON and report into an existing folder.
 
@@ -79,6 +83,6 @@ class Diagnosed:
         if draws_plots():
             from discrepancy.result.pictures.plots import save_plots
 
-            save_plots(values, residuals, self.rig.channels, self.words, folder)
+            save_plots(values, residuals, self.rig.channels, self.words.unit, folder)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self}\n")

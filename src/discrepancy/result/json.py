@@ -1,13 +1,24 @@
 """JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
 
-format, version     "mocobot-diagnosis", 2
+format, version     "mocobot-diagnosis", 3; version 2 has no ``machine``, ``finished`` and ``members``
+machine             "team", or "joints" of one robot of hinges and slides (``discrepancy.joints.json``), for which
+                    ``told``, ``event``, ``at`` and ``reference`` are there besides, and where ``prior_odds``,
+                    ``share_left``, ``law``, ``foretold``, ``unlisted_nats``, ``nats`` of ``scatter`` and ``chi2_per_n``
+                    of alternatives are null
+finished            whether the search came to its end
 recordings          names of the trials
+reference           names of the trials of the robot while it was well
 prior_odds          of any cause being there before the data are seen, at all its places together
 verdict             "consistent", "miscalibrated", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
     kind, name, place, sentence    in words: the cause, the cause at its place, its place, what it does
-    parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
+    parameters                     {name: {value, se}}; se is null for what was chosen, not fitted; of a cause of all
+                                   joints (joint null, place "all joints") the medians over its members
+    members                        list of {name, place, joint, parameters}, one a place; empty of a team
+    told                           list of {cause, place, name}: the smallest set that holds 90 %, the likeliest first
+    event                          {trial (from 1), start_s, duration_s} of what acted once, else null; ``at`` has its
+                                   first two numbers
     explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
                                    beyond those before it; the shares add up to what all causes remove
     probability                    that it is this cause, at this place
@@ -29,7 +40,8 @@ causes              list, in the order of discovery, of
 places              where something unlisted was looked for, the likeliest first: {place, robot, joint, nats}; empty
                     where nothing unlisted is left
 suspected           what would explain some of it, but is not probable enough to be named: list of {cause, kind, name,
-                    family, robot, joint, place, at, sentence, probability, over_nothing}
+                    family, robot, joint, place, at, sentence, probability, over_nothing}; of "joints" all that
+                    causes have
 scatter             kinds of which all places are off by more than the tolerance, the farthest first: list of
     cause, kind, family, sentence
     factor                         their spread over the tolerance
@@ -57,7 +69,7 @@ not_simulated       why there is no closed-loop comparison, or null
 rollouts            of serial robots: measured states let go in simulation, see ``joints.rolled.told``; else null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
 detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
-                    times in ten; null where these recordings say nothing
+                    times in ten; null where these recordings say nothing; of "joints" with ``place``
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
     chi2_per_n_tolerated           with no cause, and everything off as far as its kind scatters
     unlisted_nats                  by how much what is left is likelier something than clean noise
@@ -132,6 +144,8 @@ def diagnosis_to_dict(
     values: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
+        "machine": "team",
+        "finished": True,
         "recordings": list(rig.trials),
         "verdict": diagnosis.verdict,
         "prior_odds": explanation.problem.odds,
@@ -184,6 +198,7 @@ def _cause(
         "shape": plain(dict(candidate.shape)),
         "law": _law(candidate, found.values, rig, located) if isinstance(candidate, LawCandidate) else None,
         "separate": words.separate(candidate),
+        "members": [],
         "alternatives": [
             {
                 **place_of(rival.candidate),

@@ -9,7 +9,9 @@ from typing import Any
 from estimator.errors import InputError
 from estimator.strict import read_json
 
-FORMAT, VERSION, NAME = "mocobot-diagnosis", 2, "diagnosis.json"
+FORMAT, VERSION, NAME = "mocobot-diagnosis", 3, "diagnosis.json"
+READABLE = (2, VERSION)
+"""Versions that are read."""
 EXTENDED, AS_FOUND = "extended", "as_found"
 """Folders of models beside it: with the named causes, and with every part as far off as it is found."""
 VERDICTS = {
@@ -87,10 +89,11 @@ def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
     """
     if values.get("format") != FORMAT:
         raise InputError(f"{path}: not a diagnosis; it must have format {FORMAT!r}")
-    if values.get("version") != VERSION:
+    if values.get("version") not in READABLE:
         version = values.get("version")
         raise InputError(
-            f"{path}: is a diagnosis of version {version!r:.40}; this mocobot reads version {VERSION}"
+            f"{path}: is a diagnosis of version {version!r:.40}; this mocobot reads "
+            f"versions {' and '.join(map(str, READABLE))}"
         )
     verdict = values.get("verdict")
     if verdict not in VERDICTS:
@@ -120,3 +123,8 @@ def name_of(entry: Mapping[str, Any]) -> str:
 def kind_of(entry: Mapping[str, Any]) -> str:
     """A cause in words, wherever it sits."""
     return entry["kind"]
+
+
+def is_of_joints(values: Mapping[str, Any]) -> bool:
+    """Whether it is of one robot of joints; files of version 2 do not say, but such alone were rolled out."""
+    return values.get("machine", "joints" if values.get("rollouts") else "") == "joints"

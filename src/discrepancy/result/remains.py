@@ -7,7 +7,7 @@ from discrepancy import rules
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.digits import three_digits
 from discrepancy.engine.explanation import Scatter
-from discrepancy.result.read import kind_of
+from discrepancy.result.read import is_of_joints, kind_of
 
 Values = Mapping[str, Any]
 FARTHEST = 3
@@ -16,6 +16,8 @@ FARTHEST = 3
 
 def remedy(values: Values) -> str:
     """What to do where all places are off, and what it would be worth."""
+    if is_of_joints(values):
+        return "Correct the model by these values, and diagnose again with it."
     what = 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
     told = values.get("foretold")
     if told is None:
@@ -32,6 +34,8 @@ def remains(values: Values) -> list[str]:
     Args:
         values: a diagnosis as ``discrepancy.result.json`` documents it.
     """
+    if is_of_joints(values):
+        return list(values["remains"])
     residual = values["residual"]
     out = []
     if residual["chi2_per_n"] > rules.CLEAN_CHI2_PER_N:
@@ -117,10 +121,11 @@ def scatter_to_dict(item: Scatter) -> dict[str, Any]:
             for place, sizes, errors in item.each
         ],
     }
-    return values | {"sentence": _sentence(values)}
+    return values | {"sentence": scatter_sentence(values)}
 
 
-def _sentence(entry: Values) -> str:
+def scatter_sentence(entry: Values) -> str:
+    """What a kind that is off everywhere is off by."""
     kind = kind_of(entry)
     return (
         f"{kind[:1].upper()}{kind[1:]}: a spread of {sizes_of(entry, 'spread')} over {entry['places']} places "

@@ -29,9 +29,13 @@ def format_diagnosis(values: Values) -> str:
     Args:
         values: a diagnosis in the form of ``diagnosis_to_dict``.
     """
-    lines = list(_wrapped(_verdict(values), ""))
+    lines = list(wrapped(_verdict(values), ""))
     for k, cause in enumerate(values["causes"], start=1):
-        lines += ["", f"[[Cause {k}: {_heading(cause)} ({cause['cause']})]]", *_cause(cause, further=k > 1)]
+        lines += [
+            "",
+            f"[[Cause {k}: {_heading(cause)} ({cause['cause']})]]",
+            *cause_lines(cause, further=k > 1),
+        ]
     lines += [*_suspected(values), *_scatter(values), *gain_lines(values), *rollout_lines(values)]
     notes = list(values["notes"])
     if values["not_simulated"] and not values["causes"]:
@@ -42,18 +46,18 @@ def format_diagnosis(values: Values) -> str:
     if notes:
         lines += ["", "[[Notes]]"]
         for note in notes:
-            lines += _wrapped(note)
-    lines += ["", "[[Residual]]", *(line for text in _residual(values) for line in _wrapped(text))]
+            lines += wrapped(note)
+    lines += ["", "[[Residual]]", *(line for text in _residual(values) for line in wrapped(text))]
     if values["verdict"] in NOTHING_WRONG_HERE:
         lines += [
             "",
             "[[What would have been noticed, nine times in ten]]",
-            *_limits(values["detection_limits"]),
+            *limit_lines(values["detection_limits"]),
         ]
     else:
         lines += ["", "[[What such recordings cannot decide]]"]
         for entry in values["undecidable"]:
-            lines += _wrapped(f"{entry['what']}: {entry['why']}; needs {entry['remedy']}.")
+            lines += wrapped(f"{entry['what']}: {entry['why']}; needs {entry['remedy']}.")
     return "\n".join(lines)
 
 
@@ -86,7 +90,8 @@ def _heading(cause: Values) -> str:
     return name_of(cause).partition(", by ")[0] if cause.get("law") else name_of(cause)
 
 
-def _cause(cause: Values, *, further: bool) -> Iterable[str]:
+def cause_lines(cause: Values, *, further: bool) -> Iterable[str]:
+    """What supports a cause, and what else may be in its place; ``further``: it is not the first."""
     more = "a further " if further else ""
     explained = f"Explains {more}{_percent(cause['explained']['in_sample'])} of the misfit in sample"
     if cause["explained"]["held_out"] is not None:
@@ -99,7 +104,7 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
         if cause["over_nothing"] is None
         else f", {cause['over_nothing']:.0f} nats over nothing in its place"
     )
-    yield from _wrapped(
+    yield from wrapped(
         f"Probability {probability_words(cause['probability'])}{over}{_else(cause)}. {explained}."
     )
     alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
@@ -109,13 +114,13 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
             ruled_out.setdefault(name_of(rival), rival)
     if alike:
         names = ", ".join(f"{name_of(rival)} by {rival['evidence_gap']:.1f} nats" for rival in alike)
-        yield from _wrapped(f"Cannot be told from: {names}.")
+        yield from wrapped(f"Cannot be told from: {names}.")
         advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
-        yield from _wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
+        yield from wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
     if ruled_out:
-        yield from _wrapped("Fits worse: " + ", ".join(map(_rival, list(ruled_out.values())[:NEAREST])) + ".")
+        yield from wrapped("Fits worse: " + ", ".join(map(_rival, list(ruled_out.values())[:NEAREST])) + ".")
     if not cause["alternatives"]:
-        yield from _wrapped("No other cause comes near.")
+        yield from wrapped("No other cause comes near.")
 
 
 def _else(cause: Values) -> str:
@@ -136,14 +141,14 @@ def _suspected(values: Values) -> Iterable[str]:
         yield from ("", "[[Suspected: too improbable to be named]]")
     for entry in values["suspected"]:
         chance = probability_words(entry["probability"])
-        yield from _wrapped(f"{label(entry)} ({entry['cause']}), probability {chance}: {entry['sentence']}")
+        yield from wrapped(f"{label(entry)} ({entry['cause']}), probability {chance}: {entry['sentence']}")
 
 
 def _scatter(values: Values) -> Iterable[str]:
     if values["scatter"]:
         yield from ("", "[[Off at all places alike]]")
     for entry in values["scatter"]:
-        yield from _wrapped(
+        yield from wrapped(
             f"{entry['kind']} ({entry['cause']}): {sizes_of(entry, 'spread')}, {_times(entry['factor'])} times the "
             f"tolerance; likelier than it by {entry['nats']:.0f} nats.{_farthest(entry)}"
         )
@@ -182,7 +187,7 @@ def _residual(values: Values) -> Iterable[str]:
         yield f"What is left: {residual['signature']['sentence']}"
 
 
-def _limits(limits: Sequence[Values]) -> Iterable[str]:
+def limit_lines(limits: Sequence[Values]) -> Iterable[str]:
     """One line per cause: each parameter's smallest and largest limit over the places, in one unit per quantity."""
     sizes: dict[str, dict[str, list[float | None]]] = {}
     kinds = {entry["cause"]: kind_of(entry) for entry in limits}
@@ -195,7 +200,7 @@ def _limits(limits: Sequence[Values]) -> Iterable[str]:
     )  # fmt: skip
     for cause, parameters in sizes.items():
         each = ", ".join(_range(*parameter(name), values, shown) for name, values in parameters.items())
-        yield from _wrapped(f"{kinds[cause]} ({cause}): {each}")
+        yield from wrapped(f"{kinds[cause]} ({cause}): {each}")
 
 
 def _range(words: str, unit: str, sizes: Sequence[float | None], shown: Mapping[str, Shown]) -> str:
@@ -225,5 +230,6 @@ def probability_words(probability: float) -> str:
     return f"{100 * probability:.{1 if probability < 0.095 or probability > 0.99 else 0}f} %"
 
 
-def _wrapped(text: str, indent: str = "    ") -> Sequence[str]:
+def wrapped(text: str, indent: str = "    ") -> Sequence[str]:
+    """Lines of at most ``WIDTH`` columns."""
     return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)

@@ -71,6 +71,11 @@ def foretold_torques(gain: Values) -> bool:
     return all(channel.endswith(" torque") for channel in gain["units"])
 
 
+def floor_words(gain: Values) -> str:
+    """What is left at best."""
+    return "noise" if foretold_torques(gain) else "noise and integration error"
+
+
 def answer(gain: Values) -> str:
     """What is held against the recordings."""
     if foretold_torques(gain):

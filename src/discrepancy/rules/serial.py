@@ -212,7 +212,7 @@ amplitude; and the degree of polynomials in the position. Chosen: of the forms t
 harmonic of 15 %, a dress pack that stiffens by 20 % and readings that drift by 20 % must be no second cause."""
 SERIAL_LAW_SHARE = 1.0
 """Standard deviation of what the law of a lasting cause leaves of its trace, in amplitude. Chosen: noise is that of
-the sensors, less than gears leave whatever is named; as much as of the EMPS axis (``discrepancy.rules``)."""
+the sensors, less than gears leave whatever is named."""
 RIVAL_SHARE = 0.2
 """The same towards a rival: traces that differ by less leave it open which of the two it is. Chosen: what was hidden in
 a simulated arm in other forms is off by 15 to 25 %."""

@@ -61,6 +61,8 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError, OSError) as error:
         raise InputError(f"{path}: MuJoCo cannot read it ({_sentence(error)})") from error
+    if path.suffix.lower() == ".urdf":
+        _without_mass(spec)
     try:
         spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
@@ -111,6 +113,14 @@ def _moves(body: mujoco.MjsBody) -> bool:
             return True
         body = body.parent
     return False
+
+
+def _without_mass(spec: mujoco.MjSpec) -> None:
+    """Links of a URDF that have no inertial have no mass; MuJoCo would give fixed ones that of their shapes."""
+    for body in spec.bodies:
+        if not body.explicitinertial and not body.joints:
+            for geom in body.geoms:
+                geom.mass = 0.0
 
 
 def _drop_meshes(spec: mujoco.MjSpec) -> None:

@@ -75,7 +75,7 @@ def convert(
     """Convert a log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording.
 
     Args:
-        log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset.
+        log: a rosbag2 folder, .mcap, .db3, .csv, .npz, .mat or .parquet file, or a LeRobot dataset.
         map: map file, or name of a built-in map (docs/measured-data.md); found out if not given.
         trial: ``"random"``, ``"periodic"``, ``"static"`` or ``"free"`` (robots that hold nothing), if neither log nor
             map says; ``"random"`` else.

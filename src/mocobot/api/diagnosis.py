@@ -7,14 +7,31 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.engine.diagnose import Verdict, When
+from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.result.read import name_of
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import read_tolerances
 from estimator.files import holds, whole_folder
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
-from mocobot.api.public import public
 from mocobot.files.targets import check_folder
 from mocobot_sim.trial.truth import GroundTruth
+
+
+@dataclass(frozen=True)
+class Member:
+    """One place of a cause that all joints have.
+
+    Attributes:
+        place: in words.
+        joint: counted from 1, or None.
+        parameters, standard_errors: as of ``Cause``.
+    """
+
+    place: str
+    joint: int | None
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float | None]
 
 
 @dataclass(frozen=True)
@@ -31,6 +48,10 @@ class Cause:
         probability: that it is this cause, at this place.
         in_sample: share of the nominal model's misfit that it removes beyond the causes before it.
         held_out: the same on trials left out of the fit, or None.
+        place: in words.
+        members: its places; several of a cause that all joints have, whose ``parameters`` are the medians; none of a
+            team's cause.
+        told: names in words of the smallest set of causes that holds 90 %, the likeliest first; empty of a team's.
     """
 
     cause: str
@@ -42,16 +63,29 @@ class Cause:
     probability: float
     in_sample: float
     held_out: float | None
+    place: str
+    members: tuple[Member, ...]
+    told: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Diagnosed):
-    """A verdict with all that supports it: printable, a table in a notebook, and a folder of files."""
+class Diagnosis:
+    """A verdict with all that supports it: printable, a table in a notebook, and a folder of files.
+
+    Attributes:
+        found: of a team, or of one robot of joints.
+    """
+
+    found: Diagnosed | JointDiagnosed
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
+        return self.found.to_dict()
 
     @property
     def verdict(self) -> Verdict:
         """``"consistent"``, ``"miscalibrated"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
-        return self.diagnosis.verdict
+        return self.to_dict()["verdict"]
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -60,8 +94,17 @@ class Diagnosis(Diagnosed):
 
     def __repr__(self) -> str:
         """One line."""
-        named = ", ".join(found.candidate.label for found in self.diagnosis.causes) or "nothing named"
-        return f"<Diagnosis of {len(self.rig.trials)} trials: {self.verdict}; {named}>"
+        values = self.to_dict()
+        named = ", ".join(map(name_of, values["causes"])) or "nothing named"
+        return f"<Diagnosis of {len(values['recordings'])} trials: {self.verdict}; {named}>"
+
+    def __str__(self) -> str:
+        """The text report; of a robot of joints its first sentences and its table."""
+        return str(self.found)
+
+    def verbose_text(self) -> str:
+        """The whole text report."""
+        return self.found.verbose_text()
 
     def _repr_html_(self) -> str:
         from mocobot.api.notebook import diagnosis_html
@@ -79,6 +122,10 @@ class Diagnosis(Diagnosed):
         check_folder(Path(folder), [], holds("diagnosis"), "an earlier diagnosis", force=True)
         with whole_folder(Path(folder), "diagnosis") as whole:
             self.write_into(whole)
+
+    def write_into(self, folder: Path, **more: Any) -> None:
+        """The same into an existing folder, with further keys in the JSON."""
+        self.found.write_into(folder, **more)
 
 
 def diagnose(
@@ -127,14 +174,18 @@ def diagnose(
     )  # fmt: skip
     if truth is not None:
         found = against_truth(found, truth.to_dict())
-    return public(Diagnosis, found)
+    return Diagnosis(found)
 
 
 def _cause(values: Mapping[str, Any]) -> Cause:
-    parameters = values["parameters"]
     return Cause(
-        values["cause"], values["robot"], values["joint"], values["sentence"],
-        {name: entry["value"] for name, entry in parameters.items()},
-        {name: entry["se"] for name, entry in parameters.items()},
-        values["probability"], values["explained"]["in_sample"], values["explained"]["held_out"],
+        values["cause"], values["robot"], values["joint"], values["sentence"], *_numbers(values),
+        values["probability"], values["explained"]["in_sample"], values["explained"]["held_out"], values["place"],
+        tuple(Member(entry["place"], entry["joint"], *_numbers(entry)) for entry in values["members"]),
+        tuple(entry["name"] for entry in values.get("told", ())),
     )  # fmt: skip
+
+
+def _numbers(values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, float | None]]:
+    parameters = values["parameters"].items()
+    return {name: of["value"] for name, of in parameters}, {name: of["se"] for name, of in parameters}

@@ -24,7 +24,7 @@ from mocobot_report.blocks.tables import (
     table,
 )
 from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
-from mocobot_report.diagnosis.keys import cause_name, chance_of
+from mocobot_report.diagnosis.keys import cause_name, chance_of, numbers_of, sentence_of
 
 Values = Mapping[str, Any]
 STYLE = (
@@ -67,13 +67,13 @@ def diagnosis_html(values: Values) -> str:
     """The verdict with the causes' sentences, probabilities and parameters, and the misfit before and after."""
     rows: list[list[Entry]] = []
     for cause in values["causes"]:
-        for k, (name, entry) in enumerate(cause["parameters"].items()):
+        for k, (name, at, entry) in enumerate(numbers_of(cause) or [("", "", None)]):
             rows.append(
                 [
                     cause_name(name_of(cause), cause["cause"]) if k == 0 else "",
                     Num(chance_of(cause["probability"])) if k == 0 else "",
-                    name,
-                    measurement(entry["value"], entry["se"]),
+                    f"{name}, {at}" if at else name,
+                    measurement(entry["value"], entry["se"]) if entry else "",
                 ]
             )
     residual = values["residual"]
@@ -84,7 +84,7 @@ def diagnosis_html(values: Values) -> str:
     if removed is not None and rows:
         misfit.append(["excess error of the response removed", Num(percent(removed["share"]))])
     named = el("p", el("strong", values["verdict"].replace("_", " ").upper()))
-    sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
+    sentences = [sentence_of(cause) for cause in values["causes"]]
     if values["verdict"] == "miscalibrated":
         sentences = [
             tidy(text) for text in (*(entry["sentence"] for entry in values["scatter"]), remedy(values))

@@ -1,16 +1,12 @@
 """``mocobot diagnose``: read recordings, find out what the simulation gets wrong, report and write it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from discrepancy.causes.tolerances_file import read_tolerances
-from discrepancy.emps import catalogue as emps_catalogue
-from discrepancy.emps.diagnosis import diagnose_emps
-from discrepancy.emps.recording.reader import read_emps
-from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
@@ -30,15 +26,6 @@ from mocobot_logs.convert_report import format_on_the_fly
 from mocobot_sim.trial.truth import truth_path
 
 
-@dataclass(frozen=True)
-class _Rig:
-    """What can be diagnosed: its default tolerances, and what reads and diagnoses recordings."""
-
-    tolerances: Callable[[], Mapping[str, Mapping[str, float]]]
-    read: Callable[[Sequence[Path], Logs, Robots], Any]
-    diagnose: Callable[..., Diagnosed]
-
-
 def run(options: Diagnose) -> None:
     """Run the command.
 
@@ -49,22 +36,20 @@ def run(options: Diagnose) -> None:
     if options.model is not None:
         diagnose_joints.run(options, options.model)
         return
-    rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
     inputs += calibration_file(options.calibration)
     logs, robots = Logs(options.map), Robots(options.calibration)
-    tolerances = read_tolerances(options.tolerances, rig.tolerances())
+    tolerances = read_tolerances(options.tolerances, default_tolerances())
     with whole_folder(options.out, "diagnosis") if options.out else nullcontext() as folder:
-        data = rig.read(options.rec, logs, robots)
+        data = _read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with workers_of(options.scheduler), stages() as (say, simulated):
-            own = {"whole": options.whole} if options.rig == "team" else {}
-            found = rig.diagnose(
+            found = diagnose_team(
                 data, tolerances, options.exclude,
                 closed_loop=options.closed_loop, laws=options.laws, odds=options.odds, jobs=options.jobs, say=say,
-                simulated=simulated, **own,
+                simulated=simulated, whole=options.whole,
             )  # fmt: skip
-            if options.rig == "team" and (truth := _truth(options.rec)) is not None:
+            if (truth := _truth(options.rec)) is not None:
                 found = against_truth(found, truth)
             if folder is not None:
                 say("write")
@@ -102,13 +87,3 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
         except (InputError, KeyError):
             return None
     return found[0] if all(values == found[0] for values in found) else None
-
-
-RIGS = {
-    "team": _Rig(default_tolerances, _read, diagnose_team),
-    "emps": _Rig(
-        emps_catalogue.default_tolerances,
-        lambda paths, *_: read_emps(paths[0]),
-        diagnose_emps,
-    ),
-}

@@ -37,23 +37,16 @@ def run(options: Diagnose, model: Path) -> None:
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with stages() as (say, _):
             found = serial.diagnosed(
-                robot,
-                logs,
-                reference,
-                tolerances,
-                options.exclude,
-                laws=options.laws,
-                odds=options.odds,
-                closed_loop=options.closed_loop,
-                jobs=options.jobs,
-                say=say,
-            )
+                robot, logs, reference, tolerances, options.exclude,
+                closed_loop=options.closed_loop, seconds=options.seconds, say=say,
+            )  # fmt: skip
             if folder is not None:
                 say("write")
                 found.write_into(folder, provenance=made_with)
-    print(found)  # after the folder is in place: whoever reads may close the pipe
+    # After the folder is in place: whoever reads may close the pipe.
+    print(found.verbose_text() if options.verbose else found)
     if options.out:
         print(f"\nWritten to {options.out}.")
-    verdict = found.diagnosis.verdict
+    verdict = found.to_dict()["verdict"]
     if options.strict and verdict not in ("consistent", "explained"):
         raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")

@@ -16,8 +16,8 @@ Values = Mapping[str, Any]
 
 def groups_of(a: Values, b: Values) -> list[Group]:
     """Parameters of the causes that both name at the same place; those that were chosen, not fitted, are left out."""
-    groups, others = [], {_place(cause): cause for cause in b["causes"]}
-    for cause in a["causes"]:
+    groups, others = [], {_place(place): place for one in b["causes"] for place in _places(one)}
+    for cause in (place for one in a["causes"] for place in _places(one)):
         other = others.get(_place(cause))
         if other is None:
             continue
@@ -37,12 +37,14 @@ def changes_of(a: Values, b: Values) -> list[str]:
         before, after = (VERDICTS[one["verdict"]].lower() for one in (a, b))
         out.append(f"The verdict was {before} in A and is {after} in B.")
     for name, here, other_name, there in (("A", a, "B", b), ("B", b, "A", a)):
-        named = {_place(cause) for cause in there["causes"]}
-        out += [
-            f"Named in {name} alone: {name_of(cause)}, {_numbers(cause)}; {other_name} {_could(cause, there)}."
-            for cause in here["causes"]
-            if _place(cause) not in named
-        ]
+        named = {_place(place) for cause in there["causes"] for place in _places(cause)}
+        for cause in here["causes"]:
+            places = _places(cause)
+            alone = [place for place in places if _place(place) not in named]
+            # Of a kind that is nowhere else one sentence is enough.
+            for one in [cause] if len(alone) == len(places) else alone:
+                numbers = ", ".join([name_of(one), *_numbers(one)])
+                out.append(f"Named in {name} alone: {numbers}; {other_name} {_could(one, there)}.")
     return out
 
 
@@ -57,25 +59,33 @@ def notes_of(a: Values, b: Values) -> list[str]:
     return notes
 
 
-def _place(cause: Cause) -> tuple[str, int | None, int | None]:
-    return cause["cause"], cause["robot"], cause["joint"]
+def _places(cause: Cause) -> list[Cause]:
+    """A cause at each of its places; a kind has several."""
+    members = cause.get("members", ())
+    return [{**cause, **member, "members": ()} for member in members] if len(members) > 1 else [cause]
+
+
+def _place(cause: Cause) -> tuple[str, int | None, int | None, str]:
+    return cause["cause"], cause["robot"], cause["joint"], cause["place"]
 
 
 def _value(parameter: Mapping[str, float]) -> tuple[Array, Array]:
     return np.array([parameter["value"]]), np.array([[parameter["se"] ** 2]])
 
 
-def _numbers(cause: Cause) -> str:
-    return ", ".join(
+def _numbers(cause: Cause) -> list[str]:
+    return [
         f"{name} {one['value']:.3g}" + ("" if one["se"] is None else f" +- {one['se']:.2g}")
         for name, one in cause["parameters"].items()
-    )
+    ]
 
 
 def _could(cause: Cause, other: Values) -> str:
     """Whether the other recordings would have shown it."""
     limits: Sequence[Values] = [
-        entry for entry in other["detection_limits"] if _place(entry) == _place(cause)
+        entry
+        for entry in other["detection_limits"]
+        if _place({"place": cause["place"]} | dict(entry)) == _place(cause)
     ]
     sizes = {
         name: size

@@ -14,6 +14,7 @@ KINDS = {
     "bag": "a ROS 2 bag",
     "csv": "a table of text",
     "npz": "an NPZ archive",
+    "mat": "a MATLAB file",
     "lerobot": "of a LeRobot dataset",
     "parquet": "a Parquet file",
 }

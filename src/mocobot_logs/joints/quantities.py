@@ -49,8 +49,8 @@ EFFORTS = ("torque", "link_torque", "motor_torque", "current")
 COMMANDS = ("command", "motor_command")
 DUTIES = ("duty", "motor_voltage")
 
-COUNTS, RATED = "counts", ("%", "permille")
-"""Units that need a number more: ``counts_per_turn`` or ``full_scale``; ``rated``."""
+COUNTS, RATED = "counts", {"%": 0.01, "permille": 0.001, "V": 1.0}
+"""Units that need a number more: ``counts_per_turn`` or ``full_scale``; ``rated``, with the share of it that one is."""
 _TURNING: dict[str, dict[str, float]] = {
     "position": {"rad": 1.0, "deg": math.pi / 180.0, "turn": 2.0 * math.pi},
     "velocity": {
@@ -91,7 +91,7 @@ def si_factor(
         slides: whether the joint (or, for a motor's column, the motor) slides; else it turns.
         counts_per_turn: counts in one turn, or in one metre of a slide, for positions in ``counts``.
         full_scale: counts of a duty of 1.
-        rated: torque [N m or N] or current [A] that ``%`` and ``permille`` are of.
+        rated: torque [N m or N] or current [A] that ``%`` and ``permille`` are of, or that 1 V is.
         where: what to call the channel in messages.
 
     Raises:
@@ -105,7 +105,7 @@ def si_factor(
     needed = None
     if unit == COUNTS:
         needed = "full_scale" if kind == "duty" else "counts_per_turn"
-    elif unit in RATED and kind != "duty":
+    elif unit in RATED and kind in ("effort", "current"):
         needed = "rated"
     given = {"counts_per_turn": counts_per_turn, "full_scale": full_scale, "rated": rated}
     for name, value in given.items():
@@ -117,7 +117,7 @@ def si_factor(
     if size is None:
         raise InputError(f"{where}: missing key {needed!r}, which goes with unit {unit!r}")
     if needed == "rated":
-        return size * (0.01 if unit == "%" else 0.001)
+        return size * RATED[unit]
     return (1.0 if slides or needed == "full_scale" else 2.0 * math.pi) / size
 
 

@@ -10,6 +10,8 @@ from mocobot_logs.joints.assemble import assemble
 from mocobot_logs.joints.even import even_parts
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
+from mocobot_logs.joints.quantities import QUANTITIES
+from mocobot_logs.joints.turns import unwrapped
 from mocobot_logs.log import LogSource, Samples, collect
 from mocobot_logs.open_log import open_log
 
@@ -56,7 +58,14 @@ def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointL
         InputError: see ``read_joint_log``.
     """
     channels = tuple(label(*key) for key in log_map.channels)
+    at = [k for k, (quantity, _) in enumerate(log_map.channels) if QUANTITIES[quantity].kind == "position"]
+    positions, notes = unwrapped(samples.values[:, at], [channels[k] for k in at])
+    if notes:
+        values = samples.values.copy()
+        values[:, at] = positions
+        samples = replace(samples, values=values)
     parts = even_parts(name, channels, samples, log_map.rate_hz)
+    parts = [replace(part, notes=(*notes, *part.notes)) for part in parts]
     control = log_map.control_of(Path(name).name)
     logs = [assemble(part, log_map, name, control) for part in parts]
     if len(logs) == 1:

@@ -1,1 +1,1 @@
-"""Tables: CSV, NPZ, Parquet, LeRobot."""
+"""Tables: CSV, NPZ, MATLAB, Parquet, LeRobot."""

@@ -121,11 +121,9 @@ class NpzTable(Table):
         """What reads the next rows of one array."""
         array = self._arrays[name]
         file = stack.enter_context(archive.open(array.member))
-        _read_exactly(file, array.start)
+        read_exactly(file, array.start)
         if _is_columnwise(array):
-            whole = np.frombuffer(_read_exactly(file, array.size), array.dtype).reshape(
-                array.shape, order="F"
-            )
+            whole = np.frombuffer(read_exactly(file, array.size), array.dtype).reshape(array.shape, order="F")
             done = 0
 
             def next_loaded(count: int) -> NDArray:
@@ -136,7 +134,7 @@ class NpzTable(Table):
             return next_loaded
 
         def next_read(count: int) -> NDArray:
-            raw = _read_exactly(file, count * array.dtype.itemsize * prod(array.row_shape))
+            raw = read_exactly(file, count * array.dtype.itemsize * prod(array.row_shape))
             return np.frombuffer(raw, array.dtype).reshape(count, *array.row_shape)
 
         return next_read
@@ -162,8 +160,8 @@ class NpzTable(Table):
                 f"{self.name}: array {METADATA_NAME!r} must be one text, the recording's metadata"
             )
         with archive.open(array.member) as file:
-            _read_exactly(file, array.start)
-            text = str(np.frombuffer(_read_exactly(file, array.size), array.dtype)[0])
+            read_exactly(file, array.start)
+            text = str(np.frombuffer(read_exactly(file, array.size), array.dtype)[0])
         return RecordingMetadata.from_json(text, where=f"{self.name}: metadata")
 
     @contextmanager
@@ -175,15 +173,15 @@ class NpzTable(Table):
 
 def _header(member: zipfile.ZipInfo, file: IO[bytes], where: str) -> Array:
     """Header of one array, checked against the size of its entry."""
-    start = _read_exactly(file, 8)
+    start = read_exactly(file, 8)
     if start[:6] != b"\x93NUMPY" or start[6] not in (1, 2):
         raise InputError(f"{where} is not in numpy's format 1.0 or 2.0")
     width = 2 if start[6] == 1 else 4
-    length_bytes = _read_exactly(file, width)
+    length_bytes = read_exactly(file, width)
     length = int.from_bytes(length_bytes, "little")
     if length > MAX_HEADER_BYTES:
         raise InputError(f"{where} has a header of {length} bytes; it may have {MAX_HEADER_BYTES}")
-    text = io.BytesIO(length_bytes + _read_exactly(file, length))
+    text = io.BytesIO(length_bytes + read_exactly(file, length))
     read = np.lib.format.read_array_header_1_0 if start[6] == 1 else np.lib.format.read_array_header_2_0
     shape, fortran, dtype = read(text, max_header_size=MAX_HEADER_BYTES)
     array = Array(member, dtype, shape, fortran, 8 + width + length)
@@ -201,7 +199,8 @@ def _is_columnwise(array: Array) -> bool:
     return array.fortran and len(array.shape) > 1
 
 
-def _read_exactly(file: IO[bytes], count: int) -> bytes:
+def read_exactly(file: IO[bytes], count: int) -> bytes:
+    """So many bytes, or an EOFError."""
     content = file.read(count)
     if len(content) < count:
         raise EOFError(f"{len(content)} of {count} bytes are there")

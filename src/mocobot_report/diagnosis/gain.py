@@ -6,7 +6,13 @@ from typing import Any
 import numpy as np
 
 from discrepancy.result.remains import all_as_found
-from discrepancy.result.text_gain import ERRORS, foretold_torques, response_units, something_is_off
+from discrepancy.result.text_gain import (
+    ERRORS,
+    floor_words,
+    foretold_torques,
+    response_units,
+    something_is_off,
+)
 from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
 from mocobot_report.blocks.html import Node, el
@@ -21,7 +27,6 @@ BEFORE, AFTER = (
     Key("after", "with the causes", "after", "circle"),
 )
 ERROR = Key("before", "error", "before", "square")
-NOISE = Key("", "noise and integration error", "text", "dash")
 
 
 def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | None:
@@ -91,7 +96,7 @@ def _closed_loop(book: Book, gain: Values, names: Sequence[str], shown: Mapping[
     return [
         paragraph(said),
         _response(gain, shown),
-        shared_legend([*shown.values(), NOISE]),
+        shared_legend([*shown.values(), Key("", floor_words(gain), "text", "dash")]),
         el("div", *charts, class_="pair"),
     ]
 
@@ -132,8 +137,11 @@ def _trials_chart(book: Book, gain: Values, key: str, names: Sequence[str], show
     across, up = column_axis(_fitted(names)), log_axis(f"{title} [{unit}]" if unit else title, seen)
     plot = figure(traces, xaxis=across, yaxis=up, margin_b=26)
     plot.add_hline(floor)
-    label = f"{title} of every trial's simulated response, before and after; the means are in the table."
-    return chart(book, f"Response: {title}", plot, height=230, label=label)
+    of, head = (
+        ("foretold torques", "Foretold") if foretold_torques(gain) else ("simulated response", "Response")
+    )
+    label = f"{title} of every trial's {of}, before and after; the means are in the table."
+    return chart(book, f"{head}: {title}", plot, height=230, label=label)
 
 
 def _fitted(names: Sequence[str]) -> list[str]:

@@ -10,9 +10,18 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.result.evidence_list import label
-from discrepancy.result.read import AS_FOUND, EXTENDED, VERDICTS, kind_of, name_of, read_diagnosis
+from discrepancy.result.read import (
+    AS_FOUND,
+    EXTENDED,
+    VERDICTS,
+    is_of_joints,
+    kind_of,
+    name_of,
+    read_diagnosis,
+)
 from discrepancy.result.remains import farthest, remains, remedy, sizes_of
 from discrepancy.result.text import NEAREST, NOTHING_WRONG_HERE, SAID
+from discrepancy.result.text_gain import foretold_torques
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
@@ -26,10 +35,10 @@ from mocobot_report.blocks.tables import Entry, Num, measurement, table, value
 from mocobot_report.blocks.units import short_names
 from mocobot_report.diagnosis.evidence import evidence_sections, residual_sections, rollout_section
 from mocobot_report.diagnosis.gain import gain_section
-from mocobot_report.diagnosis.keys import cause_name, chance_of, share_of
+from mocobot_report.diagnosis.keys import cause_name, chance_of, numbers_of, sentence_of, share_of
 from mocobot_report.folder import Diagnosed
 from mocobot_report.sources import sources
-from mocobot_view.pictures.shots import axis_shot, diagnosis_shot
+from mocobot_view.pictures.shots import diagnosis_shot
 
 Values = Mapping[str, Any]
 
@@ -37,22 +46,20 @@ Values = Mapping[str, Any]
 def cause_tables(causes: Sequence[Values]) -> list[Node]:
     """What is named, what supports it, and what else it might be."""
     units = one_each(
-        (_said(cause, name)[1], entry["value"])
-        for cause in causes
-        for name, entry in cause["parameters"].items()
+        (_said(cause, name)[1], entry["value"]) for cause in causes for name, _, entry in numbers_of(cause)
     )
     sizes: list[list[Entry]] = []
     support: list[list[Entry]] = []
     for cause in causes:
         who = cause_name(name_of(cause), cause["cause"])
         # A number without an error that is 0 is of a form that the cause does not have.
-        there = {name: of for name, of in cause["parameters"].items() if of["value"] or of["se"] is not None}
-        for k, (name, entry) in enumerate(there.items()):
+        there = [number for number in numbers_of(cause) if number[2]["value"] or number[2]["se"] is not None]
+        for k, (name, at, entry) in enumerate(there):
             words, unit = _said(cause, name)
             unit, scale = units[unit] if unit in ("s", "m", "rad", "m/N") else (unit, 1.0)
             se = None if entry["se"] is None else scale * entry["se"]
             shown = measurement(scale * entry["value"], se, spelled(unit))
-            sizes.append([who if k == 0 else "", shown, words])
+            sizes.append([who if k == 0 else "", shown, f"{words}, {at}" if at else words])
         shares = (Num(share_of(cause["explained"][kind])) for kind in ("in_sample", "held_out"))
         folds = cause["folds"]
         better = f"{sum(gain > 0 for gain in folds)} of {len(folds)}" if folds else NONE
@@ -307,20 +314,28 @@ MEANING = {
     "partly_explained": "The named causes are there, but more than noise is left.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
+OF_JOINTS = {
+    "consistent": "The model explains the logs within noise and tolerances; nothing is named.",
+    "miscalibrated": "The robot is off by more than its tolerances, all places alike, so none is named.",
+    "explained": "The named causes explain what the model got wrong.",
+    "unexplained": "Logs and model differ, and no cause of the tables accounts for it.",
+}
+"""The same of one robot of joints, where that is said otherwise."""
 
 
-def is_axis(diagnosed: Diagnosed) -> bool:
-    """Whether the EMPS axis was diagnosed, not a team."""
+def is_robot(diagnosed: Diagnosed) -> bool:
+    """Whether logs of one robot's joints were diagnosed, not a team's recordings."""
+    if is_of_joints(diagnosed.values):
+        return True
     provenance = diagnosed.provenance
     options = provenance.get("options") if isinstance(provenance, dict) else None
-    if isinstance(options, dict) and "rig" in options:
-        return options["rig"] == "emps"
-    return not (diagnosed.values["gain"] or {}).get("estimates")
+    told = isinstance(options, dict) and options.get("model") is not None
+    return told or diagnosed.values.get("rollouts") is not None
 
 
 def title(diagnosed: Diagnosed) -> str:
     """The verdict in a word or two, and what it is of."""
-    of = " of the EMPS axis" if is_axis(diagnosed) else ""
+    of = " of a robot" if is_robot(diagnosed) else ""
     return f"Diagnosis{of}: {VERDICTS[diagnosed.values['verdict']].lower()}"
 
 
@@ -328,31 +343,34 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     """Verdict, causes in words, and what they are worth."""
     values = diagnosed.values
     count = len(values["recordings"])
-    if is_axis(diagnosed):
-        what = f"One recording of a real axis (the EMPS benchmark), in {count} blocks that validate each other, is"
+    joints, simulation = is_robot(diagnosed), "simulation"
+    if joints:
+        what, simulation = f"{count} trials of a robot's joints are", "robot's model"
+        what = "One trial of a robot's joints is" if count == 1 else what
     elif count == 1:
         what = "One recording of a team that carries a payload is"
     else:
         what = f"{count} recordings of a team that carries one payload are"
     lede = (
-        f"{what} held against the simulation: where do they part, which physical cause does it, and what is it worth "
-        "to have it in the simulation?"
+        f"{what} held against the {simulation}: where do they part, which physical cause does it, and what is it worth "
+        f"to have it in the {simulation.split()[-1]}?"
     )
-    meaning = MEANING[values["verdict"]]
+    meaning = (MEANING | (OF_JOINTS if joints else {}))[values["verdict"]]
     if len(values["causes"]) == 1:
         meaning = meaning.replace("causes explain", "cause explains").replace("causes are", "cause is")
     said: list[Node | str] = []
     left = remains(values)
     if values["causes"]:
-        said = [bullets([tidy(cause["sentence"]) for cause in values["causes"]])]
+        said = [bullets([sentence_of(cause) for cause in values["causes"]])]
     elif values["verdict"] == "miscalibrated":
         said = [bullets([tidy(entry["sentence"]) for entry in values["scatter"]]), tidy(remedy(values))]
     elif values["verdict"] != "consistent" and not left:
         said = [tidy(values["residual"]["nominal"]["signature"]["sentence"])]
     kind = KINDS[values["verdict"]]
     # Green stands beside no figure that contradicts it.
-    kind = "warn" if left and kind == "good" else kind
-    box = verdict(kind, VERDICTS[values["verdict"]], meaning, *said, *map(tidy, left))
+    stopped = [] if values.get("finished", True) else ["The search was stopped before its end."]
+    kind = "warn" if (left or stopped) and kind == "good" else kind
+    box = verdict(kind, VERDICTS[values["verdict"]], meaning, *stopped, *said, *map(tidy, left))
     return [paragraph(lede, kind="lede"), box, tiles(_tiles(values))]
 
 
@@ -384,7 +402,8 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
     if gain and gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
         interval = f"95 %: {percent(low)} to {percent(high)}" if low is not None and high is not None else ""
-        out.append(("excess error of the response removed", percent(gain["removed"]["share"]), interval))
+        of = "foretold torques" if foretold_torques(gain) else "response"
+        out.append((f"excess error of the {of} removed", percent(gain["removed"]["share"]), interval))
     elif values["not_simulated"]:
         out.append(("closed loop", "not simulated", tidy(str(values["not_simulated"]))))
     return out
@@ -413,8 +432,6 @@ def sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
 
 
 def _picture(book: Book, diagnosed: Diagnosed) -> Node | None:
-    if is_axis(diagnosed):
-        return book.gallery.ask([("The axis", partial(axis_shot, ASPECT))])
     estimates = (diagnosed.values["gain"] or {}).get("estimates")
     if not estimates:
         return None

@@ -277,13 +277,6 @@ def diagnosis_shot(
     return _shot(team.model, team.qpos, marks, says, aspect, ABOVE)
 
 
-def axis_shot(aspect: float = ASPECT) -> Shot:
-    """The EMPS axis, its carriage at the middle of its way."""
-    model = mujoco.MjModel.from_xml_path(str(models_dir() / "emps" / "scene.xml"))
-    says = "The EMPS axis: a carriage on a ball screw."
-    return _shot(model, model.key("hold").qpos.copy(), Marks(), says, aspect)
-
-
 def _shot(
     model: mujoco.MjModel, qpos: Array, marks: Marks, says: str, aspect: float, elevation: float = ELEVATION
 ) -> Shot:

@@ -11,7 +11,7 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.pictures.render import Picture, Shot, render_shots
-from mocobot_view.pictures.shots import axis_shot, diagnosis_shot, estimate_shot, team_shot
+from mocobot_view.pictures.shots import diagnosis_shot, estimate_shot, team_shot
 
 WIDTH, HEIGHT = 1600, 1000
 
@@ -47,11 +47,6 @@ def diagnosis_view(
 ) -> Picture | str:
     """The team as estimated, causes of a diagnosis in red; see ``diagnosis_shot``."""
     return _one(diagnosis_shot(recording, estimate, causes, payload, time_s, width / height), width, height)
-
-
-def emps_view(width: int = WIDTH, height: int = HEIGHT) -> Picture | str:
-    """The EMPS axis; see ``axis_shot``."""
-    return _one(axis_shot(width / height), width, height)
 
 
 def _one(shot: Shot, width: int, height: int) -> Picture | str:

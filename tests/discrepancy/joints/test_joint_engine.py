@@ -13,6 +13,7 @@ from discrepancy.evidence.odds import odds_of
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import causes, problem
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
+from discrepancy.joints.trials import trials_of
 from followed_arm import Change, arm_log, arm_model, rubs
 
 
@@ -100,7 +101,7 @@ def test_the_verdict_does_not_depend_on_the_rate(folder: Path) -> None:
 def test_friction_at_rest_is_that_of_all_terms_together(folder: Path) -> None:
     """Coulomb friction of 2 N m, less 1.5 N m of Stribeck friction: what is left at rest is 0.5 N m."""
     model = arm_model(folder)
-    linear = problem.joint_problem(model, problem.smoothed(model, [arm_log(rubs(0.5), 9)]))
+    linear = problem.joint_problem(model, trials_of(model, [arm_log(rubs(0.5), 9)]).runs)
 
     def rests(**amounts: float) -> np.ndarray:
         values, chosen = np.zeros(linear.cells.count), []

@@ -12,7 +12,6 @@ import pytest
 from diagnosed import small_diagnosis
 from discrepancy.candidate import Candidate
 from discrepancy.causes.numbers import number
-from discrepancy.emps.causes import CAUSES as AXIS
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
@@ -137,7 +136,7 @@ def test_errors_against_the_truth_are_shown() -> None:
 
 def test_causes_are_named_in_words_where_they_sit() -> None:
     robot, joint = 3, 2
-    for cause in [*CAUSES.values(), *AXIS.values()]:
+    for cause in CAUSES.values():
         at = getattr(cause, "per", "payload")
         place = (None if at == "payload" else robot, joint if at == "joint" else None)
         candidate = cause.candidate({}, {}, *place)

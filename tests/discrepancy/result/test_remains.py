@@ -21,7 +21,6 @@ def test_clean_verdicts_stand_alone() -> None:
 
 
 def test_a_misfit_beside_a_verdict_is_told_with_its_place() -> None:
-    """The figures of the EMPS benchmark's first recording."""
     values = small_diagnosis("partly_explained")
     values["residual"] |= {"chi2_per_n": 5.16}
     values["residual"]["nominal"] = values["residual"]["nominal"] | {"chi2_per_n": 7350.0}

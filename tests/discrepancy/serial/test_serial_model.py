@@ -168,3 +168,15 @@ def test_a_joint_that_slides_has_torques_in_newtons(tmp_path: Path) -> None:
     words = SerialWords(load_model(path))
     assert [words.unit(f"{name} torque") for name in ("lift", "turn")] == ["N", "N m"]
     assert [words.unit(f"position of joint {j}") for j in (1, 2)] == ["m", "rad"]
+
+
+def test_a_fixed_link_of_a_urdf_without_an_inertial_has_no_mass(tmp_path: Path) -> None:
+    text = """<robot name="r"><link name="base"/>
+    <link name="arm"><inertial><mass value="2"/>
+      <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <link name="hull"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+    <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="9" velocity="9"/></joint>
+    <joint name="mount" type="fixed"><parent link="arm"/><child link="hull"/></joint></robot>"""
+    (tmp_path / "r.urdf").write_text(text, encoding="utf-8")
+    assert load_model(tmp_path / "r.urdf").model.body("arm").mass[0] == 2.0

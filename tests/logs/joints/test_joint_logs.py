@@ -209,6 +209,17 @@ def test_duty_supply_and_gains_by_the_name_of_the_file(tmp_path) -> None:
     assert np.isnan(other.drive.velocity_gain).all()
 
 
+def test_torques_of_analogue_drives_come_in_volts(tmp_path) -> None:
+    """Of a hinge at its motor, and of a slide."""
+    text = MAP.replace("[channels.torque]", "[channels.motor_torque]").replace(
+        'unit = "Nm"', 'unit = "V"\nrated = 0.3'
+    )
+    text = text.replace('torque.unit = "N"', "motor_torque.rated = 2.5\n[drive]\ngear = [20, -10, 4]")
+    (log,) = read(write_csv(tmp_path / "log.csv", columns(TIME)), text)
+    newtons = torques(TIME) * np.array([20 * 0.3, -10 * 0.3, 4 * 2.5])
+    np.testing.assert_allclose(log.torque, newtons, rtol=1e-13)
+
+
 def test_rated_torques_and_counts(tmp_path) -> None:
     """What a drive on a field bus tells: counts of an encoder, and torque in thousandths of the rated one."""
     q, _ = motion(TIME)

@@ -112,6 +112,10 @@ REFUSED = {
     "log that says nothing": (lambda t: t + '[[log]]\nmatch = "a*"\n', "log 1: says nothing; give it one of"),
     "log without a pattern": (lambda t: t + "[[log]]\nsupply_V = 7\n", "log 1: missing key 'match'"),
     "log of a wrong kind": (lambda t: "log = 3\n" + t, "log is 3; it must be tables, [[log]]"),
+    "volts of what": (
+        lambda t: t.replace('unit = "Nm"', 'unit = "V"'),
+        "channels.torque: missing key 'rated', which goes with unit 'V'",
+    ),
     "rate": (lambda t: t.replace('unit = "s"', 'unit = "s"\nrate_hz = 5'), "time: rate_hz is 5; it must be"),
     "fast rate": (lambda t: t.replace('unit = "s"', 'unit = "s"\nrate_hz = 1e6'), "time: rate_hz is 1e+06; it must be"),
     "unit of time": (lambda t: t.replace('unit = "s"', 'unit = "h"'), "time: unit is 'h'; it must be one of"),

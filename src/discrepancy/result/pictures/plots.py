@@ -1,7 +1,7 @@
 """Pictures of a diagnosis: residuals over time and against what they may depend on, evidence, closed loop."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from discrepancy.causes.words import Words
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure, evidence_figure
 from discrepancy.result.pictures.plots_law import law_figure
@@ -29,7 +28,7 @@ def save_plots(
     values: Mapping[str, Any],
     traces: Sequence[Trace],
     channels: Sequence[Any],
-    words: Words,
+    unit: Callable[[str], str],
     folder: Path,
 ) -> list[Path]:
     """Draw everything there is and return the paths.
@@ -38,7 +37,7 @@ def save_plots(
         values: the diagnosis, as in the JSON.
         traces: residuals of every trial.
         channels: the rig's channels.
-        words: the rig's units.
+        unit: of a quantity that a misfit may depend on.
         folder: existing folder for ``residual_<trial>.png``, ``residual_against.png``, ``evidence.png`` and
             ``closed_loop.png`` and ``law.png`` (these only where the closed loop was simulated, and a law stated).
     """
@@ -46,7 +45,7 @@ def save_plots(
     paths = []
     for trace, name in zip(traces, file_names([trace.name for trace in traces]), strict=True):
         paths.append(_save(_time_figure(trace, grouped, named=named), folder / f"residual_{name}.png"))
-    paths.append(_save(against_figure(traces, grouped, words, named=named), folder / "residual_against.png"))
+    paths.append(_save(against_figure(traces, grouped, unit, named=named), folder / "residual_against.png"))
     paths.append(_save(evidence_figure(values), folder / "evidence.png"))
     loop = closed_loop_figure(values)
     if loop is not None:

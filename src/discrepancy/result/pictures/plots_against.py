@@ -1,12 +1,11 @@
 """The residual against speed, position, load and frequency, in multiples of clean data."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from discrepancy.causes.words import Words
 from discrepancy.result.pictures.residual_statistics import binned, spectrum
 from discrepancy.result.traces import Group, Trace
 from mocobot_sim.plots_plain import plain_numbers
@@ -15,7 +14,9 @@ BEFORE, AFTER = "#c8553d", "#2f6fd0"
 SERIES = (("as simulated", "white_before", BEFORE), ("with causes and tolerances", "white_after", AFTER))
 
 
-def against_figure(traces: Sequence[Trace], grouped: Sequence[Group], words: Words, *, named: bool) -> Figure:
+def against_figure(
+    traces: Sequence[Trace], grouped: Sequence[Group], unit: Callable[[str], str], *, named: bool
+) -> Figure:
     """One row per group of channels, one column per quantity; all trials together."""
     quantities = list(traces[0].quantities)
     columns = len(quantities) + 1
@@ -28,7 +29,7 @@ def against_figure(traces: Sequence[Trace], grouped: Sequence[Group], words: Wor
             scale_multiples(axis, max(tops), 1.6)
         row[0].set_ylabel(f"{group.name}\n[clean = 1]", fontsize=9)
     for axis, name in zip(axes[-1], quantities, strict=False):
-        axis.set_xlabel(f"{name} [{words.unit(name)}]")
+        axis.set_xlabel(f"{name} [{unit(name)}]")
     axes[-1][-1].set_xlabel("frequency [Hz]")
     handles, labels = axes[0][0].get_legend_handles_labels()
     labels[-1] = "with causes and tolerances" if named else "with tolerances"

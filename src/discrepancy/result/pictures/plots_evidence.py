@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from discrepancy.result.evidence_list import drawn, label, relation
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
-from discrepancy.result.text_gain import foretold_torques, response_units
+from discrepancy.result.text_gain import floor_words, foretold_torques, response_units
 from mocobot_sim.plots_plain import plain_numbers
 
 RELATIONS = {
@@ -87,7 +87,7 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
             )
             low, high = min(low, float(np.nanmin(heights))), max(high, float(np.nanmax(heights)))
         floor = scale * gain["noise"][key] if key in gain["noise"] else 1.0
-        axis.axhline(floor, color="black", linewidth=0.8, linestyle="--", label="noise and integration error")
+        axis.axhline(floor, color="black", linewidth=0.8, linestyle="--", label=floor_words(gain))
         low, high = min(low, floor), max(high, floor)
         if high > 12.0 * low:
             log_scale(axis, 10 ** np.floor(np.log10(0.9 * low)), 10 ** np.ceil(np.log10(1.1 * high)))
@@ -97,7 +97,9 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
         axis.set_xticks(at, [f"{k + 1}" for k in at])
         axis.set_xlabel("trial")
         axis.set_title(
-            f"{title} [{unit}]" if unit else f"{title} (noise and integration = 1)", loc="left", fontsize=10
+            f"{title} [{unit}]" if unit else f"{title} ({floor_words(gain).removesuffix(' error')} = 1)",
+            loc="left",
+            fontsize=10,
         )
         axis.grid(axis="y", alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()

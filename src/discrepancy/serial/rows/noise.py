@@ -1,6 +1,6 @@
 """What of the torque is noise: as loud as sensors are where nothing moves, as coloured as what all causes leave.
 
-Weights must suit what will be left over (as ``discrepancy.emps.noise`` has it for an axis). So the colour, and how the
+Weights must suit what will be left over. So the colour, and how the
 joints' rows go together, is that of what the whole catalogue leaves, and the level that of the sensors: the torque's
 own, read off above the rows' frequencies, and that of the positions, through the nominal model.
 """

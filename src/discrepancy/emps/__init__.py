@@ -1,1 +1,0 @@
-"""The EMPS rig: one electro-mechanical positioning axis, its drive and its position loop."""

@@ -1,1 +1,0 @@
-"""Laws at the axis."""

@@ -1,0 +1,337 @@
+"""The text of a verdict on a robot of joints: at most five sentences and one table; the rest on request."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from discrepancy import rules
+from discrepancy.causes.numbers import number
+from discrepancy.causes.units import one_each, parameter
+from discrepancy.digits import three_digits
+from discrepancy.result.evidence_list import label
+from discrepancy.result.read import VERDICTS
+from discrepancy.result.remains import remedy
+from discrepancy.result.text import (
+    NOTHING_WRONG_HERE,
+    WIDTH,
+    cause_lines,
+    limit_lines,
+    probability_words,
+    wrapped,
+)
+from discrepancy.result.text_gain import gain_lines
+from discrepancy.result.text_rollouts import rollout_lines
+
+Values = Mapping[str, Any]
+MOST_NAMED = 4
+"""Findings that the second sentence lists."""
+LEAST_NATS = 1.0
+"""Gains below are not told."""
+MOST_PLACES = 12
+"""Rows of a kind that is off everywhere."""
+PLACES, WHATS, GAP = 24, 34, "  "
+"""Widest columns, and what is between columns."""
+TOGETHER = "\N{NO-BREAK SPACE}"
+"""Between words that stay in one line of a cell."""
+Row = tuple[list[str], list[str], list[str], str]
+"""Lines of place, what and size, and a probability."""
+
+
+def format_verdict(values: Values, *, verbose: bool = False) -> str:
+    """Readable report of at most 100 columns.
+
+    Args:
+        values: a verdict in the form of ``verdict_to_dict``.
+        verbose: whether to tell rivals, limits, rollouts, notes and evidence, too.
+    """
+    lines = [*wrapped(" ".join(_sentences(values)), ""), *_table(values, verbose=verbose)]
+    if verbose:
+        lines += _rest(values)
+    return "\n".join(lines)
+
+
+def _sentences(values: Values) -> Iterable[str]:
+    yield _verdict(values)
+    if values["causes"]:
+        yield _found(values)
+    yield from values["remains"][:1]
+    yield from _gain(values)
+    yield from _advice(values)
+
+
+def _verdict(values: Values) -> str:
+    verdict, count, named = values["verdict"], len(values["recordings"]), len(values["causes"])
+    word = VERDICTS[verdict].upper()
+    word = word if values["finished"] else f"UNFINISHED, SO FAR {word}"
+    data = "the trial" if count == 1 else f"the {count} trials"
+    account = "one finding accounts for" if named == 1 else f"{named} findings account for"
+    said = {
+        "consistent": f"the model explains {data} within noise and tolerances",
+        "miscalibrated": f"in {data} all places of a kind are off by more than their tolerances",
+        "explained": f"{account} what the model gets wrong in {data}",
+        "partly_explained": f"{account} a part of what the model gets wrong in {data}",
+        "unexplained": f"no cause of the tables accounts for what the model gets wrong in {data}",
+    }[verdict]
+    return f"{word}: {said}."
+
+
+def _found(values: Values) -> str:
+    names = [_either(cause) for cause in values["causes"][:MOST_NAMED]]
+    more = len(values["causes"]) - len(names)
+    if more:
+        names.append(f"{more} more")
+    between = "; " if any(" or " in name for name in names) else ", "
+    listed = (
+        names[0] if len(names) == 1 else f"{between.join(names[:-1])}{between.rstrip(', ')} and {names[-1]}"
+    )
+    than = "the reference" if values.get("reference") else "its model"
+    return f"The robot differs from {than} by {listed}."
+
+
+def _either(cause: Values) -> str:
+    told = [entry["name"] for entry in cause.get("told", ())]
+    others = [name for name in told if name != cause["name"]]
+    if len(others) > 2:
+        return f"{cause['name']} or {len(others)} others"
+    return " or ".join([cause["name"], *others])
+
+
+def _gain(values: Values) -> Iterable[str]:
+    gain = values["gain"]
+    if gain is None or not values["causes"]:
+        return
+    if not gain["validated"]:
+        yield "There is one trial only, so the findings are not tested on data left out of the fit."
+    elif gain["removed"] is not None:
+        share = gain["removed"]["share"]
+        they = "it removes" if len(values["causes"]) == 1 else "they remove"
+        if share > 0.0:
+            yield f"In trials left out of the fit {they} {100.0 * share:.0f} % of the torques' error beyond noise."
+        else:
+            yield "In trials left out of the fit the torques' error is no smaller with that."
+
+
+def _advice(values: Values) -> Iterable[str]:
+    open_ = [cause for cause in values["causes"] if len(cause.get("told", ())) > 1 and cause["separate"]]
+    if not values["finished"]:
+        yield "Let the search come to its end before you rely on this."
+    elif open_:
+        yield f"To decide what {open_[0]['place']} has: {_lower(open_[0]['separate'])}"
+    elif values["verdict"] == "miscalibrated":
+        yield remedy(values)
+    elif values["verdict"] == "explained":
+        yield "Correct the model by the values below, or repair the robot there."
+    elif values["verdict"] == "consistent":
+        if values["detection_limits"]:
+            yield "What would have been noticed is listed with --verbose."
+    else:
+        yield "The pictures that --out writes show at which speed, position and load the torques part."
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+# --- the table
+
+
+def _table(values: Values, *, verbose: bool) -> list[str]:
+    named = [row for cause in values["causes"] for row in _rows(cause, verbose=verbose)]
+    off = [row for entry in values["scatter"] for row in _scattered(entry)]
+    suspected = [row for cause in values["suspected"] for row in _rows(cause, verbose=verbose)]
+    rows = [*named, *off, *suspected]
+    if not rows:
+        return []
+    head: Row = (["place"], ["what"], ["size +- standard error"], "probability")
+    widths = [
+        min(most, max(len(line) for row in (head, *rows) for line in row[k]))
+        for k, most in enumerate((PLACES, WHATS))
+    ]
+    last = max(len(row[3]) for row in (head, *rows))
+    room = WIDTH - sum(widths) - last - 3 * len(GAP)
+    widths.append(min(room, max(len(line) for row in (head, *rows) for line in row[2])))
+    out = ["", *_lines(head, widths, last), "-" * (sum(widths) + last + 3 * len(GAP))]
+    out += [line for row in (*named, *off) for line in _lines(row, widths, last)]
+    if suspected:
+        text = "-- suspected, too improbable to be named "
+        out.append(text.ljust(sum(widths) + last + 3 * len(GAP), "-"))
+        out += [line for row in suspected for line in _lines(row, widths, last)]
+    return out
+
+
+def _lines(row: Row, widths: Sequence[int], last: int) -> list[str]:
+    """A row as lines; what is too wide for its column goes on below."""
+    cells = [
+        [
+            part
+            for line in row[k]
+            for part in textwrap.wrap(line, widths[k], subsequent_indent="  ", break_on_hyphens=False) or [""]
+        ]
+        for k in range(3)
+    ]
+    out = []
+    for i in range(max(map(len, cells))):
+        parts = [cell[i].replace(TOGETHER, " ") if i < len(cell) else "" for cell in cells]
+        text = GAP.join(f"{part:<{width}}" for part, width in zip(parts, widths, strict=True))
+        out.append(f"{text}{GAP}{row[3] if i == 0 else '':>{last}}".rstrip())
+    return out
+
+
+def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
+    """A finding; a kind with a row for every joint."""
+    what = [_what(cause["kind"]), *_ors(cause)]
+    chance = _chance(cause["probability"])
+    members = cause.get("members") or [cause]
+    if len(members) == 1:
+        sizes = _sizes(members[0]["parameters"], verbose=verbose)
+        if cause.get("event"):
+            event = cause["event"]
+            sizes.append(f"trial {event['trial']}, {event['start_s']:.2f} s, for {event['duration_s']:.2f} s")
+        yield [cause["place"]], what, sizes or [""], chance
+    else:
+        yield from _each(cause["place"], what, members, chance)
+
+
+def _scattered(entry: Values) -> Iterable[Row]:
+    what = [_what(entry["kind"]), f"{entry['factor']:.1f} times the tolerance"]
+    members = entry["each"][:MOST_PLACES]
+    yield from _each(f"{entry['places']} places", what, members, "")
+    if entry["places"] > len(members):
+        yield [f"  and {entry['places'] - len(members)} more"], [""], [""], ""
+
+
+def _each(place: str, what: list[str], members: Sequence[Values], chance: str) -> Iterable[Row]:
+    """A heading, and a row for every place; units in the heading if all places have the same."""
+    names = {tuple(member["parameters"]) for member in members}
+    shown = one_each(
+        (parameter(name)[1], entry["value"])
+        for member in members
+        for name, entry in member["parameters"].items()
+    )
+    heading = [_named(name, shown) for name in members[0]["parameters"]] if len(names) == 1 else []
+    yield [place], what, [", ".join(heading)], chance
+    for member in members:
+        numbers = [
+            _number(name, entry, shown, named=not heading, unit=False)
+            for name, entry in member["parameters"].items()
+        ]
+        yield [f"  {member['place']}"], [""], [f"  {', '.join(numbers)}"], ""
+
+
+def _what(kind: str) -> str:
+    """A cause in words without its place."""
+    return re.sub(r" (in|of|at) (a joint|a link|two joints)\b", "", kind)
+
+
+def _ors(cause: Values) -> list[str]:
+    """What else may be there, of the smallest set that holds 90 %."""
+    chances = {rival["name"]: rival["probability"] for rival in cause["alternatives"]}
+    out = []
+    for entry in cause.get("told", ()):
+        unlisted = entry["cause"] == "unlisted"
+        if entry["name"] != cause["name"]:
+            chance = cause["instead"]["unlisted"] if unlisted else chances.get(entry["name"])
+            name = "something unlisted" if unlisted else entry["name"]
+            out.append(f"or {name}{'' if chance is None else f' ({_chance(chance)})'}")
+    return out
+
+
+def _chance(probability: float) -> str:
+    return probability_words(probability).replace("above", ">").replace("below", "<")
+
+
+def _sizes(parameters: Values, *, verbose: bool) -> list[str]:
+    """Numbers of one place, a line each; three of a point in one; moments of inertia on request."""
+    shown = one_each((parameter(name)[1], entry["value"]) for name, entry in parameters.items())
+    point = [name for name in parameters if re.fullmatch(r"[xyz]_\w+", name)]
+    out = []
+    for name, entry in parameters.items():
+        if name in point[1:] or (name.startswith("inertia_") and not verbose):
+            continue
+        if name in point:
+            numbers = [_number(each, parameters[each], shown, named=False, unit=False) for each in point]
+            out.append(f"x, y, z: {', '.join(numbers)} {_unit(name, shown)[0]}")
+        else:
+            out.append(_number(name, entry, shown, named=len(parameters) > 1))
+    return out
+
+
+def _unit(name: str, shown: Mapping[str, tuple[str, float]]) -> tuple[str, float]:
+    unit = parameter(name)[1]
+    return shown[unit] if unit else ("%", 100.0)
+
+
+def _named(name: str, shown: Mapping[str, tuple[str, float]]) -> str:
+    return f"{_word(name)} [{_unit(name, shown)[0]}]".replace(" ", TOGETHER)
+
+
+def _number(
+    name: str, entry: Values, shown: Mapping[str, tuple[str, float]], *, named: bool, unit: bool = True
+) -> str:
+    said, scale = _unit(name, shown)
+    text = number(entry["value"], entry["se"], said if named or unit else "", scale)
+    return (f"{_word(name)} {text}" if named else text).replace(" ", TOGETHER)
+
+
+def _word(name: str) -> str:
+    return parameter(name)[0].replace("coulomb", "Coulomb")
+
+
+# --- the rest
+
+
+def _rest(values: Values) -> Iterable[str]:
+    for k, cause in enumerate(values["causes"], start=1):
+        yield from ("", f"[[{cause['name'][:1].upper()}{cause['name'][1:]} ({cause['cause']})]]")
+        yield from wrapped(cause["sentence"])
+        yield from cause_lines(cause, further=k > 1)
+    if values["suspected"]:
+        yield from ("", "[[Suspected: too improbable to be named]]")
+        for entry in values["suspected"]:
+            chance = probability_words(entry["probability"])
+            yield from wrapped(
+                f"{label(entry)} ({entry['cause']}), probability {chance}: {entry['sentence']}"
+            )
+    yield from gain_lines(values)
+    yield from rollout_lines(values)
+    for title, entries in (
+        ("nothing found", values["evidence"]["before"]),
+        ("that", values["evidence"]["after"]),
+    ):
+        if entries := [entry for entry in entries or () if entry["nats"] >= LEAST_NATS]:
+            yield from ("", f"[[What one more cause would gain, with {title} in the model]]")
+            yield from wrapped(
+                ", ".join(f"{label(entry)} {entry['nats']:.0f} nats" for entry in entries) + "."
+            )
+    yield from ("", "[[Misfit]]", *wrapped(_misfit(values)))
+    for sentence in values["remains"]:
+        yield from wrapped(sentence)
+    if values["detection_limits"]:
+        title = (
+            "would have been noticed"
+            if values["verdict"] in NOTHING_WRONG_HERE
+            else "would be noticed besides"
+        )
+        yield from ("", f"[[What {title}, nine times in ten]]", *limit_lines(values["detection_limits"]))
+    if values["undecidable"]:
+        yield from ("", "[[What such logs cannot decide]]")
+        for entry in values["undecidable"]:
+            yield from wrapped(f"{entry['what']}: {entry['why']}; needs {entry['remedy']}.")
+    if values["notes"]:
+        yield from ("", "[[Notes]]")
+        for note in values["notes"]:
+            yield from wrapped(note)
+
+
+def _misfit(values: Values) -> str:
+    residual = values["residual"]
+    text = f"chi2/n is {three_digits(residual['nominal']['chi2_per_n'])} as modelled, "
+    text += (
+        f"{three_digits(residual['chi2_per_n_tolerated'])} with everything a little off, within its tolerance"
+    )
+    if values["causes"]:
+        text += f", {three_digits(residual['chi2_per_n'])} with what is found"
+    return f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."

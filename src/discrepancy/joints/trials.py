@@ -1,0 +1,161 @@
+"""From logs to trials: torques of every drive, smooth signals, and parts that foretell each other."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.joints.noise import sensor_noise
+from discrepancy.serial.mechanics.nominal import inverse_torque
+from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rows.signals import Signals
+from discrepancy.serial.servo.motor import Motor, with_torques
+from estimator.arrays import Array
+from estimator.errors import InputError
+
+EDGE_S = 0.1
+"""Left out at both ends, where smoothing is spoilt: six periods of its cut-off."""
+SHORT_S = 0.03
+"""Spells without a reading that are interpolated. Derived: a quarter of a period of the fastest row."""
+LEAST_S, LEAST_SAMPLES = 2.0, 40
+"""A part that is used, at least."""
+PARTS, PART_S = 3, 4.0
+"""Parts of a single log, and their length at least: each holds most of the motion's poses."""
+LEAST_SPEED = 1e-6
+RESTS = 2.0
+"""Noise over which readings of a joint must scatter for it to move."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Logs as the engine takes them.
+
+    Attributes:
+        runs: stretches without gaps; those of a reference come last.
+        changed: how many are none of the reference.
+        joints: which have torques in all logs, from 0, shape (C,).
+        motors: drives that tell no torque, and what they give by what they were given.
+        parts: for each part its run and the samples of it.
+        names: of the parts.
+        noise: a draw of what the sensors add to the residual of each run, shape (W, J).
+    """
+
+    runs: tuple[Signals, ...]
+    changed: int
+    joints: NDArray[np.intp]
+    motors: tuple[Motor, ...]
+    parts: tuple[tuple[int, slice], ...]
+    names: tuple[str, ...]
+    noise: tuple[Array, ...]
+
+    @property
+    def signals(self) -> tuple[Signals, ...]:
+        """Of each part."""
+        return tuple(part_of(self.runs[k], at) for k, at in self.parts)
+
+
+def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[JointLog] = ()) -> Trials:
+    """Smooth the logs, and cut them where samples are missing; a single log has three parts if it is long enough.
+
+    Raises:
+        InputError: a log is too short, or has no torques.
+    """
+    every, motors = with_torques(model, [*logs, *reference])
+    known = np.ones(len(model.joints), dtype=bool)
+    for log in every:
+        if log.torque is None:
+            raise InputError(
+                f"{log.name}: there are no torques, currents or duties, one of which the diagnosis needs"
+            )
+        known &= np.isfinite(log.torque).any(axis=0)
+    joints = np.flatnonzero(known)
+    if not len(joints):
+        raise InputError(f"{every[0].name}: no joint has torques in every log")
+    tree, inverse = Tree.of(model.model), partial(inverse_torque, model.model)
+    whole = [Signals.of(log, tree, inverse) for log in every]
+    typical = np.sqrt(np.mean([np.mean(s.dq**2, axis=0) for s in whole], axis=0))
+    whole = [replace(s, typical=np.maximum(typical, LEAST_SPEED)) for s in whole]
+    at = [_runs(s, joints) for s in whole]
+    cut = [[part_of(s, run) for run in own] for s, own in zip(whole, at, strict=True)]
+    runs = [run for own in cut for run in own]
+    loud = [sensor_noise(s) for s in whole]
+    noise = tuple(x[run] for x, own in zip(loud, at, strict=True) for run in own)
+    changed = sum(len(own) for own in cut[: len(logs)])
+    number = PARTS if len(runs) == 1 else 1
+    parts = []
+    for k, s in enumerate(runs):
+        most = max(1, min(number, int(len(s.time) / s.rate_hz / PART_S)))
+        edges = np.linspace(0, len(s.time), most + 1).astype(int)
+        parts += [(k, slice(int(a), int(b))) for a, b in itertools.pairwise(edges)]
+    names = tuple(_name(runs[k], at, whole=len(parts) == len(every)) for k, at in parts)
+    return Trials(tuple(runs), changed, joints, motors, tuple(parts), names, noise)
+
+
+def part_of(s: Signals, at: slice) -> Signals:
+    """Some samples of a log."""
+    own = {name: getattr(s, name)[at] for name in ("time", "q", "dq", "ddq", "torque", "usable", "inverse")}
+    return replace(s, enabled=None if s.enabled is None else s.enabled[at], **own)
+
+
+def _runs(s: Signals, joints: NDArray[np.intp]) -> list[slice]:
+    """Stretches of usable samples without the ends that smoothing spoils, short gaps included."""
+    bad = ~s.usable[:, joints].all(axis=1)
+    edge = max(1, round(EDGE_S * s.rate_hz))
+    cuts = [-1, *np.flatnonzero(bad).tolist(), len(bad)]
+    runs: list[list[int]] = []
+    for a, b in itertools.pairwise(cuts):
+        if b - a > 1:
+            if runs and a + 1 - runs[-1][1] <= SHORT_S * s.rate_hz + 1:
+                runs[-1][1] = b
+            else:
+                runs.append([a + 1, b])
+    out = [slice(a + edge, b - edge) for a, b in runs]
+    least = max(LEAST_S * s.rate_hz, LEAST_SAMPLES)
+    out = [run for run in out if run.stop - run.start >= least]
+    if not out:
+        raise InputError(
+            f"{s.log.name}: no part of it is long enough to diagnose; it needs at least "
+            f"{least / s.rate_hz + 2 * EDGE_S:.2g} s without gaps"
+        )
+    return out
+
+
+def _name(s: Signals, at: slice, *, whole: bool) -> str:
+    name = Path(s.log.name).stem
+    return name if whole else f"{name} {s.time[at.start]:.2f}-{s.time[at.stop - 1]:.2f} s"
+
+
+def notes_of(logs: Sequence[JointLog]) -> Iterator[str]:
+    """Notes on logs; of those that differ in their numbers only, the first, and how many more there are."""
+    alike: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.notes:
+            alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", note), []).append(f"{log.name}: {note}")
+    for notes in alike.values():
+        more = len(notes) - 1
+        parts = f"{more} more part{'s' if more > 1 else ''} of the logs"
+        yield notes[0] + (f" So it is, with other numbers, in {parts}." if more else "")
+
+
+def resting(logs: Sequence[JointLog]) -> Iterator[str]:
+    """What rests in all logs, of which they tell little."""
+    still = np.ones(len(logs[0].joints), dtype=bool) if logs else np.zeros(0, dtype=bool)
+    for log in logs:
+        # White noise has second differences of six times its variance; those of a motion are small beside its size.
+        noise: Array = np.std(np.diff(log.q, 2, axis=0), axis=0) / np.sqrt(6.0)
+        still &= np.std(log.q, axis=0) <= np.maximum(RESTS * noise, log.position_step)
+    names = [name for name, rests in zip(logs[0].joints, still, strict=True) if rests] if logs else []
+    if names and still.all():
+        yield "No joint moves in these logs; they tell no friction and no inertia, and gravity in one pose only."
+    elif names:
+        which = f"{', '.join(names[:-1])} and {names[-1]} do" if len(names) > 1 else f"{names[0]} does"
+        yield f"{which} not move in these logs, which tell no friction and no rotor there."

@@ -1,1 +1,0 @@
-"""The EMPS axis and its digital loop."""
