@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,12 +14,13 @@ import numpy as np
 import pytest
 
 from discrepancy.joints.findings import Event, Finding, Member
-from discrepancy.joints.problem import smoothed
 from discrepancy.joints.rolled.closed import laws_without, longest
 from discrepancy.joints.rolled.free import diverged, in_neither, rms, starts, usable
 from discrepancy.joints.rolled.robot import LoggedTorques, Robot
 from discrepancy.joints.rolled.told import rolled_out
 from discrepancy.result.text_rollouts import rollout_lines
+from discrepancy.serial.mechanics.nominal import inverse_torque
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel, load_model
 from discrepancy.serial.recording.joint_log import Drive, JointLog
 from discrepancy.serial.rows.signals import Signals
@@ -72,8 +74,7 @@ def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def signals(model: SerialModel, log: JointLog) -> Signals:
-    (smooth,) = smoothed(model, [log])
-    return smooth
+    return Signals.of(log, Tree.of(model.model), partial(inverse_torque, model.model))
 
 
 def finding(cause: str, place: str, joint: int | None, values: dict[str, float], **more: Any) -> Finding:
