@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.joints.findings import Finding, JointVerdict, Member
-from discrepancy.joints.problem import horizontal
+from discrepancy.joints.values import axes_of_tilt
 from discrepancy.serial.model import SerialModel, load_spec
 from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.serial.effects import RobotEffect
@@ -62,7 +62,7 @@ def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect
         numbers = {"bend": 0.0} | numbers
     if finding.cause == "gravity_direction":
         gravity = np.array(model.model.opt.gravity)
-        way = np.array([numbers["tilt_1_rad"], numbers["tilt_2_rad"]]) @ horizontal(gravity)
+        way = np.array([numbers["tilt_1_rad"], numbers["tilt_2_rad"]]) @ axes_of_tilt(gravity)
         turned = Rotation.from_rotvec(-way).apply(gravity)
         numbers |= dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, turned), strict=True))
     joint, body = member.joint, ""

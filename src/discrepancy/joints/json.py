@@ -98,6 +98,8 @@ class _Told:
     def finding(self, f: Finding) -> Values:
         """An entry of ``causes`` and ``suspected``."""
         at, event = self.at(f.cause, f.place, f.joint, f.partner), f.event
+        if f.of:
+            at |= {"name": f"{at['name']} by its {f.of}"}
         members = [self.member(f, member, at) for member in f.members]
         parameters = _medians(f.members) if len(members) > 1 else members[0]["parameters"] if members else {}
         return at | {

@@ -66,7 +66,7 @@ gain                null where the closed loop was not simulated and there is no
     estimates       {before, after}, as the rig has them
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null
-rollouts            of serial robots: measured states let go in simulation, see ``serial.rolled.told``; else null
+rollouts            of serial robots: measured states let go in simulation, see ``joints.rolled.told``; else null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
 detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
                     times in ten; null where these recordings say nothing; of "joints" with ``place``

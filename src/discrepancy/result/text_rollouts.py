@@ -1,4 +1,4 @@
-"""The part of the report on rollouts of a serial robot (keys: ``discrepancy.serial.rolled.told``)."""
+"""The part of the report on rollouts of a serial robot (keys: ``discrepancy.joints.rolled.told``)."""
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence

@@ -34,12 +34,11 @@ class RobotEffect:
         """The number that is named so, or whose name begins so, whatever its unit.
 
         Raises:
-            KeyError: there is none, or more than one.
+            ValueError: there is none, or more than one.
         """
-        named = [n for n in self.parameters if n in stems or n.startswith(tuple(f"{s}_" for s in stems))]
-        if len(named) != 1:
-            raise KeyError(stems)
-        return float(self.parameters[named[0]])
+        begins = tuple(f"{stem}_" for stem in stems)
+        (name,) = (n for n in self.parameters if n in stems or n.startswith(begins))
+        return float(self.parameters[name])
 
 
 def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Array, dry: Array) -> Array:

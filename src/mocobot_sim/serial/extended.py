@@ -134,9 +134,8 @@ def write_extended(
 
 def _entry(effect: Effect) -> dict[str, Any]:
     if isinstance(effect, JointLaw):
-        plain = RobotEffect(LAW, effect.joint)
-        return asdict(plain) | {"law": effect.to_dict()}
-    return asdict(effect) | {"parameters": dict(effect.parameters), "law": None}
+        return asdict(RobotEffect(LAW, effect.joint)) | {"law": effect.to_dict()}
+    return asdict(effect) | {"law": None}
 
 
 def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
@@ -180,6 +179,9 @@ def step(
         effects: of ``load_effects``.
         torque: at the joints, shape (J,).
     """
+    if not effects:
+        data.qfrc_applied[:] = torque
+        return mujoco.mj_step(model, data)
     before = np.array(data.qacc)
     listed = [effect for effect in effects if isinstance(effect, RobotEffect)]
     rubbing = [effect for effect in listed if effect.cause in DRY]

@@ -113,7 +113,7 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
         return False
     joint = None if effect.joint is None else spec.joint(model.joint(effect.joint - 1).name)
     body = spec.body(effect.body) if effect.body else joint.parent
-    index = model.body(effect.body).id if effect.body else int(model.jnt_bodyid[effect.joint - 1])
+    index = model.body(effect.body).id if effect.body else int(model.joint(joint.name).bodyid[0])
     if effect.cause == "link_length":
         body.pos = np.array(body.pos) + [effect.number(axis) for axis in "xyz"]
         return True

@@ -67,10 +67,10 @@ WAYS = {
 OFF = {
     "link_mass": {"excess_kg": 0.3},
     "link_com": {"x_m": 0.02, "y_m": 0.01, "z_m": 0.0},
-    "link_inertia": dict.fromkeys([f"inertia_{axes}_kgm2" for axes in ("xx", "yy", "zz")], 0.004)
+    "link_inertia": {"share": 0.3},
+    "payload": {"mass_kg": 0.5, "x_m": 0.2, "y_m": 0.02, "z_m": 0.01}
+    | dict.fromkeys([f"inertia_{axes}_kgm2" for axes in ("xx", "yy", "zz")], 0.002)
     | dict.fromkeys([f"inertia_{axes}_kgm2" for axes in ("xy", "xz", "yz")], 0.0),
-    "payload": {"mass_kg": 0.5, "x_m": 0.2, "y_m": 0.02, "z_m": 0.01, "gyration_m": 0.05}
-    | dict.fromkeys([f"inertia_{axes}_kgm2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")], 0.0),
 }
 
 
@@ -99,13 +99,13 @@ def test_inertia_is_put_in_whatever_way_the_model_gives_it_in(way: str, cause: s
     mass, com, inertia = tree.mass[joint], tree.com[joint], tree.inertia[joint]
     own = inertial_parameters(mass, com, inertia)
     if cause == "payload":
-        more = inertial_parameters(0.5, centre, 0.5 * 0.05**2 * np.eye(3))
+        more = inertial_parameters(0.5, centre, 0.002 * np.eye(3))
     elif cause == "link_mass":
-        more = inertial_parameters(mass + 0.3, com, inertia * (1.0 + 0.3 / mass)) - own
+        more = inertial_parameters(0.3, com, 0.0 * inertia)
     elif cause == "link_com":
         more = inertial_parameters(mass, com + centre, inertia) - own
     else:
-        more = inertial_parameters(0.0, com, 0.004 * np.eye(3))
+        more = inertial_parameters(0.0, com, 0.3 * inertia)
     wanted = inverse_torque(before, *states) + body_regressor(moved, joint) @ more
     np.testing.assert_allclose(inverse_torque(after, *states), wanted, atol=1e-4)
 
@@ -119,7 +119,7 @@ def test_positions_are_in_the_unit_in_which_the_model_has_angles(compiler: str, 
     before, after = extended(text, RobotEffect("joint_zero", 2, None, {"zero_rad": 0.05}))
     stands = [states[0] + [0.0, 0.05], *states[1:]]
     np.testing.assert_allclose(inverse_torque(after, *states), inverse_torque(before, *stands), atol=1e-4)
-    spring = {"stiffness_Nm_per_rad": 3.0, "neutral_rad": 0.2}
+    spring = {"stiffness_Nm_per_rad": 3.0, "middle_rad": 0.5, "offset_Nm": 0.9}
     before, after = extended(text, RobotEffect("spring", 2, None, spring))
     wanted = inverse_torque(before, *states)
     wanted[:, 1] += 3.0 * (states[0][:, 1] - 0.2)

@@ -138,13 +138,13 @@ def roll_freely(trial: Trial, horizons: Sequence[Horizon], passed_s: float, tota
     ahead = [max(1, round(h.seconds * s.rate_hz)) for h in horizons]
     apart = max(1, round(total_s / MOST_STARTS * s.rate_hz))
     good = usable(s, trial.events)
+    logged = {id(r): LoggedTorques.of(s.log, r.readings) for r in (trial.given, trial.found) if r is not None}
     for first, reach in starts(good, -round(passed_s * s.rate_hz) % apart, apart, ahead[-1], ahead[0]):
         reached = [n for n in ahead if n <= reach]
 
         def run(robot: Robot, first: int = first, reached: Sequence[int] = reached) -> Array:
-            torques = LoggedTorques.of(s.log, robot.readings)
             piece = slice(first, first + reached[-1] + 1)
-            return robot.errors(s, piece, torques, trial.limit, trial.tick)[list(reached)]
+            return robot.errors(s, piece, logged[id(robot)], trial.limit, trial.tick)[list(reached)]
 
         before, after = trial.both(run, (len(reached), s.q.shape[1]))
         for horizon, a, b in zip(horizons, before, after, strict=False):

@@ -63,12 +63,16 @@ class Readings:
                 out.braking[j] += effect.number("braking")
         return out
 
-    def real(self, told: Array, dq: Array, on: float) -> Array:
-        """Torques at the joints (J,) by those that the log would have, velocities, and whether the drives are on."""
+    def real(self, told: Array, dq: Array, on: Array | float) -> Array:
+        """Torques at the joints by those that the log would have, velocities, and whether the drives are on.
+
+        Shapes (..., J), (..., J), and (..., 1) or ().
+        """
         read = told - self.offset * on
         # The root of squared x^2 + scale x = |read|, in a form that has no zero below it.
         root = np.sqrt(np.maximum(self.scale**2 + 4.0 * self.squared * np.abs(read), 0.0))
-        return np.asarray(2.0 * read / (self.scale + root) - on * self.braking * dq)
+        real = 2.0 * read / (self.scale + root)
+        return real - on * self.braking * dq if self.braking.any() else real
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +80,14 @@ class LoggedTorques:
     """The torques of a log as drives of a simulation, interpolated linearly between samples.
 
     Attributes:
-        readings: what is wrong with them.
         time: of the samples, even [s], shape (Q,).
-        torque: shape (Q, J); read where it was known only.
-        on: whether the drives are on, shape (Q,).
+        torque: at standstill, shape (Q, J); read where it was known only.
+        braking: what is lost to the speed, shape (Q, J); None where nothing is.
     """
 
-    readings: Readings
     time: Array
     torque: Array
-    on: Array
+    braking: Array | None
 
     @classmethod
     def of(cls, log: JointLog, readings: Readings) -> LoggedTorques:
@@ -96,15 +98,16 @@ class LoggedTorques:
         for j in np.flatnonzero(readings.delay_s):  # what was read late was there before
             good = np.isfinite(log.torque[:, j])
             torque[:, j] = np.interp(log.time + readings.delay_s[j], log.time[good], log.torque[good, j])
-        return cls(readings, log.time, torque, on)
+        braking = on[:, None] * readings.braking if readings.braking.any() else None
+        return cls(log.time, readings.real(torque, np.zeros_like(torque), on[:, None]), braking)
 
     def __call__(self, time: float, q: Array, dq: Array) -> Array:
         """Torques at the joints, shape (J,)."""
         at = (time - self.time[0]) / (self.time[1] - self.time[0])
         k = min(max(int(at), 0), len(self.time) - 2)
         share = min(max(at - k, 0.0), 1.0)
-        told = (1.0 - share) * self.torque[k] + share * self.torque[k + 1]
-        return self.readings.real(told, dq, float(self.on[k]))
+        out = (1.0 - share) * self.torque[k] + share * self.torque[k + 1]
+        return out if self.braking is None else out - self.braking[k] * dq
 
 
 @dataclass(frozen=True, eq=False)
