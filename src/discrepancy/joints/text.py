@@ -96,7 +96,7 @@ def _found(values: Values) -> str:
 
 def _either(cause: Values) -> str:
     """All of the smallest set that holds 90 %, the likeliest first, and what was fitted."""
-    names = list(dict.fromkeys([*(entry["name"] for entry in cause["told"]), cause["name"]]))
+    names = list(dict.fromkeys(entry["name"] for entry in (*cause["told"], cause)))
     return " or ".join(names) if len(names) <= MOST_ALIKE else f"{names[0]} or {len(names) - 1} others"
 
 

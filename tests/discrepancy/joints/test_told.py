@@ -266,6 +266,23 @@ def test_what_is_likelier_than_what_was_fitted_comes_first(tmp_path: Path) -> No
     assert "or payload at link carriage (98 %)" in " ".join(line[15:50].strip() for line in table(text)[3:])
 
 
+def test_one_place_that_was_judged_as_one_of_all_joints_is_no_rival_of_itself(tmp_path: Path) -> None:
+    one = finding("friction", member("turn", 1, coulomb_Nm=0.5, viscous_Nms_per_rad=0.3))
+    one = replace(one, told=(("friction", "all joints"),))
+    text = format_verdict(values(tmp_path, [one]))
+    assert " or " not in text.replace("or repair", "")
+    both = replace(one, rivals=(Rival("friction", "all joints", None, 0.4, 0.5),))
+    assert "or friction in all joints" in format_verdict(values(tmp_path, [both]))
+
+
+def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
+    some = finding("unlisted", place="turn", joint=1, of="position and direction")
+    text = format_verdict(values(tmp_path, [some]))
+    assert "by something unlisted at joint 1 (turn) by its position and direction." in first_part(text)
+    assert "something unlisted by its" in table(text)[2]
+    assert " or " not in text.replace("or repair", "")
+
+
 def test_units_of_a_kind_stand_once(tmp_path: Path) -> None:
     kind = finding("torque_delay", *(member(name, j, delay_s=0.008) for j, name in enumerate(JOINTS, 1)))
     rows = table(format_verdict(values(tmp_path, [kind])))
