@@ -391,7 +391,7 @@ def test_options_are_shown_as_they_were_given(pages: dict[str, Reader]) -> None:
 def test_a_robots_page_is_not_called_a_teams(pages: dict[str, Reader]) -> None:
     text = pages["robot"].rows()
     assert "Diagnosis of a robot: consistent" in text
-    assert "Logs of a robot's joints, in 2 parts, are held against the simulation" in text.replace("’", "'")
+    assert "2 trials of a robot's joints are held against the simulation" in text.replace("’", "'")
     assert "recordings of a team that carries one payload are held" in pages["diagnosis"].rows()
 
 

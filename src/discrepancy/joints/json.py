@@ -243,18 +243,16 @@ def _gain(verdict: JointVerdict) -> Values | None:
         sizes |= {f"{name}_nrmse": float(rms[j] / one.torque[j]) for j, name in names.items()}
         return sizes | {"chi2_per_n": float(getattr(one, f"chi2_{which}"))}
 
-    trials = [
-        {"name": one.trial} | {which: errors(one, which) for which in ("before", "after")} for one in foretold
-    ]
+    sides = {which: [errors(one, which) for one in foretold] for which in ("before", "after")}
+    both = zip(foretold, sides["before"], sides["after"], strict=True)
     noise = np.sqrt(np.mean([np.square(one.noise) for one in foretold], axis=0))
     return {
-        "held_out": {which: _means([trial[which] for trial in trials]) for which in ("before", "after")}
-        | {"as_found": None},
+        "held_out": {which: _means(each) for which, each in sides.items()} | {"as_found": None},
         "units": {name: unit_of(verdict.model, j) for j, name in names.items()},
         "noise": {f"{name}_rms": float(noise[j]) for j, name in names.items()},
         "removed": _removed(foretold) if verdict.findings else None,
         "validated": verdict.validated,
-        "trials": trials,
+        "trials": [{"name": one.trial, "before": before, "after": after} for one, before, after in both],
     }
 
 

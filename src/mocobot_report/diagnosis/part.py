@@ -309,18 +309,11 @@ KINDS = {
 }  # fmt: skip
 MEANING = {
     "consistent": "The simulation explains the recordings within noise and tolerances; nothing is named.",
-    "miscalibrated": "The robots are off by more than their tolerances, all places alike, so none is named.",
+    "miscalibrated": "All places of a kind are off by more than their tolerances, so none is named.",
     "explained": "The named causes explain what the simulation got wrong.",
     "partly_explained": "The named causes are there, but more than noise is left.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
-OF_JOINTS = {
-    "consistent": "The model explains the logs within noise and tolerances; nothing is named.",
-    "miscalibrated": "The robot is off by more than its tolerances, all places alike, so none is named.",
-    "explained": "The named causes explain what the model got wrong.",
-    "unexplained": "Logs and model differ, and no cause of the tables accounts for it.",
-}
-"""The same of one robot of joints, where that is said otherwise."""
 
 
 def is_robot(diagnosed: Diagnosed) -> bool:
@@ -329,8 +322,7 @@ def is_robot(diagnosed: Diagnosed) -> bool:
         return True
     provenance = diagnosed.provenance
     options = provenance.get("options") if isinstance(provenance, dict) else None
-    told = isinstance(options, dict) and options.get("model") is not None
-    return told or diagnosed.values.get("rollouts") is not None
+    return isinstance(options, dict) and options.get("model") is not None
 
 
 def title(diagnosed: Diagnosed) -> str:
@@ -343,19 +335,17 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     """Verdict, causes in words, and what they are worth."""
     values = diagnosed.values
     count = len(values["recordings"])
-    joints, simulation = is_robot(diagnosed), "simulation"
-    if joints:
-        what, simulation = f"{count} trials of a robot's joints are", "robot's model"
-        what = "One trial of a robot's joints is" if count == 1 else what
+    if is_robot(diagnosed):
+        what = "One trial of a robot's joints is" if count == 1 else f"{count} trials of a robot's joints are"
     elif count == 1:
         what = "One recording of a team that carries a payload is"
     else:
         what = f"{count} recordings of a team that carries one payload are"
     lede = (
-        f"{what} held against the {simulation}: where do they part, which physical cause does it, and what is it worth "
-        f"to have it in the {simulation.split()[-1]}?"
+        f"{what} held against the simulation: where do they part, which physical cause does it, and what is it worth "
+        "to have it in the simulation?"
     )
-    meaning = (MEANING | (OF_JOINTS if joints else {}))[values["verdict"]]
+    meaning = MEANING[values["verdict"]]
     if len(values["causes"]) == 1:
         meaning = meaning.replace("causes explain", "cause explains").replace("causes are", "cause is")
     said: list[Node | str] = []
