@@ -103,7 +103,7 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
     steps: list[str] = []
     outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)))
     causes = []
-    for o in odds_of(outcome.search, outcome.state, 1.0):
+    for o in odds_of(outcome.search, outcome.state):
         none = {True: ("open", ""), False: ("nothing", "")}
         rivals = [(r.group.key if r.group else none[r.open], r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
