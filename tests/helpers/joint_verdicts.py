@@ -53,7 +53,8 @@ def finding(cause: str, *members: Member, place: str = "", **more: Any) -> Findi
     where = place or (alone.place if alone else "all joints")
     given = {"probability": 0.97, "over_nothing": 180.0, "nothing": 0.0, "unlisted": 0.03, "folds": (80.0, 100.0),
              "in_sample": 0.4, "held_out": 0.38, "told": ((cause, where),)} | more  # fmt: skip
-    return Finding(cause, where, alone.joint if alone else None, members, **given)
+    joint = alone.joint if alone else more.get("joint")
+    return Finding(**{"cause": cause, "place": where, "members": members} | given | {"joint": joint})
 
 
 def friction_everywhere() -> Finding:

@@ -11,10 +11,11 @@ TOKENS = {
 SMALL = {
     "m": ("mm", 1e3), "rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m/s": ("mm/s", 1e3), "V": ("mV", 1e3),
     "s": ("ms", 1e3), "m/N": ("mm/N", 1e3), "rad/N": ("mrad/N", 1e3),
+    "rad/N m": ("mrad/N m", 1e3),
 }  # fmt: skip
 SMALLER = {
     "m": ("um", 1e6), "rad": ("urad", 1e6), "N m": ("uN m", 1e6), "N": ("mN", 1e3), "s": ("us", 1e6),
-    "m/s": ("um/s", 1e6), "m/N": ("um/N", 1e6), "rad/N": ("urad/N", 1e6),
+    "m/s": ("um/s", 1e6), "m/N": ("um/N", 1e6), "rad/N": ("urad/N", 1e6), "rad/N m": ("urad/N m", 1e6),
 }  # fmt: skip
 Shown = tuple[str, float]
 """A unit, and the factor to it."""

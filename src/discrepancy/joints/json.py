@@ -16,7 +16,7 @@ from discrepancy.joints.findings import Finding, Foretold, JointVerdict, Limit, 
 from discrepancy.joints.said import Said, joint_in_words, link_in_words, titled
 from discrepancy.result.json import plain
 from discrepancy.result.read import FORMAT, VERSION
-from discrepancy.result.remains import of_scatter, scatter_sentence
+from discrepancy.result.remains import scatter_sentence
 from discrepancy.serial.model import SerialModel
 from estimator.arrays import Array
 
@@ -56,7 +56,9 @@ def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = 
         },
         "notes": list(v.notes),
     }  # fmt: skip
-    remains = of_scatter(values)
+    kinds, remains = ", ".join(entry["kind"] for entry in values["scatter"]), []
+    if kinds and v.verdict != "miscalibrated":
+        remains = [f"Besides, all places alike are off by more than their tolerances: {kinds}."]
     if left > rules.CLEAN_CHI2_PER_N:
         where = values["residual"]["signature"]["sentence"].replace("The torque", "the torque").rstrip(".")
         more = f"A misfit of chi2/n {three_digits(left)} of {three_digits(modelled)} remains; {where}."
@@ -97,7 +99,7 @@ class _Told:
         """An entry of ``causes`` and ``suspected``."""
         at, event = self.at(f.cause, f.place, f.joint, f.partner), f.event
         if f.of:
-            at |= {"name": f"{at['name']} by its {f.of}"}
+            at |= {key: f"{at[key]} by its {f.of}" for key in ("kind", "name")}
         members = [self.member(f, member, at) for member in f.members]
         parameters = _medians(f.members) if len(members) > 1 else members[0]["parameters"] if members else {}
         return at | {
@@ -110,7 +112,7 @@ class _Told:
             "probability": f.probability, "over_nothing": f.over_nothing, "share_left": None,
             "instead": {"nothing": f.nothing, "unlisted": f.unlisted},
             "folds": list(f.folds), "law": None, "shape": dict(f.shape), "separate": _separate(f.cause),
-            "told": [self.one_of_told(f, cause, place) for cause, place in f.told],
+            "told": [self.one_of_told(f, cause, place, at) for cause, place in f.told],
             "alternatives": [self.rival(rival, (rival.cause, rival.place) in f.told) for rival in f.rivals],
         }  # fmt: skip
 
@@ -145,15 +147,15 @@ class _Told:
         trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."
 
-    def one_of_told(self, f: Finding, cause: str, place: str) -> Values:
-        """One of the causes that may be there."""
-        if cause in ("", "unlisted"):
-            here = self.where(f.cause, f.place, f.joint, f.partner)
-            return {"cause": "unlisted", "place": here, "name": f"something unlisted at {here}"}
-        places = {(r.cause, r.place): (r.joint, None) for r in f.rivals} | {
-            (f.cause, f.place): (f.joint, f.partner)
-        }
-        at = self.at(cause, place, *places.get((cause, place), (None, None)))
+    def one_of_told(self, f: Finding, cause: str, place: str, own: Values) -> Values:
+        """One of the causes that may be there; a finding at one place may have been judged as one of all joints."""
+        joints = {(rival.cause, rival.place): rival.joint for rival in f.rivals}
+        if (cause, place) not in joints and cause == f.cause and place in (f.place, ALL):
+            at = own
+        elif cause in ("", "unlisted"):
+            at = self.at("unlisted", f.place, f.joint, f.partner)
+        else:
+            at = self.at(cause, place, joints.get((cause, place)))
         return {key: at[key] for key in ("cause", "place", "name")}
 
     def rival(self, rival: Rival, alike: bool) -> Values:

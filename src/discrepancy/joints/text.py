@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 from discrepancy import rules
@@ -28,12 +29,14 @@ from discrepancy.result.text_rollouts import rollout_lines
 Values = Mapping[str, Any]
 MOST_NAMED = 4
 """Findings that the second sentence lists."""
+MOST_ALIKE = 3
+"""Causes of one finding that it lists."""
 LEAST_NATS = 1.0
 """Gains below are not told."""
 MOST_PLACES = 12
 """Rows of a kind that is off everywhere."""
-PLACES, WHATS, GAP = 24, 34, "  "
-"""Widest columns, and what is between columns."""
+PLACES, WHATS, LEAST_WHAT, SIZES, GAP = 24, 34, 22, 38, "  "
+"""Widest columns of places and of what there is, the narrowest of that, room for sizes, and what is between columns."""
 TOGETHER = "\N{NO-BREAK SPACE}"
 """Between words that stay in one line of a cell."""
 Row = tuple[list[str], list[str], list[str], str]
@@ -92,11 +95,9 @@ def _found(values: Values) -> str:
 
 
 def _either(cause: Values) -> str:
-    told = [entry["name"] for entry in cause.get("told", ())]
-    others = [name for name in told if name != cause["name"]]
-    if len(others) > 2:
-        return f"{cause['name']} or {len(others)} others"
-    return " or ".join([cause["name"], *others])
+    """All of the smallest set that holds 90 %, the likeliest first, and what was fitted."""
+    names = list(dict.fromkeys(entry["name"] for entry in (*cause["told"], cause)))
+    return " or ".join(names) if len(names) <= MOST_ALIKE else f"{names[0]} or {len(names) - 1} others"
 
 
 def _gain(values: Values) -> Iterable[str]:
@@ -115,7 +116,7 @@ def _gain(values: Values) -> Iterable[str]:
 
 
 def _advice(values: Values) -> Iterable[str]:
-    open_ = [cause for cause in values["causes"] if len(cause.get("told", ())) > 1 and cause["separate"]]
+    open_ = [cause for cause in values["causes"] if len(cause["told"]) > 1 and cause["separate"]]
     if not values["finished"]:
         yield "Let the search come to its end before you rely on this."
     elif open_:
@@ -146,44 +147,38 @@ def _table(values: Values, *, verbose: bool) -> list[str]:
     if not rows:
         return []
     head: Row = (["place"], ["what"], ["size +- standard error"], "probability")
-    widths = [
-        min(most, max(len(line) for row in (head, *rows) for line in row[k]))
-        for k, most in enumerate((PLACES, WHATS))
-    ]
+    widths = [max(len(line) for row in (head, *rows) for line in row[k]) for k in range(3)]
     last = max(len(row[3]) for row in (head, *rows))
-    room = WIDTH - sum(widths) - last - 3 * len(GAP)
-    widths.append(min(room, max(len(line) for row in (head, *rows) for line in row[2])))
-    out = ["", *_lines(head, widths, last), "-" * (sum(widths) + last + 3 * len(GAP))]
-    out += [line for row in (*named, *off) for line in _lines(row, widths, last)]
+    widths[:2] = [min(widths[0], PLACES), min(widths[1], WHATS)]
+    room = WIDTH - widths[0] - last - 3 * len(GAP)
+    widths[1] = max(min(widths[1], room - min(widths[2], SIZES)), min(widths[1], LEAST_WHAT))
+    widths[2] = min(widths[2], room - widths[1])
+    across = sum(widths) + last + 3 * len(GAP)
+    lines = ["", *_lines(head, widths, last), "-" * across]
+    lines += [line for row in (*named, *off) for line in _lines(row, widths, last)]
     if suspected:
-        text = "-- suspected, too improbable to be named "
-        out.append(text.ljust(sum(widths) + last + 3 * len(GAP), "-"))
-        out += [line for row in suspected for line in _lines(row, widths, last)]
-    return out
+        lines.append("-- suspected, too improbable to be named ".ljust(across, "-"))
+        lines += [line for row in suspected for line in _lines(row, widths, last)]
+    return lines
 
 
-def _lines(row: Row, widths: Sequence[int], last: int) -> list[str]:
+def _lines(row: Row, widths: Sequence[int], last: int) -> Iterable[str]:
     """A row as lines; what is too wide for its column goes on below."""
-    cells = [
-        [
-            part
-            for line in row[k]
-            for part in textwrap.wrap(line, widths[k], subsequent_indent="  ", break_on_hyphens=False) or [""]
-        ]
-        for k in range(3)
-    ]
-    out = []
-    for i in range(max(map(len, cells))):
-        parts = [cell[i].replace(TOGETHER, " ") if i < len(cell) else "" for cell in cells]
-        text = GAP.join(f"{part:<{width}}" for part, width in zip(parts, widths, strict=True))
-        out.append(f"{text}{GAP}{row[3] if i == 0 else '':>{last}}".rstrip())
-    return out
+    cells = [[part for line in row[k] for part in _folded(line, widths[k])] for k in range(3)]
+    for i, parts in enumerate(zip_longest(*cells, fillvalue="")):
+        padded = (
+            f"{part.replace(TOGETHER, ' '):<{width}}" for part, width in zip(parts, widths, strict=True)
+        )
+        yield f"{GAP.join(padded)}{GAP}{row[3] if i == 0 else '':>{last}}".rstrip()
+
+
+def _folded(line: str, width: int) -> list[str]:
+    return textwrap.wrap(line, width, subsequent_indent="  ", break_on_hyphens=False) or [""]
 
 
 def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
     """A finding; a kind with a row for every joint."""
-    what = [_what(cause["kind"]), *_ors(cause)]
-    chance = _chance(cause["probability"])
+    what, chance = _whats(cause), _chance(cause["probability"])
     members = cause.get("members") or [cause]
     if len(members) == 1:
         sizes = _sizes(members[0]["parameters"], verbose=verbose)
@@ -226,16 +221,17 @@ def _what(kind: str) -> str:
     return re.sub(r" (in|of|at) (a joint|a link|two joints)\b", "", kind)
 
 
-def _ors(cause: Values) -> list[str]:
-    """What else may be there, of the smallest set that holds 90 %."""
+def _whats(cause: Values) -> list[str]:
+    """The cause that was fitted, and what else the smallest set that holds 90 % has."""
     chances = {rival["name"]: rival["probability"] for rival in cause["alternatives"]}
-    out = []
-    for entry in cause.get("told", ()):
+    others = [entry for entry in cause["told"] if entry["name"] != cause["name"]]
+    what = _what(cause["kind"])
+    out = [what if len(others) < max(len(cause["told"]), 1) else f"(fitted as {what})"]
+    for entry in others:
         unlisted = entry["cause"] == "unlisted"
-        if entry["name"] != cause["name"]:
-            chance = cause["instead"]["unlisted"] if unlisted else chances.get(entry["name"])
-            name = "something unlisted" if unlisted else entry["name"]
-            out.append(f"or {name}{'' if chance is None else f' ({_chance(chance)})'}")
+        chance = cause["instead"]["unlisted"] if unlisted else chances.get(entry["name"])
+        share = "" if chance is None else f" ({_chance(chance).replace(' ', TOGETHER)})"
+        out.append(f"or {'something unlisted' if unlisted else entry['name']}{share}")
     return out
 
 

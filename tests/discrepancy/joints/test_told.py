@@ -16,7 +16,7 @@ from diagnosed import check_finite, small_diagnosis
 from discrepancy.cause_names.serial import NAMES
 from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS
-from discrepancy.joints.findings import Finding, Limit, Offer
+from discrepancy.joints.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints.json import verdict_to_dict
 from discrepancy.joints.said import Said, parameter_name
 from discrepancy.joints.text import format_verdict
@@ -209,6 +209,7 @@ CASES: dict[str, dict[str, Any]] = {
     "miscalibrated": {"verdict": "miscalibrated", "scatter": (off_everywhere(),), "chi2_per_n": (9.0, 8.0, 7.0)},
     "partly": {"findings": [finding("unlisted", place="turn")], "verdict": "partly_explained",
                "chi2_per_n": (9.0, 8.0, 7.0), "scatter": (off_everywhere(),)},
+    "besides": {"findings": [offset_or_spring(), a_payload()], "scatter": (off_everywhere(),)},
     "unexplained": {"verdict": "unexplained", "chi2_per_n": (9.0, 8.0, 7.0)},
     "unfinished": {"findings": [offset_or_spring()], "finished": False},
     "one trial": {"findings": [offset_or_spring()], "trials": TRIALS[:1], "validated": False,
@@ -252,6 +253,36 @@ def test_a_kind_is_a_group_of_rows_and_rivals_stand_with_or(tmp_path: Path) -> N
     assert "elasticity" not in "\n".join(rows[:below])
 
 
+def test_what_is_likelier_than_what_was_fitted_comes_first(tmp_path: Path) -> None:
+    """Where the smallest set that holds 90 % is another cause alone."""
+    rivals = (Rival("payload", "carriage", None, 0.98, -6.6),)
+    link = member("carriage", None, excess_kg=1.2)
+    mass = finding(
+        "link_mass", link, probability=0.01, unlisted=0.01, rivals=rivals, told=(("payload", "carriage"),)
+    )
+    text = format_verdict(values(tmp_path, [mass]))
+    assert "by payload at link carriage or mass of link carriage." in first_part(text)
+    assert "(fitted as mass)" in table(text)[2]
+    assert "or payload at link carriage (98 %)" in " ".join(line[15:50].strip() for line in table(text)[3:])
+
+
+def test_one_place_that_was_judged_as_one_of_all_joints_is_no_rival_of_itself(tmp_path: Path) -> None:
+    one = finding("friction", member("turn", 1, coulomb_Nm=0.5, viscous_Nms_per_rad=0.3))
+    one = replace(one, told=(("friction", "all joints"),))
+    text = format_verdict(values(tmp_path, [one]))
+    assert " or " not in text.replace("or repair", "")
+    both = replace(one, rivals=(Rival("friction", "all joints", None, 0.4, 0.5),))
+    assert "or friction in all joints" in format_verdict(values(tmp_path, [both]))
+
+
+def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
+    some = finding("unlisted", place="turn", joint=1, of="position and direction")
+    text = format_verdict(values(tmp_path, [some]))
+    assert "by something unlisted at joint 1 (turn) by its position and direction." in first_part(text)
+    assert "something unlisted by its" in table(text)[2]
+    assert " or " not in text.replace("or repair", "")
+
+
 def test_units_of_a_kind_stand_once(tmp_path: Path) -> None:
     kind = finding("torque_delay", *(member(name, j, delay_s=0.008) for j, name in enumerate(JOINTS, 1)))
     rows = table(format_verdict(values(tmp_path, [kind])))
@@ -274,6 +305,11 @@ def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
             "partly",
             "PARTLY EXPLAINED: one finding accounts for a part",
             "something unlisted at joint 1 (turn)",
+        ),
+        (
+            "besides",
+            "EXPLAINED:",
+            "Besides, all places alike are off by more than their tolerances: zero of a joint.",
         ),
         ("unexplained", "UNEXPLAINED:", "chi2/n 7 of 9 remains"),
         ("unfinished", "UNFINISHED, SO FAR EXPLAINED:", "Let the search come to its end"),
