@@ -455,6 +455,20 @@ def test_a_kind_is_one_effect_a_member(case: Case) -> None:
     ]
 
 
+def test_a_link_that_is_named_as_the_joint_of_another(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    inertial = '<inertial pos="0 0 0.1" mass="{}" diaginertia="0.01 0.01 0.01"/>'
+    path.write_text(
+        f'<mujoco><worldbody><body name="a"><joint name="b"/>{inertial.format(1)}<body name="b"><joint name="a"/>'
+        f"{inertial.format(2)}</body></body></worldbody></mujoco>"
+    )
+    heavy = Finding("link_mass", "b", 1, (Member("b", 1, {"excess_kg": 0.5}, {}),), 0.99, 50.0, 0.0, 0.0)
+    made = SimpleNamespace(model=load_model(path), findings=(heavy,), trials=("log",), reference=())
+    write_extended(made, tmp_path / "extended")  # type: ignore[arg-type]
+    extended = mujoco.MjModel.from_xml_path(str(tmp_path / "extended" / "robot.xml"))
+    assert (extended.body("a").mass[0], extended.body("b").mass[0]) == (1.0, 2.5)
+
+
 def test_gravity_is_compensated_with_the_payload_in_it(case: Case, tmp_path: Path) -> None:
     def change(spec: mujoco.MjSpec) -> None:
         load(spec)

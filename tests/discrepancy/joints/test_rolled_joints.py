@@ -228,13 +228,13 @@ def test_what_rollouts_lack_is_listed(two_links: SerialModel, rubbing: JointLog)
     bends = finding("elasticity", "elbow", 2, {"compliance_rad_per_Nm": 1e-3})
     rolled = rolled_out(verdict(two_links, [signals(two_links, rubbing)], [rubs(), push, bends]))
     assert rolled is not None
-    assert rolled["not_simulated"] == ["elasticity (elbow)", "push (last link)"]
+    assert rolled["not_simulated"] == ["elasticity of elbow", "push on the last link"]
     assert 8 <= rolled["horizons"][0]["starts"] <= 15  # no start in the 9 s of the push
 
 
 @pytest.mark.usefixtures("few_starts")
 def test_what_mujoco_refuses_is_said(two_links: SerialModel, rubbing: JointLog) -> None:
-    lost = finding("link_mass", "elbow", 2, {"excess_kg": float("nan")})
+    lost = finding("link_mass", "link of elbow", None, {"excess_kg": float("nan")})
     rolled = rolled_out(verdict(two_links, [signals(two_links, rubbing)], [lost]))
     assert rolled is not None
     assert rolled["refused"][0].startswith("trial 1: MuJoCo refuses the model")
