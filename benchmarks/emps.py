@@ -32,7 +32,9 @@ def plain(log: serial.JointLog) -> tuple[np.ndarray, float]:
     rate = log.rate_hz
     q = low_pass(log.q[:, 0], rate, SMOOTH_HZ)
     dq = np.gradient(q, 1.0 / rate)
-    columns = np.column_stack([np.gradient(dq, 1.0 / rate), np.clip(dq / SLOW_MPS, -1.0, 1.0), dq, np.ones(len(q))])
+    columns = np.column_stack(
+        [np.gradient(dq, 1.0 / rate), np.clip(dq / SLOW_MPS, -1.0, 1.0), dq, np.ones(len(q))]
+    )
     force = log.torque[:, 0]
     # The drive holds its voltage for a sample: the force is half a sample younger.
     force = 0.5 * (force + np.concatenate([force[:1], force[:-1]]))

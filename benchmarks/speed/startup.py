@@ -30,7 +30,7 @@ LINES = (
     "simulate --effect rust --out new.parquet",
     "effects rust",
     "diagnose rec.parquet --exclude rust",
-    "diagnose rec.parquet --rig emps --exclude rust",
+    "diagnose rec.parquet --model robot.xml --exclude rust",
     "estimate empty.parquet",
     "simulate --effect joint_friction:robot=0 --out new.parquet",
     "estimate log.h5",

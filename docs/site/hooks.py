@@ -42,7 +42,7 @@ NAV = {
     "Logs": ["recording.md", "measured-data.md", "inspect.md", "commands/watch.md"],
     "Estimate": ["method.md", "method-arm.md"],
     "Calibrate": ["calibration.md", "calibration"],
-    "Diagnose": ["diagnosis", "emps.md", "serial", "commands/campaign.md"],
+    "Diagnose": ["diagnosis", "serial", "commands/campaign.md"],
     "Show": ["replay.md", "report.md", "commands/comparison.md", "commands/cluster.md"],
     "Learn": ["tutorials"],
     "Python": ["api.md", "reference"],

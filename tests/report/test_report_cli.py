@@ -170,7 +170,7 @@ def test_nothing_of_others_is_overwritten(tmp_path: Path, capsys: pytest.Capture
     link.symlink_to(folder / "diagnosis.json")
     assert "exists; give --force" in refused(capsys, folder, "--out", link)
     assert theirs.read_text() == "<html>mine</html>"
-    assert json.loads((folder / "diagnosis.json").read_text())["version"] == 2
+    assert json.loads((folder / "diagnosis.json").read_text())["version"] == 3
 
 
 @pytest.mark.usefixtures("no_renderer")

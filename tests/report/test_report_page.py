@@ -388,6 +388,13 @@ def test_options_are_shown_as_they_were_given(pages: dict[str, Reader]) -> None:
     assert "option closed_loop no" in pages["robot"].rows()
 
 
+def test_a_robots_page_is_not_called_a_teams(pages: dict[str, Reader]) -> None:
+    text = pages["robot"].rows()
+    assert "Diagnosis of a robot: consistent" in text
+    assert "Logs of a robot's joints, in 2 parts, are held against the simulation" in text.replace("’", "'")
+    assert "recordings of a team that carries one payload are held" in pages["diagnosis"].rows()
+
+
 def test_causes_are_read_in_words(pages: dict[str, Reader]) -> None:
     """What the command line calls them stands softly behind, as code; nowhere else."""
     page = pages["diagnosis"]

@@ -8,16 +8,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from discrepancy.joints.effects import write_extended
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.json import unit_of, verdict_to_dict
 from discrepancy.joints.text import format_verdict
-from discrepancy.result.diagnosed import REPORT
+from discrepancy.result.diagnosed import REPORT, draw
 from discrepancy.result.read import EXTENDED, NAME
-from discrepancy.result.traces_file import NAME as RESIDUALS
-from discrepancy.result.traces_file import save_traces
 from discrepancy.rig import Channel
 from estimator.errors import InputError
-from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 
 
@@ -61,8 +59,6 @@ class JointDiagnosed:
         """
         values, model = self._values, self.verdict.model
         if self.verdict.findings:
-            from discrepancy.joints.effects import write_extended
-
             try:
                 write_extended(self.verdict, folder / EXTENDED)
             except InputError as error:  # values that no effect can have, such as a negative friction
@@ -72,12 +68,7 @@ class JointDiagnosed:
             Channel(f"{name} torque", "torque", None, unit_of(model, j))
             for j, name in enumerate(model.joints)
         ]
-        residuals = self.verdict.traces()
-        save_traces(residuals, channels, folder / RESIDUALS)
-        if draws_plots():
-            from discrepancy.result.pictures.plots import save_plots
-
-            save_plots(values, residuals, channels, self._quantity_unit, folder)
+        draw(values, self.verdict.traces(), channels, self._quantity_unit, folder)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self.verbose_text()}\n")
 

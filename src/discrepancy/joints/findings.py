@@ -75,13 +75,14 @@ class Finding:
         partner: the other joint of a coupled drive, from 1.
         members: the places with their values; more than one only of a kind.
         shape: numbers inside its columns, such as ``share`` of the typical speed.
+        of: signal of the joint that something unlisted is a function of; empty where that is not known.
         event: when it acted, if it did so once.
         probability: that it is this cause, at this place.
         over_nothing: by how much it is likelier than nothing in its place [nats].
         nothing: probability that nothing is there.
         unlisted: probability that something is there that no table lists.
         rivals: what else may be there, the likeliest first.
-        told: causes and places of the smallest set that holds 90 %, the likeliest first; empty strings: unlisted.
+        told: causes and places of the smallest set that holds 90 %, the likeliest first.
         folds: by how much each trial is likelier with it, foretold by the other trials [nats].
         in_sample: share of the model's misfit that it removes beyond the findings before it.
         held_out: the same in trials foretold by the others; None of a single trial and of events.
@@ -97,6 +98,7 @@ class Finding:
     unlisted: float
     partner: int | None = None
     shape: Mapping[str, float] = field(default_factory=dict)
+    of: str = ""
     event: Event | None = None
     rivals: tuple[Rival, ...] = ()
     told: tuple[tuple[str, str], ...] = ()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -34,46 +33,35 @@ def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = 
         verdict: what was found.
         rollouts: what rollouts said, or None.
     """
-    told = _Told(verdict)
-    causes = [told.finding(finding) for finding in verdict.findings]
-    modelled, tolerated, left = verdict.chi2_per_n
-    values = {
-        "format": FORMAT,
-        "version": VERSION,
-        "machine": "joints",
-        "finished": verdict.finished,
-        "recordings": list(verdict.trials),
-        "reference": list(verdict.reference),
-        "prior_odds": None,
-        "verdict": verdict.verdict,
+    v, told = verdict, _Told(verdict)
+    causes, (modelled, tolerated, left) = [told.finding(finding) for finding in v.findings], v.chi2_per_n
+    unlisted = [cause for cause in causes if cause["cause"] == "unlisted"]
+    values: Values = {
+        "format": FORMAT, "version": VERSION, "machine": "joints", "finished": v.finished,
+        "recordings": list(v.trials), "reference": list(v.reference), "prior_odds": None, "verdict": v.verdict,
         "causes": causes,
         "places": [
-            {"place": cause["place"], "robot": None, "joint": cause["joint"], "nats": cause["over_nothing"]}
-            for cause in causes
-            if cause["cause"] == "unlisted"
+            {"place": c["place"], "robot": None, "joint": c["joint"], "nats": c["over_nothing"]} for c in unlisted
         ],
-        "suspected": [told.finding(finding) for finding in verdict.suspected],
-        "scatter": [told.scatter(entry) for entry in verdict.scatter],
+        "suspected": [told.finding(finding) for finding in v.suspected],
+        "scatter": [told.scatter(entry) for entry in v.scatter],
         "foretold": None,
-        "evidence": {
-            "before": told.offers(verdict.before),
-            "after": told.offers(verdict.after) if verdict.findings else None,
-        },
-        "gain": _gain(verdict),
-        "not_simulated": None,
-        "rollouts": rollouts,
+        "evidence": {"before": told.offers(v.before), "after": told.offers(v.after) if causes else None},
+        "gain": _gain(v), "not_simulated": None, "rollouts": rollouts,
         "undecidable": told.blind_spots(),
-        "detection_limits": [told.limit(limit) for limit in verdict.limits],
+        "detection_limits": [told.limit(limit) for limit in v.limits],
         "residual": {
-            "chi2_per_n": left,
-            "signature": _signature(verdict, "after"),
-            "chi2_per_n_tolerated": tolerated,
-            "unlisted_nats": None,
-            "nominal": {"chi2_per_n": modelled, "signature": _signature(verdict, "before")},
+            "chi2_per_n": left, "signature": _signature(v, "after"), "chi2_per_n_tolerated": tolerated,
+            "unlisted_nats": None, "nominal": {"chi2_per_n": modelled, "signature": _signature(v, "before")},
         },
-        "notes": list(verdict.notes),
-    }
-    return plain(values | {"remains": _remains(values)})
+        "notes": list(v.notes),
+    }  # fmt: skip
+    remains = of_scatter(values)
+    if left > rules.CLEAN_CHI2_PER_N:
+        where = values["residual"]["signature"]["sentence"].replace("The torque", "the torque").rstrip(".")
+        more = f"A misfit of chi2/n {three_digits(left)} of {three_digits(modelled)} remains; {where}."
+        remains = [more, *remains]
+    return plain(values | {"remains": remains})
 
 
 class _Told:
@@ -91,15 +79,8 @@ class _Told:
         """Cause and place, in words too."""
         title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
         where = self.where(cause, place, joint, partner)
-        return {
-            "cause": cause,
-            "kind": titled(title),
-            "name": titled(title, where),
-            "family": cause,
-            "robot": None,
-            "joint": joint,
-            "place": where,
-        }
+        return {"cause": cause, "kind": titled(title), "name": titled(title, where), "family": cause, "robot": None,
+                "joint": joint, "place": where}  # fmt: skip
 
     def where(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> str:
         """A place in words."""
@@ -108,158 +89,124 @@ class _Told:
         if joint is None and place in self.model.joints:
             joint = self.model.joints.index(place) + 1
         if joint is not None:
-            return joint_in_words(
-                joint, place if place in self.model.joints else self.model.joints[joint - 1]
-            )
+            return joint_in_words(joint, self.model.joints[joint - 1])
         is_link = cause in WORDS and "link" in WORDS[cause].title and not place.startswith("all ")
         return link_in_words(place) if is_link else place
 
-    def finding(self, finding: Finding) -> Values:
+    def finding(self, f: Finding) -> Values:
         """An entry of ``causes`` and ``suspected``."""
-        f, several = finding, len(finding.members) > 1
-        at = self.at(f.cause, f.place, f.joint, f.partner)
-        event = f.event and {
-            "trial": f.event.trial + 1,
-            "start_s": f.event.start_s,
-            "duration_s": f.event.duration_s,
-        }
+        at, event = self.at(f.cause, f.place, f.joint, f.partner), f.event
+        if f.of:
+            at |= {"name": f"{at['name']} by its {f.of}"}
         members = [self.member(f, member, at) for member in f.members]
-        parameters = _medians(f.members) if several else (members[0]["parameters"] if members else {})
-        listed = set(f.told)
+        parameters = _medians(f.members) if len(members) > 1 else members[0]["parameters"] if members else {}
         return at | {
-            "at": event and [event["trial"], event["start_s"]],
-            "event": event,
+            "at": event and [event.trial + 1, event.start_s],
+            "event": event and {"trial": event.trial + 1, "start_s": event.start_s, "duration_s": event.duration_s},
             "sentence": self.sentence(f, at["place"], parameters),
             "parameters": parameters,
             "members": members,
             "explained": {"in_sample": f.in_sample, "held_out": f.held_out},
-            "probability": f.probability,
-            "over_nothing": f.over_nothing,
-            "share_left": None,
+            "probability": f.probability, "over_nothing": f.over_nothing, "share_left": None,
             "instead": {"nothing": f.nothing, "unlisted": f.unlisted},
-            "folds": list(f.folds),
-            "law": None,
-            "shape": dict(f.shape),
-            "separate": _separate(f.cause),
+            "folds": list(f.folds), "law": None, "shape": dict(f.shape), "separate": _separate(f.cause),
             "told": [self.one_of_told(f, cause, place) for cause, place in f.told],
-            "alternatives": [self.rival(rival, (rival.cause, rival.place) in listed) for rival in f.rivals],
-        }
+            "alternatives": [self.rival(rival, (rival.cause, rival.place) in f.told) for rival in f.rivals],
+        }  # fmt: skip
 
     def member(self, f: Finding, member: Member, at: Values) -> Values:
         """One of a finding's places."""
-        if len(f.members) > 1 or f.joint is None:
-            at = self.at(f.cause, member.place, member.joint)
-        return {
-            "name": at["name"],
-            "place": at["place"],
-            "joint": member.joint,
-            "parameters": _with_errors(member.values, member.errors),
-        }
+        at = self.at(f.cause, member.place, member.joint) if len(f.members) > 1 or f.joint is None else at
+        numbers = _with_errors(member)
+        return {"name": at["name"], "place": at["place"], "joint": member.joint, "parameters": numbers}
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         """What a finding does, with its numbers; for a kind with their medians."""
         numbers = {name: entry["value"] for name, entry in parameters.items()}
         errors = {name: entry["se"] for name, entry in parameters.items() if entry["se"] is not None}
         when = {"start_s": f.event.start_s, "duration_s": f.event.duration_s} if f.event else {}
-        at = [member.joint - 1 for member in f.members if member.joint is not None]
-        sliding = [j for j in at if self.model.slides[j]]
-        slide = bool(at) and sliding == at
-        if len(at) > 1:
-            told = "joint" if slide or not sliding else "joint that turns"
-            place = f"the typical {told} (median of {len(at) - (0 if slide else len(sliding))})"
-        said = Said({**numbers, **f.shape, **when}, errors, place, slide, self.than)
+        slides = [
+            bool(self.model.slides[member.joint - 1]) for member in f.members if member.joint is not None
+        ]
+        if len(slides) > 1:
+            mixed = len({tuple(member.values) for member in f.members}) > 1  # slides have other units
+            count = slides.count(False) if mixed else len(slides)
+            place = f"the typical joint{' that turns' if mixed else ''} (median of {count})"
+        said = Said({**numbers, **f.shape, **when}, errors, place, bool(slides) and all(slides), self.than)
         cause = WORDS.get(f.cause)
         if cause is None or cause.sentence is None:
-            text = f"{cause.title if cause else f.cause}: " + ", ".join(
-                f"{k} {v:.3g}" for k, v in numbers.items()
-            )
-            text = titled(text, place)
+            listed = ", ".join(f"{name} {value:.3g}" for name, value in numbers.items())
+            text = f"{titled(cause.title if cause else f.cause, place)}: {listed}"
         else:
             text = cause.sentence(said)
-        if len(at) > 1:
-            text = f"{titled(cause.title, ALL) if cause else f.cause}: {text}"
+        if cause and len(slides) > 1:
+            text = f"{titled(cause.title, ALL)}: {text}"
         trials = self.verdict.trials
         trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."
 
     def one_of_told(self, f: Finding, cause: str, place: str) -> Values:
         """One of the causes that may be there."""
-        if not cause or cause == "unlisted":
+        if cause in ("", "unlisted"):
             here = self.where(f.cause, f.place, f.joint, f.partner)
             return {"cause": "unlisted", "place": here, "name": f"something unlisted at {here}"}
-        if (cause, place) == (f.cause, f.place):
-            at = self.at(cause, place, f.joint, f.partner)
-        else:
-            joint = next((r.joint for r in f.rivals if (r.cause, r.place) == (cause, place)), None)
-            at = self.at(cause, place, joint)
+        places = {(r.cause, r.place): (r.joint, None) for r in f.rivals} | {
+            (f.cause, f.place): (f.joint, f.partner)
+        }
+        at = self.at(cause, place, *places.get((cause, place), (None, None)))
         return {key: at[key] for key in ("cause", "place", "name")}
 
     def rival(self, rival: Rival, alike: bool) -> Values:
         """What else may be in a finding's place."""
         return self.at(rival.cause, rival.place, rival.joint) | {
-            "probability": rival.probability,
-            "evidence_gap": rival.nats,
-            "chi2_per_n": None,
-            "ambiguous": alike,
+            "probability": rival.probability, "evidence_gap": rival.nats, "chi2_per_n": None, "ambiguous": alike,
             "separate": _separate(rival.cause),
-        }
+        }  # fmt: skip
 
     def scatter(self, entry: Scatter) -> Values:
         """A kind that is off everywhere."""
-        at = self.at(entry.cause, ALL, None)
-        tolerance = dict(entry.tolerance)
+        places = [self.where(entry.cause, member.place, member.joint) for member in entry.members]
         values: Values = {
-            "cause": entry.cause,
-            "kind": at["kind"],
-            "family": entry.cause,
-            "factor": entry.factor,
-            "places": len(entry.members),
-            "spread": {name: entry.factor * size for name, size in tolerance.items()},
-            "tolerance": tolerance,
-            "nats": None,
+            "cause": entry.cause, "kind": self.at(entry.cause, ALL, None)["kind"], "family": entry.cause,
+            "factor": entry.factor, "places": len(places), "nats": None, "tolerance": dict(entry.tolerance),
+            "spread": {name: entry.factor * size for name, size in entry.tolerance.items()},
             "each": [
-                {
-                    "robot": None,
-                    "joint": member.joint,
-                    "place": self.where(entry.cause, member.place, member.joint),
-                    "parameters": _with_errors(member.values, member.errors),
-                }
-                for member in entry.members
+                {"robot": None, "joint": member.joint, "place": place, "parameters": _with_errors(member)}
+                for member, place in zip(entry.members, places, strict=True)
             ],
-        }
+        }  # fmt: skip
         return values | {"sentence": scatter_sentence(values)}
 
     def offers(self, offers: Sequence[Offer]) -> list[Values]:
-        """What one more cause would gain, the most first."""
-        ranked = sorted(offers, key=lambda offer: -offer.nats)[:MOST_OFFERS]
+        """What one more cause would gain, the most first; each in its likeliest shape."""
+        best: dict[tuple[str, str], Offer] = {}
+        for offer in sorted(offers, key=lambda offer: -offer.nats):
+            best.setdefault((offer.cause, offer.place), offer)
         return [
             self.at(offer.cause, offer.place, offer.joint)
             | {"at": None, "nats": offer.nats, "needed": SETTINGS.need_nats}
-            for offer in ranked
+            for offer in list(best.values())[:MOST_OFFERS]
             if offer.nats > 0.0
         ]
 
     def limit(self, limit: Limit) -> Values:
         """What would have been noticed."""
         at = self.at(limit.cause, limit.place, limit.joint)
-        return {key: at[key] for key in ("cause", "kind", "robot", "joint", "place")} | {
-            "parameters": dict(limit.sizes)
-        }
+        place = {key: at[key] for key in ("cause", "kind", "robot", "joint", "place")}
+        return place | {"parameters": dict(limit.sizes)}
 
     def blind_spots(self) -> list[Values]:
         """Causes and places of which these logs say nothing."""
         places: dict[str, list[str]] = {}
-        for limit in self.verdict.limits:
-            if limit.sizes and all(size is None for size in limit.sizes.values()):
-                at = self.at(limit.cause, limit.place, limit.joint)
-                places.setdefault(at["kind"], []).append(at["place"])
+        for limit in map(self.limit, self.verdict.limits):
+            if limit["parameters"] and not any(limit["parameters"].values()):
+                places.setdefault(limit["kind"], []).append(limit["place"])
+        why, remedy = (
+            "its trace in these logs cannot be told from the unknowns",
+            "motion in more directions, where any helps",
+        )
         return [
-            {
-                "what": f"{kind} ({'; '.join(where)})",
-                "why": "its trace in these logs cannot be told from the unknowns",
-                "remedy": "motion in more directions, where any helps",
-            }
-            for kind, where in places.items()
+            {"what": f"{kind} ({'; '.join(w)})", "why": why, "remedy": remedy} for kind, w in places.items()
         ]
 
 
@@ -267,11 +214,9 @@ def _separate(cause: str) -> str:
     return WORDS[cause].separate if cause in WORDS else ""
 
 
-def _with_errors(values: Mapping[str, float], errors: Mapping[str, float]) -> Values:
-    return {
-        name: {"value": float(value), "se": error if (error := errors.get(name, 0.0)) > 0.0 else None}
-        for name, value in values.items()
-    }
+def _with_errors(member: Member) -> Values:
+    errors = {name: error for name, error in member.errors.items() if error > 0.0}
+    return {name: {"value": float(value), "se": errors.get(name)} for name, value in member.values.items()}
 
 
 def _medians(members: Iterable[Member]) -> Values:
@@ -287,22 +232,25 @@ def _gain(verdict: JointVerdict) -> Values | None:
     """Torques foretold without and with the findings."""
     if not verdict.foretold:
         return None
-    units = {f"{verdict.model.joints[j]} torque": unit_of(verdict.model, j) for j in _known(verdict)}
+    foretold, known = verdict.foretold, _known(verdict)
+    names = {j: f"{verdict.model.joints[j]} torque" for j in known}
+
+    def errors(one: Foretold, which: str) -> dict[str, float]:
+        rms = getattr(one, which)
+        sizes = {f"{name}_rms": float(rms[j]) for j, name in names.items()}
+        sizes |= {f"{name}_nrmse": float(rms[j] / one.torque[j]) for j, name in names.items()}
+        return sizes | {"chi2_per_n": float(getattr(one, f"chi2_{which}"))}
+
     trials = [
-        {
-            "name": one.trial,
-            "before": _errors(verdict, one.before, one.torque, one.chi2_before),
-            "after": _errors(verdict, one.after, one.torque, one.chi2_after),
-        }
-        for one in verdict.foretold
+        {"name": one.trial} | {which: errors(one, which) for which in ("before", "after")} for one in foretold
     ]
-    noise = np.sqrt(np.mean([np.square(one.noise[_known(verdict)]) for one in verdict.foretold], axis=0))
+    noise = np.sqrt(np.mean([np.square(one.noise) for one in foretold], axis=0))
     return {
-        "held_out": {which: _means([t[which] for t in trials]) for which in ("before", "after")}
+        "held_out": {which: _means([trial[which] for trial in trials]) for which in ("before", "after")}
         | {"as_found": None},
-        "units": units,
-        "noise": {f"{name}_rms": float(x) for name, x in zip(units, noise, strict=True)},
-        "removed": _removed(verdict.foretold) if verdict.findings else None,
+        "units": {name: unit_of(verdict.model, j) for j, name in names.items()},
+        "noise": {f"{name}_rms": float(noise[j]) for j, name in names.items()},
+        "removed": _removed(foretold) if verdict.findings else None,
         "validated": verdict.validated,
         "trials": trials,
     }
@@ -320,29 +268,17 @@ def _known(verdict: JointVerdict) -> list[int]:
     return [int(j) for j in np.flatnonzero(there)]
 
 
-def _errors(verdict: JointVerdict, rms: Array, torque: Array, chi2: float) -> dict[str, float]:
-    out: dict[str, float] = {}
-    for j in _known(verdict):
-        name = f"{verdict.model.joints[j]} torque"
-        out |= {f"{name}_rms": float(rms[j]), f"{name}_nrmse": float(rms[j] / torque[j])}
-    return out | {"chi2_per_n": float(chi2)}
-
-
 def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {key: float(np.mean([one[key] for one in each])) for key in each[0]}
 
 
 def _removed(foretold: Sequence[Foretold]) -> Values | None:
     """Share of the error beyond noise: mean over the trials, 95 % interval."""
-    shares = [
-        1.0 - _excess(one.chi2_after) / _excess(one.chi2_before) for one in foretold if one.chi2_before > 1.0
-    ]
+    shares = [1.0 - _excess(f.chi2_after) / _excess(f.chi2_before) for f in foretold if f.chi2_before > 1.0]
     if not shares:
         return None
     mean, count = float(np.mean(shares)), len(shares)
-    if count < 2:
-        return {"share": mean, "interval": [None, 1.0]}
-    half = float(stdtrit(count - 1, 0.975) * np.std(shares, ddof=1) / np.sqrt(count))
+    half = float(stdtrit(count - 1, 0.975) * np.std(shares, ddof=1) / np.sqrt(count)) if count > 1 else np.inf
     return {"share": mean, "interval": [mean - half, min(1.0, mean + half)]}
 
 
@@ -352,35 +288,20 @@ def _excess(chi2_per_n: float) -> float:
 
 def _signature(verdict: JointVerdict, which: str) -> Values:
     """Where the misfit is, by joint and trial; ``before`` or ``after``."""
-    channel, trial, known = {}, {}, _known(verdict) if verdict.foretold else []
-    if verdict.foretold:
-        errors, noise = ([getattr(f, name)[known] for f in verdict.foretold] for name in (which, "noise"))
-        squares = np.mean(np.square(np.divide(errors, noise)), axis=0)
-        channel = {f"{verdict.model.joints[j]} torque": float(x) for j, x in zip(known, squares, strict=True)}
-        trial = {f.trial: float(getattr(f, f"chi2_{which}")) for f in verdict.foretold}
-    chi2 = verdict.chi2_per_n[0 if which == "before" else 2]
+    known, joints = _known(verdict) if verdict.foretold else [], verdict.model.joints
+    squares: list[Array] = [
+        np.square(getattr(f, which) / np.where(f.noise > 0, f.noise, 1.0)) for f in verdict.foretold
+    ]
+    channel = {j: float(np.mean([square[j] for square in squares])) for j in known}
+    worst = max(known, key=lambda j: channel[j], default=None)
+    said = "No torque was foretold."
+    if worst is not None:
+        place = joint_in_words(worst + 1, joints[worst])
+        said = f"The torque of {place} is off most, by chi2/n {three_digits(channel[worst])}."
     return {
-        "chi2_per_n": chi2,
+        "chi2_per_n": verdict.chi2_per_n[0 if which == "before" else 2],
         "kind": {},
-        "channel": channel,
-        "trial": trial,
-        "sentence": _worst(verdict, channel),
+        "channel": {f"{joints[j]} torque": size for j, size in channel.items()},
+        "trial": {f.trial: float(getattr(f, f"chi2_{which}")) for f in verdict.foretold},
+        "sentence": said,
     }
-
-
-def _worst(verdict: JointVerdict, channel: Mapping[str, float]) -> str:
-    if not channel:
-        return "No trial was foretold."
-    called = max(channel, key=lambda name: channel[name]).removesuffix(" torque")
-    name = joint_in_words(verdict.model.joints.index(called) + 1, called)
-    return f"The torque of {name} is off most, by chi2/n {three_digits(max(channel.values()))}."
-
-
-def _remains(values: Values) -> list[str]:
-    """Sentences on what is left open."""
-    residual, out = values["residual"], []
-    left, before = residual["chi2_per_n"], residual["nominal"]["chi2_per_n"]
-    if left > rules.CLEAN_CHI2_PER_N:
-        worst = re.sub(r"^The", "the", residual["signature"]["sentence"].rstrip("."))
-        out.append(f"A misfit of chi2/n {three_digits(left)} of {three_digits(before)} remains; {worst}.")
-    return [*out, *of_scatter(values)]

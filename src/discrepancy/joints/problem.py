@@ -16,6 +16,7 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
+from discrepancy.joints.unlisted import SIGNALS, functions
 from discrepancy.serial.causes.elasticity import along
 from discrepancy.serial.mechanics.regressor import (
     body_regressor,
@@ -51,6 +52,8 @@ PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 BEGIN_S = 1.0
 """Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
 died to 15 %; in a stand or a soft joint it looks like a push."""
+UNLISTED_NATS = 1.0
+"""Log odds of a listed cause over something that no table lists."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
 
@@ -496,6 +499,12 @@ class _Builder:
                     cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(cause.shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
+        for number, (signal, terms, sizes) in enumerate(functions(self.joints[j])):
+            index = [self.add(f"{n} unlisted {signal} {k}", 0.0, {j: x}) for k, x in enumerate(terms)]
+            self.group(
+                "unlisted", n, index, self.spans[j].torque * sizes, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
+                shape=(("signal", float(number)),),
+            )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
             forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
             for i, x in enumerate(forms):

@@ -30,6 +30,7 @@ from discrepancy.joints.findings import (
 from discrepancy.joints.parts import Parts
 from discrepancy.joints.problem import Given
 from discrepancy.joints.trials import Trials, notes_of, resting, trials_of
+from discrepancy.joints.unlisted import SIGNALS
 from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
 from discrepancy.serial.model import SerialModel
@@ -163,7 +164,9 @@ class _Judge:
         open_ = sum(r.probability for r in o.rivals if r.open)
         nothing = sum(r.probability for r in o.rivals if r.group is None and not r.open)
         best = max((r.probability for r in o.rivals), default=0.0)
-        unlisted = open_ >= max(o.probability, best)
+        kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
+        unlisted = c.cause == "unlisted" or open_ >= max(o.probability + kin, best)
+        own = (o.probability if c.cause == "unlisted" else 0.0) + open_
         rivals = tuple(
             Rival(r.group.cause, r.group.place, self._joint(r.group.place), r.probability,
                   float(np.log(max(o.probability, 1e-12) / max(r.probability, 1e-12))))
@@ -174,15 +177,16 @@ class _Judge:
             place=c.place,
             joint=self._joint(c.place),
             members=() if unlisted else self._members(c, values or self.whole),
-            probability=open_ if unlisted else o.probability,
+            probability=own if unlisted else o.probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,
-            unlisted=o.probability if unlisted else open_,
+            unlisted=open_,
             partner=self._partner(c),
-            shape=absolute(self.problem, c) if not c.event else {},
+            shape={} if c.event or unlisted else absolute(self.problem, c),
+            of=list(SIGNALS)[int(dict(c.shape)["signal"])] if c.cause == "unlisted" else "",
             event=self._event(c),
             rivals=rivals,
-            told=tuple((g.cause, g.place) if g else ("", "") for g in o.told()),
+            told=tuple(dict.fromkeys(_told(g, c.place) for g in o.told())),
         )
         off = [m for m in plain.members if _is_off(m)]
         if not c.members or 2 * len(off) >= len(plain.members) or not off:
@@ -365,12 +369,16 @@ class _Judge:
         taken = {c.group.key for c in self.state.chosen}
         need = np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats)) + NOTICED
         for g in self.problem.groups:
-            if g.members or g.key in taken or (g.cause, "all joints") in taken or any(v for _, v in g.shape):
+            known = g.key in taken or (g.cause, "all joints") in taken
+            if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
                 continue
             k, se = list(g.columns), self.state.posterior.errors_of(g.columns)
             sizes = need * se
             value, _ = physical(self.problem, g, sizes, np.diag(sizes**2))
             seen = sizes < 10.0 * np.array(g.slab)
+            if not any(seen):
+                continue
+            sizes = np.where(seen, sizes, 0.0)
             names = list(value)[: len(k)]
             told = {n: abs(value[n]) if ok else None for n, ok in zip(names, seen, strict=True)}
             yield Limit(g.cause, g.place, self._joint(g.place), told)
@@ -418,6 +426,10 @@ class _Judge:
                 )
             )
         return out
+
+
+def _told(group: Group | None, place: str) -> tuple[str, str]:
+    return ("unlisted", place) if group is None else group.key
 
 
 def _is_off(member: Member) -> bool:

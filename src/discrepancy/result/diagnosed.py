@@ -14,7 +14,7 @@ from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import save_traces
-from discrepancy.rig import Rig
+from discrepancy.rig import Channel, Rig
 from estimator.errors import InputError
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
@@ -78,11 +78,29 @@ class Diagnosed:
             except InputError as error:  # values that no effect can have, such as a negative friction
                 note = f"There is no {'extended model' if name == EXTENDED else 'model as found'}: {error}."
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        residuals = self.traces()
-        save_traces(residuals, self.rig.channels, folder / RESIDUALS)
-        if draws_plots():
-            from discrepancy.result.pictures.plots import save_plots
-
-            save_plots(values, residuals, self.rig.channels, self.words.unit, folder)
+        draw(values, self.traces(), self.rig.channels, self.words.unit, folder)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self}\n")
+
+
+def draw(
+    values: Mapping[str, Any], traces: Sequence[Trace], channels: Sequence[Channel], unit: Callable[[str], str],
+    folder: Path,
+) -> None:  # fmt: skip
+    """Write residuals and, where plots can be drawn, pictures of a diagnosis.
+
+    Args:
+        values: the diagnosis, as in the JSON.
+        traces: residuals of every trial.
+        channels: what they are of.
+        unit: of a quantity that a misfit may depend on.
+        folder: an existing one.
+
+    Raises:
+        InputError: something cannot be written.
+    """
+    save_traces(traces, channels, folder / RESIDUALS)
+    if draws_plots():
+        from discrepancy.result.pictures.plots import save_plots
+
+        save_plots(values, traces, channels, unit, folder)

@@ -7,10 +7,8 @@ elements: flags, sizes, name, numbers ("MAT-File Format", The MathWorks, 2024).
 import io
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
-from math import prod
 from pathlib import Path
 from typing import IO
 
@@ -18,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from estimator.inputs import Unpacked, open_input
+from estimator.inputs import open_input
 from mocobot_logs.faults import shown, told_in_one_sentence
-from mocobot_logs.table.npz import MAX_WHOLE_BYTES, read_exactly
-from mocobot_logs.table.stamps import from_numbers
-from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
+from mocobot_logs.table.arrays import ArrayTable, Stored, read_exactly
 
 HEADER_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15
@@ -64,34 +60,10 @@ class _Inflated(io.RawIOBase):
         return 0
 
 
-@dataclass(frozen=True)
-class Variable:
-    """One matrix of a file.
-
-    Attributes:
-        at: where its element begins in the file [B].
-        start: where its numbers begin in what the element holds, unpacked [B].
-        dtype: of a number in the file.
-        rows: samples.
-        row_shape: shape of one row.
-        packed: whether zlib packed it.
-    """
-
-    at: int
-    start: int
-    dtype: np.dtype
-    rows: int
-    row_shape: tuple[int, ...]
-    packed: bool
-
-    @property
-    def size(self) -> int:
-        """Bytes of its numbers."""
-        return self.dtype.itemsize * self.rows * prod(self.row_shape)
-
-
-class MatTable(Table):
+class MatTable(ArrayTable):
     """A MATLAB file as a ``Table``: a vector is a column; of a matrix, a row is a sample."""
+
+    noun, kind = "variable", "MATLAB file"
 
     def __init__(self, path: Path, name: str) -> None:
         """Read the tags, sizes and names of all variables.
@@ -99,44 +71,28 @@ class MatTable(Table):
         Raises:
             InputError: the file is damaged, cut off, of another version, or holds no matrix of real numbers.
         """
-        self.name, self._path = name, path
-        with told_in_one_sentence(name, "MATLAB file"), open_input(path) as file:
+        self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
+        with told_in_one_sentence(name, self.kind), open_input(path) as file:
             self._order = self._byte_order(file.read(HEADER_BYTES))
-            self._variables = dict(self._found(file))
-        if not self._variables:
+            self.arrays = dict(self._found(file))
+        if not self.arrays:
             raise InputError(
                 f"{name}: holds no matrix of real numbers; save each column as a vector (structs, cells, tables, "
                 "objects and text are not read)"
             )
         self.shapes: Mapping[str, tuple[int, ...]] = {
-            key: variable.row_shape for key, variable in self._variables.items()
+            key: array.row_shape for key, array in self.arrays.items()
         }
-        self.size = max(variable.rows for variable in self._variables.values())
+        self.size = max(array.shape[0] for array in self.arrays.values())
 
-    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Rows in step, see ``Table.blocks``.
-
-        Raises:
-            InputError: the file is damaged, or a variable has another number of rows.
-        """
-        names = list(dict.fromkeys([*wanted.clocks, *wanted.columns]))
-        rows = self._rows(names)
-        at_a_time = rows_at_a_time(sum(prod(self._variables[name].row_shape) for name in names))
-        with told_in_one_sentence(self.name, "MATLAB file"), ExitStack() as stack:
-            readers = {name: self._reader(name, stack) for name in names}
-            for row in range(0, rows, at_a_time):
-                count = min(at_a_time, rows - row)
-                read = {name: reader(row, count) for name, reader in readers.items()}
-                yield Block(
-                    {name: read[name] for name in wanted.columns},
-                    {
-                        name: from_numbers(
-                            read[name].reshape(count), wanted.unit_ns, f"{self.name}: variable {name!r}", row
-                        )
-                        for name in wanted.clocks
-                    },
-                )
-                advance(count)
+    def readers(self, names: Sequence[str], stack: ExitStack) -> dict[str, Callable[[int], NDArray]]:
+        """See ``ArrayTable.readers``."""
+        return {
+            name: self.arrays[name].reader(
+                self._content(stack.enter_context(open_input(self._path)), self.arrays[name].at)
+            )
+            for name in names
+        }
 
     def _byte_order(self, header: bytes) -> str:
         if header.startswith(b"MATLAB 7.3"):
@@ -148,8 +104,8 @@ class MatTable(Table):
             )
         return order
 
-    def _found(self, file: IO[bytes]) -> Iterator[tuple[str, Variable]]:
-        size, at, seen = self._path.stat().st_size, HEADER_BYTES, set()
+    def _found(self, file: IO[bytes]) -> Iterator[tuple[str, Stored]]:
+        size, at, seen = self.stored_bytes, HEADER_BYTES, set()
         while at < size:
             file.seek(at)
             kind, count = struct.unpack(f"{self._order}II", read_exactly(file, TAG_BYTES))
@@ -159,10 +115,14 @@ class MatTable(Table):
                 raise InputError(
                     f"{self.name}: is cut off: the variable from byte {at} on goes beyond the end of the file"
                 )
-            found = self._header(at, self._content(file, at), kind == COMPRESSED)
+            found = self._header(at, self._content(file, at))
             if found is not None:
                 if found[0] in seen:
                     raise InputError(f"{self.name}: variable {found[0]!r:.60} is in the file twice")
+                if kind == MATRIX and found[1].start + found[1].size > count:
+                    raise InputError(
+                        f"{self.name}: variable {shown(found[0])!r} goes beyond its {count} bytes"
+                    )
                 seen.add(found[0])
                 yield found
             at += TAG_BYTES + count
@@ -179,7 +139,7 @@ class MatTable(Table):
             raise InputError(f"{self.name}: is damaged: what is packed at byte {at} is no matrix")
         return inside
 
-    def _header(self, at: int, content: IO[bytes], packed: bool) -> tuple[str, Variable] | None:
+    def _header(self, at: int, content: IO[bytes]) -> tuple[str, Stored] | None:
         """Name and place of a matrix; None if it is not one of real numbers."""
         _, flags, begun = self._element(content, TAG_BYTES)
         (flag,) = struct.unpack(f"{self._order}I4x", flags)
@@ -198,9 +158,9 @@ class MatTable(Table):
             raise InputError(f"{self.name}: variable {shown(name)!r} is damaged")
         if len(shape) == 2 and shape[0] == 1:
             shape = shape[::-1]
-        row_shape = () if shape[1:] == (1,) else shape[1:]
-        dtype = np.dtype(NUMBERS[kind]).newbyteorder(self._order)
-        found = Variable(at, begun + (4 if small else TAG_BYTES), dtype, shape[0], row_shape, packed)
+        shape = shape[:1] if shape[1:] == (1,) else shape
+        dtype = np.dtype(self._order + NUMBERS[kind])
+        found = Stored(at, dtype, shape, True, begun + (4 if small else TAG_BYTES))
         if found.size != count:
             raise InputError(
                 f"{self.name}: variable {shown(name)!r} claims {found.size} bytes of numbers, but has {count}"
@@ -222,35 +182,3 @@ class MatTable(Table):
             raise InputError(f"{self.name}: is damaged: a header has an element of {count} bytes")
         room = 4 if small else -(-count // 8) * 8
         return kind, read_exactly(content, room)[:count], room + (4 if small else TAG_BYTES)
-
-    def _rows(self, names: list[str]) -> int:
-        rows, unpacked = self._variables[names[0]].rows, Unpacked(self.name, self._path.stat().st_size)
-        for name in names:
-            variable = self._variables[name]
-            if variable.rows != rows:
-                raise InputError(
-                    f"{self.name}: variable {shown(name)!r} has {variable.rows} rows, but {shown(names[0])!r} has "
-                    f"{rows}; all must have as many (a matrix has a row for each sample)"
-                )
-            if variable.packed:
-                unpacked.add(variable.size)
-            if variable.row_shape and variable.size > MAX_WHOLE_BYTES:
-                raise InputError(
-                    f"{self.name}: variable {shown(name)!r} is larger than {MAX_WHOLE_BYTES >> 30} GiB; save its "
-                    "columns as vectors"
-                )
-        return rows
-
-    def _reader(self, name: str, stack: ExitStack) -> Callable[[int, int], NDArray]:
-        """What reads so many rows of a variable from a row on; of a vector, the next ones."""
-        variable = self._variables[name]
-        content = self._content(stack.enter_context(open_input(self._path)), variable.at)
-        read_exactly(content, variable.start)
-        if not variable.row_shape:
-            return lambda _, count: np.frombuffer(
-                read_exactly(content, count * variable.dtype.itemsize), variable.dtype
-            )
-        # Numbers come column by column.
-        shape = (variable.rows, *variable.row_shape)
-        whole = np.frombuffer(read_exactly(content, variable.size), variable.dtype).reshape(shape, order="F")
-        return lambda row, count: whole[row : row + count]

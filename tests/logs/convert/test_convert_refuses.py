@@ -209,7 +209,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
     ),
     "text named mcap": (lambda d: text(d / "a.mcap", "time,phi\n"), ["a.mcap"]),
     "binary named csv": (lambda d: text(d / "a.csv", bytes(range(256)) * 9), ["holds binary data"]),
-    "unknown format": (lambda d: text(d / "a.h5", "MATLAB 5.0"), ["is of no known format", ".npz"]),
+    "unknown format": (lambda d: text(d / "a.h5", "HDF"), ["is of no known format", ".npz"]),
     "claim of 10 GB": (lambda d: bomb(d / "a.npz"), ["claims the shape (1250000000,)", "but has 0"]),
     "truncated csv": (
         lambda d: truncated(write_text(d / "a.csv", columns())),
