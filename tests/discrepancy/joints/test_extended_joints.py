@@ -31,6 +31,8 @@ from discrepancy.serial.rows.signals import Signals
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.extended import load_effects, step
+from mocobot_sim.serial.extended import write_extended as write_laws
+from mocobot_sim.serial.law import ActingLaw, JointLaw
 
 ARM = """<mujoco><compiler angle="radian"/><option timestep="1e-5" integrator="implicitfast"/><worldbody>
 <body name="one" pos="0 0 0.3"><joint name="turn" axis="0 0 1" armature="0.02" frictionloss="0.6" damping="0.4"/>
@@ -498,6 +500,20 @@ def test_what_is_not_simulated_is_said(case: Case, tmp_path: Path) -> None:
     ]  # fmt: skip
     assert file["causes"][0]["parameters"]["start_s"] == 3.0
     assert load_effects(tmp_path / "extended") == []
+
+
+def test_a_law_is_written_and_stepped(tmp_path: Path) -> None:
+    """What nobody has listed: 0.5 N m of the elbow's dry friction are gone after some time constants of 8 s."""
+    law = JointLaw("torque_3", "warming", "time", -0.5, 8.0, times="direction_3")
+    wobble = JointLaw("position_2", "sine", "q_2", 0.004, 3.0)
+    write_laws(mujoco.MjSpec.from_string(ARM), [law, wobble], tmp_path / "extended", ["log"])
+    (acting,) = load_effects(tmp_path / "extended")  # a reading that is off is not simulated
+    assert isinstance(acting, ActingLaw)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "extended" / "robot.xml"))
+    data = mujoco.MjData(model)
+    data.time, data.qvel[E] = 16.0, 0.5
+    step(model, data, [acting], np.zeros(4))
+    np.testing.assert_allclose(data.qfrc_applied, [0.0, 0.0, 0.5 * (1.0 - np.exp(-2.0)), 0.0], atol=1e-9)
 
 
 def test_a_folder_of_an_earlier_release_is_refused(tmp_path: Path) -> None:
