@@ -37,7 +37,7 @@ from mocobot_sim.serial.law import ActingLaw, JointLaw
 ARM = """<mujoco><compiler angle="radian"/><option timestep="1e-5" integrator="implicitfast"/><worldbody>
 <body name="one" pos="0 0 0.3"><joint name="turn" axis="0 0 1" armature="0.02" frictionloss="0.6" damping="0.4"/>
   <inertial pos="0.02 0.01 0.1" mass="3" diaginertia="0.03 0.03 0.02"/>
-<body name="two" pos="0 0 0.2"><joint name="shoulder" axis="0 1 0" armature="0.03" frictionloss="0.6" damping="0.4"/>
+<body name="two" pos="0 0 0.2"><joint name="shoulder" axis="0 1 0" armature="0.5" frictionloss="0.6" damping="0.4"/>
   <inertial pos="0.15 0 0.02" mass="2.5" diaginertia="0.02 0.04 0.04"/>
 <body name="three" pos="0.35 0 0"><joint name="elbow" axis="0 1 0" frictionloss="0.6" damping="0.4"/>
   <inertial pos="0.12 0.01 0" mass="1.2" diaginertia="0.008 0.012 0.012"/>
@@ -188,6 +188,10 @@ TORQUES: dict[str, tuple[str, str, dict[str, float], Truth]] = {
     "by direction and speed": ("asymmetric_viscous", "elbow", {},
                                lambda m: 0.3 * np.abs(m.v[:, E])),
     "by load": ("load_friction", "elbow", {}, lambda m: 0.15 * np.abs(m.rigid[:, E]) * np.sign(m.v[:, E])),
+    "by load, without the rotor": (
+        "load_friction", "shoulder", {},
+        lambda m: 0.15 * np.abs(m.rigid[:, 1] - 0.5 * m.a[:, 1]) * np.sign(m.v[:, 1]),
+    ),
     "counterbalance": ("counterbalance", "elbow", {},
                        lambda m: 1.2 * np.cos(m.q[:, E] - 0.6)),
     "ripple": ("ripple", "elbow", {"turns": 3.0}, lambda m: 0.4 * np.cos(3 * m.q[:, E] + 1)),
