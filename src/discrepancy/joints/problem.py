@@ -356,10 +356,11 @@ class _Builder:
             ])  # fmt: skip
         asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
+        load = s.inverse - self.given.armature * s.ddq
         for j in range(self.J):
             here = (c, j)
             one = JointSignals(
-                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=s.inverse[here],
+                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=load[here],
                 asked=asked[here], torque=torque[here], t=s.time[c], span=self.spans[j],
             )  # fmt: skip
             self.joints[j].append(one)
