@@ -185,7 +185,7 @@ class Search:
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
             self.say(f"{len(state.chosen)} found, looking for more")
-            grown = self._grown(state) or self._exchanged(state)
+            grown = self._grown(state) or self._exchanged(state) or self._grown(state, late=True)
             settled = None if grown is None else self._settled(grown)
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
                 break  # one objective that rises, or a search would go round in circles
@@ -230,11 +230,13 @@ class Search:
             out.append((gain + g.log_prior - self.against, Chosen(g, scale)))
         return sorted(out, key=lambda offer: -offer[0])
 
-    def _grown(self, state: State) -> State | None:
-        """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
+    def _grown(self, state: State, *, late: bool = False) -> State | None:
+        """A set with one cause more that is likelier, its law's errors included; None if none is."""
         count = self.problem.cells.count
-        tried = [self.value((*state.chosen, c), state.posterior) for c in self._events(state)]
-        for gain, chosen in self.offers(state)[: self.settings.tried]:
+        events = () if late else self._events(state)
+        tried = [self.value((*state.chosen, c), state.posterior) for c in events]
+        offers = [o for o in self.offers(state) if o[1].group.late == late]
+        for gain, chosen in offers[: self.settings.tried]:
             if gain < -5.0:
                 break
             kept = [

@@ -54,7 +54,7 @@ PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 BEGIN_S = 1.0
 """Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
 died to 15 %; in a stand or a soft joint it looks like a push."""
-UNLISTED_NATS = 1.0
+UNLISTED_NATS = 5.0
 """Log odds of a listed cause over something that no table lists."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
@@ -128,9 +128,11 @@ class JointProblem:
         return S
 
     def slabs(self) -> Array:
-        """Prior variances with every cause in the model, shape (K,)."""
+        """Prior variances with every listed cause in the model, shape (K,)."""
         S = np.array(self.tolerance) ** 2
         for g in self.groups:
+            if g.cause == "unlisted":
+                continue  # such functions explain a short log's noise
             k = list(g.columns)
             S[k] = np.maximum(S[k], np.array(g.slab) ** 2)
         for j, (columns, unit) in enumerate(self.resting):
@@ -509,7 +511,7 @@ class _Builder:
             index = [self.add(f"{n} unlisted {signal} {k}", 0.0, {j: x}) for k, x in enumerate(terms)]
             self.group(
                 "unlisted", n, index, self.spans[j].torque * sizes, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
-                shape=(("signal", float(number)),),
+                shape=(("signal", float(number)),), late=True,
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
             forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
