@@ -28,8 +28,8 @@ PERIOD_S, STEPS, ENCODER_M = 1e-3, 10, 5e-8
 
 def reference(cycles: int = 4) -> np.ndarray:
     """Out and back at three speeds, over and over [m], one number every millisecond."""
-    knots = np.array([0.0, 0.1, 0.8, 0.9, 1.5, 1.6, 2.2, 2.5, 2.6])
-    speed = np.array([0.0, 0.04, 0.04, 0.09, 0.09, 0.14, 0.14, 0.0, 0.0])
+    knots = np.array([0.0, 0.1, 0.8, 0.9, 1.5, 1.6, 2.2, 2.5])
+    speed = np.array([0.0, 0.04, 0.04, 0.09, 0.09, 0.14, 0.14, 0.0])
     out = np.interp(np.arange(0.0, knots[-1], PERIOD_S), knots, speed)
     return np.cumsum(np.tile(np.concatenate([out, -out]), cycles)) * PERIOD_S
 

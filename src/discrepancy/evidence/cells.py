@@ -24,11 +24,19 @@ class Bands:
         rates_hz: samples per second of each trial.
         lengths: samples of each trial.
         edges_hz: K + 1 increasing edges of K bands.
+        fade_s: series rise from zero and fall to it for so long: a cut leaks noise from above the bands.
     """
 
     rates_hz: Sequence[float]
     lengths: Sequence[int]
     edges_hz: Array
+    fade_s: float = 0.0
+
+    def faded(self, x: Array, trial: int) -> Array:
+        """A series of a trial that rises from zero at its first sample and falls to it at its last."""
+        place = np.arange(len(x)) + 0.5
+        near = np.minimum(place, place[::-1]) / max(self.fade_s * self.rates_hz[trial], 0.5)
+        return (x.T * np.sin(0.5 * np.pi * np.minimum(near, 1.0)) ** 2).T
 
     def of_trial(self, trial: int) -> NDArray[np.intp]:
         """Band of each coefficient that is a row, shape (n,)."""
@@ -40,7 +48,7 @@ class Bands:
         """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n, ...)."""
         out = []
         for t, x in enumerate(series):
-            out.append(dct(x, axis=0, norm="ortho")[: len(self.of_trial(t))])
+            out.append(dct(self.faded(x, t), axis=0, norm="ortho")[: len(self.of_trial(t))])
         return np.concatenate(out)
 
 
@@ -149,7 +157,7 @@ class Cells:
             n = len(self.bands.of_trial(t))
             wide = np.zeros((length, len(spectra)))
             wide[:n] = np.column_stack([rows[first : first + n] for rows in spectra])
-            out.append(idct(wide, axis=0, norm="ortho"))
+            out.append(self.bands.faded(idct(wide, axis=0, norm="ortho"), t))
             first += n
         return out
 

@@ -27,6 +27,7 @@ class Group:
         shape: numbers inside the columns.
         least: smallest possible value of each, -inf without a bound; empty where none has a bound.
         event: whether it acts for a while; its columns exist only while it is in the set.
+        late: whether it is offered only where no other group is worth adding.
         family: groups of one family span each other and exclude each other; empty of those that have none.
         members: of a kind, the columns of each of its members; their values are alike by half of their variance.
     """
@@ -40,6 +41,7 @@ class Group:
     least: tuple[float, ...] = ()
     members: tuple[tuple[int, ...], ...] = ()
     event: bool = False
+    late: bool = False
     family: str = ""
 
     @property

@@ -51,6 +51,11 @@ class Linear(Protocol):
         """Columns of random effects whose common spread is learnt."""
         ...
 
+    @property
+    def laws(self) -> Sequence[Sequence[int]]:
+        """Columns of errors of the model's own laws, whose common share is learnt."""
+        ...
+
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
         ...
@@ -130,25 +135,31 @@ class Search:
         """
         cells, s = self.problem.cells, self.settings
         nominal = self.prior(chosen, None if near is None else near.mean)
-        p = Posterior(cells, nominal, self.floor if near is None else near.variance)
         weight = np.full((len(cells.channels), 1), s.floor_rows)
         if open_at is not None:
             weight[open_at] = 1.0
-        spread = np.ones(len(self.problem.families))
+        loose = (*self.problem.laws, *(c.forms for c in chosen if c.forms))
+        kin = [(np.asarray(k), s.spread_rows, np.inf) for k in self.problem.families]
+        kin += [(np.asarray(k), 0.0, s.most_spread) for k in loose]
+        kin = [k for k in kin if nominal[k[0][0]] > 0]
+        S, spread = nominal.copy(), np.ones(len(kin))
+        for k, _, _ in kin:
+            if near is not None and k[-1] < len(near.prior) and near.prior[k[0]] > 0:
+                S[k] *= near.prior[k[0]] / nominal[k[0]]
+        p = Posterior(cells, S, self.floor if near is None else near.variance)
         for _ in range(steps or (s.start_steps if near is None else s.noise_steps)):
             S = nominal.copy()
-            for f, family in enumerate(self.problem.families):
-                idx = np.asarray(family)
-                if nominal[idx[0]] > 0:
-                    share = (p.mean[idx] ** 2 + np.diag(p.covariance)[idx]) / nominal[idx]
-                    spread[f] = (s.spread_rows + share.sum()) / (s.spread_rows + len(idx))
-                    S[idx] *= spread[f]
+            for f, (k, rows, most) in enumerate(kin):
+                share = np.sum((p.mean[k] ** 2 + np.diag(p.covariance)[k]) / nominal[k])
+                spread[f] = np.clip((rows + share) / (rows + len(k)), s.least_spread, most)
+                S[k] *= spread[f]
             p = Posterior(cells, S, p.better_noise(self.floor, weight))
         evidence = p.log_evidence + sum(c.group.log_prior - self.against for c in chosen)
         evidence -= 0.5 * float(
             np.sum(weight * (np.log(p.variance / self.floor) + self.floor / p.variance - 1.0))
         )
-        evidence -= 0.5 * s.spread_rows * float(np.sum(np.log(spread) + 1.0 / spread - 1.0))
+        rows = np.array([k[1] for k in kin])
+        evidence -= 0.5 * float(np.sum(rows * (np.log(spread) + 1.0 / spread - 1.0)))
         return State(tuple(chosen), p, evidence)
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
@@ -174,10 +185,11 @@ class Search:
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
             self.say(f"{len(state.chosen)} found, looking for more")
-            grown = self._grown(state) or self._exchanged(state)
-            if grown is None:
-                break
-            state = self._settled(grown)
+            grown = self._grown(state) or self._exchanged(state) or self._grown(state, late=True)
+            settled = None if grown is None else self._settled(grown)
+            if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
+                break  # one objective that rises, or a search would go round in circles
+            state = settled
         return self._pruned(state, fresh=False)
 
     def _settled(self, state: State) -> State:
@@ -218,11 +230,13 @@ class Search:
             out.append((gain + g.log_prior - self.against, Chosen(g, scale)))
         return sorted(out, key=lambda offer: -offer[0])
 
-    def _grown(self, state: State) -> State | None:
-        """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
+    def _grown(self, state: State, *, late: bool = False) -> State | None:
+        """A set with one cause more that is likelier, its law's errors included; None if none is."""
         count = self.problem.cells.count
-        tried = [self.value((*state.chosen, c), state.posterior) for c in self._events(state)]
-        for gain, chosen in self.offers(state)[: self.settings.tried]:
+        events = () if late else self._events(state)
+        tried = [self.value((*state.chosen, c), state.posterior) for c in events]
+        offers = [o for o in self.offers(state) if o[1].group.late == late]
+        for gain, chosen in offers[: self.settings.tried]:
             if gain < -5.0:
                 break
             kept = [
@@ -250,7 +264,8 @@ class Search:
             for group, series in self.problem.events(state.posterior)
             if group.key not in state.keys
         ]
-        wider = Posterior(cells, self.prior(state.chosen, state.posterior.mean), state.posterior.variance)
+        p = state.posterior
+        wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
         return [Chosen(group, wider.gain(group, self.settings.octaves)[1]) for group in found]
 
     def formed(self, state: State) -> State:

@@ -12,6 +12,8 @@ class Settings:
     Attributes:
         floor_rows: observations that the noise's floor counts (20: a band of 0.25 Hz in 40 s).
         spread_rows: observations that the nominal spread of a family of random effects counts.
+        least_spread: least learnt variance of random effects over their nominal one.
+        most_spread: most of a law's errors (4: a fifth of its trace).
         form_share: standard deviation of a law's error, of the law's own trace, in each of its forms.
         need_nats: log odds by which a set must be likelier to replace another (1: a factor of e).
         cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
@@ -34,6 +36,8 @@ class Settings:
 
     floor_rows: float = 20.0
     spread_rows: float = 5.0
+    least_spread: float = 1e-3
+    most_spread: float = 4.0
     form_share: float = 0.1
     need_nats: float = 1.0
     cause_nats: float = 3.0
@@ -51,7 +55,7 @@ class Settings:
     within_nats: float = 15.0
     most_rivals: int = 8
     clean_chi2: float = 1.5
-    least_floor: float = 0.1
+    least_floor: float = 1e-3
 
 
 SETTINGS = Settings()

@@ -20,7 +20,7 @@ class JointSignals:
     Attributes:
         q, v, a: position [rad or m] and its derivatives, shape (W,).
         direction: of the motion, -1 to 1, shape (W,).
-        load: torque that the model asks for without friction [N m or N], shape (W,).
+        load: torque that the model asks for without friction and rotor [N m or N], shape (W,).
         asked: the same with friction, shape (W,).
         torque: as measured, shape (W,).
         t: time [s], shape (W,).

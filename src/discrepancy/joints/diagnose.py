@@ -142,11 +142,11 @@ def _around(
 
 def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
     """Values and standard errors of the chosen causes' columns, by label, fitted with priors that shrink nothing."""
-    search, state = outcome.search, outcome.state
-    plain = [replace(c, scale=PLAIN) for c in state.chosen]
-    prior = np.maximum(
-        search.prior(plain, state.posterior.mean)[: len(state.posterior.prior)], state.posterior.prior
-    )
+    state = outcome.state
+    prior = state.posterior.prior.copy()
+    for c in state.chosen:
+        k = list(c.group.columns)
+        prior[k] = np.maximum(prior[k], (PLAIN * np.array(c.group.slab)) ** 2)
     p = Posterior(outcome.problem.cells, prior, state.posterior.variance)
     se = np.sqrt(np.diag(p.covariance))
     return {

@@ -8,26 +8,29 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from discrepancy.joints.causes import WORDS
 from discrepancy.joints.findings import Finding, JointVerdict, Member
+from discrepancy.joints.said import titled
 from discrepancy.joints.values import axes_of_tilt
 from discrepancy.serial.model import SerialModel, load_spec
 from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended as write
 
-LINKS = ("link_mass", "link_com", "link_inertia", "link_length", "payload")
+LINKS = ("link_mass", "link_com", "link_inertia", "payload")
 LATE = ("gravity_compensation",)
 """What acts on all masses, and so goes into a model after them."""
 
 
 def effects_of(finding: Finding, model: SerialModel) -> list[RobotEffect]:
-    """A finding as the simulator's effects, one a member.
+    """A finding as the simulator's effects, one a member; one without numbers of what no table lists.
 
     Args:
         finding: with values in physical units.
         model: that it is about.
     """
-    return [_effect(finding, member, model) for member in finding.members]
+    members = finding.members or (Member(finding.place, finding.joint, {}, {}),)
+    return [_effect(finding, member, model) for member in members]
 
 
 def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[Finding, RobotEffect]]:
@@ -50,7 +53,7 @@ def write_extended(verdict: JointVerdict, folder: Path) -> None:
 
 def label(finding: Finding) -> str:
     """The cause and its place in words."""
-    return f"{finding.cause.replace('_', ' ')} ({finding.place})"
+    return titled(WORDS[finding.cause].title, finding.place)
 
 
 def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect:
@@ -66,14 +69,7 @@ def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect
         turned = Rotation.from_rotvec(-way).apply(gravity)
         numbers |= dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, turned), strict=True))
     joint, body = member.joint, ""
-    if finding.cause in LINKS and joint is None:
-        joint, body = _link(member.place, model)
+    if finding.cause in LINKS:  # a link may have the name of a joint that moves another one
+        moved = member.place in model.bodies
+        joint, body = (model.bodies.index(member.place) + 1, "") if moved else (None, member.place)
     return RobotEffect(finding.cause, joint, finding.partner, numbers, body)
-
-
-def _link(place: str, model: SerialModel) -> tuple[int | None, str]:
-    """The joint that moves a link, from 1; the link's own name where none moves it."""
-    for names in (model.bodies, model.joints):
-        if place in names:
-            return names.index(place) + 1, ""
-    return None, place

@@ -36,6 +36,8 @@ EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
 """Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
 TOP_SHARE = 0.15
 """Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
+FADE_S = 0.25
+"""Rows fade in and out: a cut leaks the noise of accelerations far above the bands into all of them."""
 INERTIA, JOINT, ZERO_RAD, LENGTH_M, TILT_RAD, SCALE, DELAY_S = 0.1, 0.03, 2e-3, 1e-3, 5e-3, 0.02, 5e-4
 """Standard deviations of a healthy robot's numbers; shares of the model's own for inertias, rotors and friction."""
 UNKNOWN_SCALE = 0.1
@@ -52,7 +54,7 @@ PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 BEGIN_S = 1.0
 """Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
 died to 15 %; in a stand or a soft joint it looks like a push."""
-UNLISTED_NATS = 1.0
+UNLISTED_NATS = 5.0
 """Log odds of a listed cause over something that no table lists."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
@@ -67,7 +69,7 @@ class JointProblem:
     Attributes:
         model: the robot as described.
         parts: smoothed logs, around which columns are made.
-        cells, groups, families: of the engine.
+        cells, groups, families, laws: of the engine.
         labels: names of the columns.
         tolerance: standard deviations of a healthy robot, shape (K,).
         series: the columns.
@@ -88,6 +90,7 @@ class JointProblem:
     cells: Cells
     groups: list[Group] = field(default_factory=list)
     families: list[list[int]] = field(default_factory=list)
+    laws: list[list[int]] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
     tolerance: list[float] = field(default_factory=list)
     series: list[Series] = field(default_factory=list)
@@ -125,9 +128,11 @@ class JointProblem:
         return S
 
     def slabs(self) -> Array:
-        """Prior variances with every cause in the model, shape (K,)."""
+        """Prior variances with every listed cause in the model, shape (K,)."""
         S = np.array(self.tolerance) ** 2
         for g in self.groups:
+            if g.cause == "unlisted":
+                continue  # such functions explain a short log's noise
             k = list(g.columns)
             S[k] = np.maximum(S[k], np.array(g.slab) ** 2)
         for j, (columns, unit) in enumerate(self.resting):
@@ -293,7 +298,7 @@ class _Builder:
         rates = [s.rate_hz for s in self.parts]
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
-        self.bands = Bands(rates, [len(r) for r in residual], edges)
+        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S)
         self.residual = residual
         known = range(self.J) if more.joints is None else more.joints
         self.channel = {j: c for c, j in enumerate(known)}
@@ -353,10 +358,11 @@ class _Builder:
             ])  # fmt: skip
         asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
+        load = s.inverse - self.given.armature * s.ddq
         for j in range(self.J):
             here = (c, j)
             one = JointSignals(
-                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=s.inverse[here],
+                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=load[here],
                 asked=asked[here], torque=torque[here], t=s.time[c], span=self.spans[j],
             )  # fmt: skip
             self.joints[j].append(one)
@@ -391,6 +397,8 @@ class _Builder:
     def built(self) -> JointProblem:
         for j in range(self.J):
             self._joint(j)
+        named = [i for i, label in enumerate(self.out.labels) if " form " in label]
+        self.out.laws += [named] if named else []
         self._kinds()
         for j in range(1, self.J):
             self._geometry(j)
@@ -503,7 +511,7 @@ class _Builder:
             index = [self.add(f"{n} unlisted {signal} {k}", 0.0, {j: x}) for k, x in enumerate(terms)]
             self.group(
                 "unlisted", n, index, self.spans[j].torque * sizes, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
-                shape=(("signal", float(number)),),
+                shape=(("signal", float(number)),), late=True,
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
             forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
@@ -626,7 +634,7 @@ class _Builder:
             self.group("payload", n, index, slab, least=(0.0,) + (-np.inf,) * 9, family=family)
 
     def _rests(self, j: int) -> None:
-        columns, unit = [], []
+        columns, unit, turns = [], [], []
         common: list[list[Array]] = [[], [], []]
         for t, s in enumerate(self.joints[j]):
             own, shared = friction.resting(s.v, s.step_s, self.slow[j])
@@ -638,8 +646,10 @@ class _Builder:
                     by[t][first : first + len(x)] = x
                     columns.append(self.add(f"{self.names[j]} rest {t} {number} {k}", 0.0, {j: by}))
                     unit.append(1.0 / np.sqrt(3.0 * (1 + k)))
-        if columns:
-            self.out.families.append(list(columns))
+                    if 0 < first < len(by[t]) - len(x):  # one that stands as a log begins may be stuck anyhow
+                        turns.append(columns[-1])
+        if turns:
+            self.out.families.append(turns)
         for k in range(3):
             columns.append(self.add(f"{self.names[j]} turning {k}", 0.0, {j: common[k]}))
             unit.append(0.5)

@@ -39,7 +39,7 @@ def functions(signals: Sequence[JointSignals]) -> Iterator[tuple[str, list[list[
         place = np.split((rankdata(every) - 0.5) / len(every), edges)
         terms = []
         for k in range(TERMS):
-            series = [np.cos(np.pi * (k + (not turns)) * u) for u in place]
+            series = [np.cos(np.pi * (k + 1) * u) for u in place]
             terms.append([x * s.direction for x, s in zip(series, signals, strict=True)] if turns else series)
         size = 1.0 / (1.0 + np.arange(TERMS))
         yield name, terms, size / np.sqrt(np.sum(size**2))

@@ -78,10 +78,22 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
             _drop_meshes(spec)
             try:
                 spec.compile()
-                return spec
+                return _named(spec)
             except (ValueError, RuntimeError, OSError) as other:
                 said += f"; without its meshes: {_sentence(other)}"
         raise InputError(f"{path}: MuJoCo cannot compile it ({said})") from error
+    return _named(spec)
+
+
+def _named(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """The same with a name for every body: findings name bodies."""
+    taken = {body.name for body in spec.bodies}
+    for k, body in enumerate(spec.bodies):
+        if not body.name:
+            joint = body.joints[0].name if body.joints else ""
+            name = f"link of {joint}" if joint else f"body {k}"
+            body.name = f"{name} ({k})" if name in taken else name
+            taken.add(body.name)
     return spec
 
 

@@ -96,7 +96,7 @@ class ArrayTable(Table):
             InputError: the file is damaged, or an array does not hold numbers or has another number of rows.
         """
         names = list(dict.fromkeys([*wanted.clocks, *wanted.columns]))
-        rows = self._rows(names)
+        rows = self._rows(names) if names else 0
         at_a_time = rows_at_a_time(sum(prod(self.arrays[name].row_shape) for name in names))
         with told_in_one_sentence(self.name, self.kind), ExitStack() as stack:
             readers = self.readers(names, stack)

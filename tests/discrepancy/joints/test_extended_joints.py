@@ -31,11 +31,13 @@ from discrepancy.serial.rows.signals import Signals
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.extended import load_effects, step
+from mocobot_sim.serial.extended import write_extended as write_laws
+from mocobot_sim.serial.law import ActingLaw, JointLaw
 
 ARM = """<mujoco><compiler angle="radian"/><option timestep="1e-5" integrator="implicitfast"/><worldbody>
 <body name="one" pos="0 0 0.3"><joint name="turn" axis="0 0 1" armature="0.02" frictionloss="0.6" damping="0.4"/>
   <inertial pos="0.02 0.01 0.1" mass="3" diaginertia="0.03 0.03 0.02"/>
-<body name="two" pos="0 0 0.2"><joint name="shoulder" axis="0 1 0" armature="0.03" frictionloss="0.6" damping="0.4"/>
+<body name="two" pos="0 0 0.2"><joint name="shoulder" axis="0 1 0" armature="0.5" frictionloss="0.6" damping="0.4"/>
   <inertial pos="0.15 0 0.02" mass="2.5" diaginertia="0.02 0.04 0.04"/>
 <body name="three" pos="0.35 0 0"><joint name="elbow" axis="0 1 0" frictionloss="0.6" damping="0.4"/>
   <inertial pos="0.12 0.01 0" mass="1.2" diaginertia="0.008 0.012 0.012"/>
@@ -186,6 +188,10 @@ TORQUES: dict[str, tuple[str, str, dict[str, float], Truth]] = {
     "by direction and speed": ("asymmetric_viscous", "elbow", {},
                                lambda m: 0.3 * np.abs(m.v[:, E])),
     "by load": ("load_friction", "elbow", {}, lambda m: 0.15 * np.abs(m.rigid[:, E]) * np.sign(m.v[:, E])),
+    "by load, without the rotor": (
+        "load_friction", "shoulder", {},
+        lambda m: 0.15 * np.abs(m.rigid[:, 1] - 0.5 * m.a[:, 1]) * np.sign(m.v[:, 1]),
+    ),
     "counterbalance": ("counterbalance", "elbow", {},
                        lambda m: 1.2 * np.cos(m.q[:, E] - 0.6)),
     "ripple": ("ripple", "elbow", {"turns": 3.0}, lambda m: 0.4 * np.cos(3 * m.q[:, E] + 1)),
@@ -455,6 +461,20 @@ def test_a_kind_is_one_effect_a_member(case: Case) -> None:
     ]
 
 
+def test_a_link_that_is_named_as_the_joint_of_another(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    inertial = '<inertial pos="0 0 0.1" mass="{}" diaginertia="0.01 0.01 0.01"/>'
+    path.write_text(
+        f'<mujoco><worldbody><body name="a"><joint name="b"/>{inertial.format(1)}<body name="b"><joint name="a"/>'
+        f"{inertial.format(2)}</body></body></worldbody></mujoco>"
+    )
+    heavy = Finding("link_mass", "b", 1, (Member("b", 1, {"excess_kg": 0.5}, {}),), 0.99, 50.0, 0.0, 0.0)
+    made = SimpleNamespace(model=load_model(path), findings=(heavy,), trials=("log",), reference=())
+    write_extended(made, tmp_path / "extended")  # type: ignore[arg-type]
+    extended = mujoco.MjModel.from_xml_path(str(tmp_path / "extended" / "robot.xml"))
+    assert (extended.body("a").mass[0], extended.body("b").mass[0]) == (1.0, 2.5)
+
+
 def test_gravity_is_compensated_with_the_payload_in_it(case: Case, tmp_path: Path) -> None:
     def change(spec: mujoco.MjSpec) -> None:
         load(spec)
@@ -474,7 +494,7 @@ def test_what_is_not_simulated_is_said(case: Case, tmp_path: Path) -> None:
     found = [
         push,
         finding("elasticity", "elbow", {"compliance_rad_per_Nm": 1e-3}),
-        finding("unlisted", "turn", {}),
+        Finding("unlisted", "turn", 1, (), 0.9, 50.0, 0.0, 0.1),
     ]
     write_extended(verdict(case, *found), tmp_path / "extended")  # type: ignore[arg-type]
     file = json.loads((tmp_path / "extended" / "effects.json").read_text())
@@ -484,6 +504,20 @@ def test_what_is_not_simulated_is_said(case: Case, tmp_path: Path) -> None:
     ]  # fmt: skip
     assert file["causes"][0]["parameters"]["start_s"] == 3.0
     assert load_effects(tmp_path / "extended") == []
+
+
+def test_a_law_is_written_and_stepped(tmp_path: Path) -> None:
+    """What nobody has listed: 0.5 N m of the elbow's dry friction are gone after some time constants of 8 s."""
+    law = JointLaw("torque_3", "warming", "time", -0.5, 8.0, times="direction_3")
+    wobble = JointLaw("position_2", "sine", "q_2", 0.004, 3.0)
+    write_laws(mujoco.MjSpec.from_string(ARM), [law, wobble], tmp_path / "extended", ["log"])
+    (acting,) = load_effects(tmp_path / "extended")  # a reading that is off is not simulated
+    assert isinstance(acting, ActingLaw)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "extended" / "robot.xml"))
+    data = mujoco.MjData(model)
+    data.time, data.qvel[E] = 16.0, 0.5
+    step(model, data, [acting], np.zeros(4))
+    np.testing.assert_allclose(data.qfrc_applied, [0.0, 0.0, 0.5 * (1.0 - np.exp(-2.0)), 0.0], atol=1e-9)
 
 
 def test_a_folder_of_an_earlier_release_is_refused(tmp_path: Path) -> None:

@@ -180,3 +180,10 @@ def test_a_fixed_link_of_a_urdf_without_an_inertial_has_no_mass(tmp_path: Path) 
     <joint name="mount" type="fixed"><parent link="arm"/><child link="hull"/></joint></robot>"""
     (tmp_path / "r.urdf").write_text(text, encoding="utf-8")
     assert load_model(tmp_path / "r.urdf").model.body("arm").mass[0] == 2.0
+
+
+def test_bodies_without_a_name_get_one_from_their_joint(tmp_path: Path) -> None:
+    """Findings name bodies; the one that has the name already keeps it."""
+    inside = f'<body name="link of one">{BODY}<joint name="two"/><body>{BODY}</body></body>'
+    model = load_model(written(tmp_path, mjcf(f'<body>{BODY}<joint name="one"/>{inside}</body>')))
+    assert [model.model.body(b).name for b in range(4)] == ["world", "link of one (1)", "link of one", "body 3"]

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
+from joint_logs import write_table
 from mocobot_logs.joints.draft import draft_joint_map
 
 JOINTS = ("shoulder", "elbow")
@@ -55,3 +57,15 @@ def test_decimal_commas_are_seen(tmp_path) -> None:
     assert '[csv]\ndecimal = ","' in draft.text
     assert draft.doubtful == 0
     assert "[csv]" not in draft_joint_map(written(tmp_path, names), JOINTS, [False, False]).text
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mat", "npz", "parquet"])
+def test_names_that_mean_nothing(tmp_path: Path, suffix: str) -> None:
+    path, columns = tmp_path / f"log.{suffix}", {"a": np.arange(50.0), "b": np.ones(50)}
+    if suffix == "mat":
+        savemat(path, columns, oned_as="column")
+    else:
+        write_table(path, columns)
+    draft = draft_joint_map(path, JOINTS, [False, False])
+    assert draft.missing == ("a position", "a torque, a current, a command or a duty")
+    assert "# not used: a, b" in draft.text

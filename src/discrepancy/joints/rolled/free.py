@@ -97,7 +97,7 @@ def usable(s: Signals, events: Sequence[Event] = ()) -> NDArray[np.bool_]:
         events: in whose time nothing is usable.
     """
     margin = math.ceil(EDGE_PERIODS / smoothing_hz(s.log.rate_hz) * s.rate_hz)
-    bad = np.pad(np.logical_not(s.usable).any(axis=1), margin, constant_values=True)
+    bad = np.pad(np.logical_not(s.usable).any(axis=1), margin)  # the ends of a trial are not spoilt
     out = np.convolve(bad, np.ones(2 * margin + 1), mode="valid") < 0.5
     for event in events:
         out &= (s.time < event.start_s) | (s.time > event.start_s + event.duration_s)

@@ -68,7 +68,7 @@ def rolled_out(verdict: JointVerdict, say: Callable[[str], object] = lambda _: N
     known = np.all([s.usable.any(axis=0) for s in parts], axis=0)
     why_not = None if known.all() else f"no torque of joint {model.joints[int(np.argmin(known))]} is known"
     horizons, runs, refused = [Horizon(h) for h in HORIZONS_S], [], []
-    left = {label(f): None for f in verdict.findings if f.event is not None}
+    left = {label(f): None for f in verdict.findings if f.event is not None or f.cause == "unlisted"}
     lengths, loop_why = [len(s.time) / s.rate_hz for s in parts], ""
     for k, (s, name) in enumerate(zip(parts, verdict.trials, strict=True)):
         given, found = Robot.of(model, (), s.rate_hz), None

@@ -88,8 +88,6 @@ _BY_FORM: dict[tuple[str, str, str], str] = {
     ): "an eccentric disc (once a turn), the encoder's poles, or a gear behind it",
     ("joint position", "linear", "own torque"): "an encoder on the far side of something that gives way",
     ("joint position", "linear", "time"): "a zero that slips",
-    ("axis force", "play", "own travel"): "a drive that gives way before it slides (presliding)",
-    ("axis force", "signed_square", "own rate"): "drag of air, or of grease that is stirred",
 }
 _TELLS = {
     "tau reading": "Exchange this torque sensor with another robot's, and repeat: does it go along?",
@@ -101,8 +99,6 @@ _TELLS = {
         "Without power, turn the joint by hand: an error of the reading stays, a torque in the joint is felt instead."
     ),
     "joint position": "Compare this encoder with an outside measurement of the angle.",
-    "axis force": "A load cell between drive and carriage: does it feel the force?",
-    "loop voltage": "Measure the voltage behind the controller, and what the controller computes.",
     "base position": "Watch the base with a dial gauge during a trial.",
     "grasp position": "Watch flange and payload with a dial gauge during a trial.",
 }
