@@ -237,10 +237,7 @@ class Search:
         count = self.problem.cells.count
         events = () if late else self._events(state)
         tried = [self.value((*state.chosen, c), state.posterior) for c in events]
-        offers = [o for o in self.offers(state) if o[1].group.late == late]
-        for gain, chosen in offers[: self.settings.tried]:
-            if gain < -5.0:
-                break
+        for chosen in self._likely(state, late=late):
             kept = [
                 c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
             ]
@@ -257,6 +254,20 @@ class Search:
             self.problem.cells.truncate(count)
         self.problem.cells.truncate(count)
         return None
+
+    def _likely(self, state: State, *, late: bool) -> list[Chosen]:
+        """Causes whose exact evidence is worth computing: the likeliest with the present noise, and with its floor.
+
+        In a short log a band has few rows, and noise alone explains what a cause would.
+        """
+        p, s = state.posterior, self.settings
+        quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
+        out: list[Chosen] = []
+        for where, most, least in ((state, s.tried, -5.0), (quiet, s.tried_quiet, s.need_nats)):
+            offers = [(gain, c) for gain, c in self.offers(where) if c.group.late == late and gain > least]
+            known = {c.group.name for c in out}
+            out += [c for _, c in offers[:most] if c.group.name not in known]
+        return out
 
     def _events(self, state: State) -> list[Chosen]:
         """The likeliest events, with their columns added."""

@@ -19,6 +19,7 @@ class Settings:
         cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
         most_causes: largest set.
         tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
+        tried_quiet: the same of those that are likeliest with the noise at its floor.
         octaves: scales of a cause's prior, by halves from the slab down.
         noise_steps: steps in which noise and spreads are learnt for a candidate.
         settle_steps: times that is repeated at most for a set that is taken.
@@ -43,6 +44,7 @@ class Settings:
     cause_nats: float = 3.0
     most_causes: int = 30
     tried: int = 6
+    tried_quiet: int = 3
     octaves: int = 5
     noise_steps: int = 2
     settle_steps: int = 8

@@ -31,7 +31,8 @@ def effects_of(finding: Finding, model: SerialModel) -> list[RobotEffect]:
         model: that it is about.
     """
     members = finding.members or (Member(finding.place, finding.joint, {}, {}),)
-    return [_effect(finding, member, model) for member in members]
+    effects = [_effect(finding, member, model) for member in members]
+    return [part for effect in effects for part in _parts(effect)]
 
 
 def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[Finding, RobotEffect]]:
@@ -55,6 +56,17 @@ def write_extended(verdict: JointVerdict, folder: Path) -> None:
 def label(finding: Finding) -> str:
     """The cause and its place in words."""
     return titled(WORDS[finding.cause].title, finding.place)
+
+
+def _parts(effect: RobotEffect) -> Iterator[RobotEffect]:
+    """An effect; a link's mass that comes with its centre and its inertia as the three."""
+    numbers = effect.parameters
+    if effect.cause != "link_mass" or "x_m" not in numbers:
+        yield effect
+        return
+    yield replace(effect, parameters={"excess_kg": numbers["excess_kg"]})
+    yield replace(effect, cause="link_com", parameters={f"{x}_m": numbers[f"{x}_m"] for x in "xyz"})
+    yield replace(effect, cause="link_inertia", parameters={"share": numbers["inertia_share"]})
 
 
 def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect:

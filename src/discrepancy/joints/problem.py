@@ -326,6 +326,8 @@ class _Builder:
             model, self.parts, self.cut, self._cells(residual), joints=self.joints, channel=self.channel
         )
         self.out.dry = np.array(self.given.coulomb)
+        for j in more.motors:  # a servo that sticks gives what its error asks for, which is no load
+            self.out.dry[j] = max(self.out.dry[j], self.spans[j].torque)
 
     def _tree(self) -> Tree:
         t, v = self.given, self.values

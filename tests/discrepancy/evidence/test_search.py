@@ -23,6 +23,7 @@ class Machine:
 
     cells: Cells
     groups: list[Group] = field(default_factory=list)
+    sensors: Array | None = None
     families: Sequence[Sequence[int]] = ()
     laws: Sequence[Sequence[int]] = ()
     others: Sequence[Array] = ()
