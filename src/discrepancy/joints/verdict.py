@@ -302,6 +302,7 @@ class _Judge:
         out = [float(np.sum(nominal / plain.floor) / cells.rows.sum())]
         for search, state in ((plain, plain.fixed(())), (self.search, self.state)):
             cells, p = search.problem.cells, state.posterior
+            cells.truncate(len(p.prior))
             left, fitted = cells.left(p.mean, p.covariance)
             free = np.maximum(cells.rows - fitted / p.variance, 0.05 * cells.rows)
             out.append(float(np.sum(left / search.floor) / free.sum()))
