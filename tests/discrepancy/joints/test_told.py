@@ -37,6 +37,8 @@ from joint_verdicts import (
 )  # fmt: skip
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.comparison.diagnoses import changes_of, groups_of
+from mocobot_view.replay.replay_trial import replay_trial
+from recordings import small_recording
 
 
 def values(folder: Path, findings: Sequence[Finding] = (), **more: Any) -> dict[str, Any]:
@@ -412,6 +414,18 @@ def test_two_days_are_compared_place_by_place(tmp_path: Path) -> None:
     assert [line.split(", ")[0] for line in alone] == [
         "Named in A alone: friction in all joints", "Named in B alone: push on the last link"
     ]  # fmt: skip
+
+
+def test_a_team_and_a_robot_of_joints_are_not_mixed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, told in (("team", small_diagnosis()), ("arm", values(tmp_path))):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "diagnosis.json").write_text(json.dumps(told))
+    said = refused(capsys, "compare", tmp_path / "team", tmp_path / "arm")
+    assert "are diagnoses of a team and of one robot's joints; both must be of one kind" in said
+    with pytest.raises(InputError, match="the diagnosis is of one robot's joints; "):
+        replay_trial(small_recording(), "rec", diagnosis=read_diagnosis(tmp_path / "arm"))
 
 
 def test_diagnoses_of_version_2_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
