@@ -118,6 +118,20 @@ class Posterior:
         out[np.ix_(self.active, self.active)] = s[:, None] * inverse * s
         return out
 
+    def errors(self, columns: Sequence[int]) -> Array:
+        """Standard deviations of the values of some columns that are in the model."""
+        s, L, _ = self._factor
+        at = np.searchsorted(self.active, columns)
+        unit = np.zeros((len(s), len(at)))
+        unit[at, np.arange(len(at))] = s[at]
+        return np.sqrt(np.sum(solve_triangular(L, unit, lower=True, check_finite=False) ** 2, axis=0))
+
+    def possible(self, group: Group, scale: float) -> float:
+        """Log evidence that the bounds of a group's values add, where the group is in the model."""
+        if not group.least:
+            return 0.0
+        return _possible(group, self.mean[list(group.columns)], self.errors(group.columns), scale)
+
     def better_noise(self, floor: Array, weight: Array | float) -> Array:
         """Variances by MacKay's step: squares left over rows that are not fitted, about a floor."""
         left, fitted = self.cells.left(self.mean, self.covariance)

@@ -154,7 +154,9 @@ class Search:
                 spread[f] = np.clip((rows + share) / (rows + len(k)), s.least_spread, most)
                 S[k] *= spread[f]
             p = Posterior(cells, S, p.better_noise(self.floor, weight))
-        evidence = p.log_evidence + sum(c.group.log_prior - self.against for c in chosen)
+        evidence = p.log_evidence
+        for c in chosen:
+            evidence += c.group.log_prior - self.against + p.possible(c.group, c.scale)
         evidence -= 0.5 * float(
             np.sum(weight * (np.log(p.variance / self.floor) + self.floor / p.variance - 1.0))
         )

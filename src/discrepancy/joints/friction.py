@@ -107,6 +107,8 @@ def other_forms(
         yield [3.0 * share * coulomb * (bent(s.q, bristle) - s.direction) for s in signals]
     for speed in (0.03, 0.1):
         yield [slow * coulomb * s.direction * np.exp(-np.abs(s.v) / (speed * s.span.speed)) for s in signals]
+    for speed in (0.02, 0.06):  # reversals that are rounded
+        yield [slow * coulomb * (np.tanh(s.v / (speed * s.span.speed)) - s.direction) for s in signals]
     yield [1e-3 * coulomb * np.gradient(s.direction, s.step_s) for s in signals]  # a millisecond
     each = [smooth(s) for s in signals]
     for i in range(len(each[0])):

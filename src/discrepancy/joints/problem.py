@@ -38,6 +38,8 @@ TOP_SHARE = 0.15
 """Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
 FADE_S = 0.25
 """Rows fade in and out: a cut leaks the noise of accelerations far above the bands into all of them."""
+SWAY_HZ, SWAY_S = (1.0, 2.0, 3.0, 4.5, 6.5), 0.5
+"""Free vibrations of what is elastic when a log begins: frequencies, and the time in which they fade."""
 INERTIA, JOINT, ZERO_RAD, LENGTH_M, TILT_RAD, SCALE, DELAY_S = 0.1, 0.03, 2e-3, 1e-3, 5e-3, 0.02, 5e-4
 """Standard deviations of a healthy robot's numbers; shares of the model's own for inertias, rotors and friction."""
 UNKNOWN_SCALE = 0.1
@@ -69,6 +71,7 @@ class JointProblem:
     Attributes:
         model: the robot as described.
         parts: smoothed logs, around which columns are made.
+        cut: samples of each that are rows.
         cells, groups, families, laws: of the engine.
         labels: names of the columns.
         tolerance: standard deviations of a healthy robot, shape (K,).
@@ -87,6 +90,7 @@ class JointProblem:
 
     model: SerialModel
     parts: list[Signals]
+    cut: list[slice]
     cells: Cells
     groups: list[Group] = field(default_factory=list)
     families: list[list[int]] = field(default_factory=list)
@@ -200,6 +204,20 @@ class JointProblem:
                 out.append(self.event(self._window(trial, first, length, group.log_prior)))
         return out
 
+    def _swaying(self, group: Group, compliance: float) -> list[Series]:
+        """Free vibrations of an elastic joint at the begin of each log, as large as it gives way under its torque."""
+        joint, out = self.model.joints.index(group.place), []
+        for t, (s, cut) in enumerate(zip(self.parts, self.cut, strict=True)):
+            time = np.maximum(s.time - s.time[cut.start], 0.0)
+            size = 10.0 * compliance * float(np.sqrt(np.mean(s.inverse[:, joint] ** 2)))
+            for hz in SWAY_HZ:
+                for wave in (np.sin, np.cos):
+                    x = along(s, joint, size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S))[cut]
+                    empty = [np.zeros((c.stop - c.start, x.shape[1])) for c in self.cut]
+                    empty[t] = x
+                    out.append({c: [e[:, c] for e in empty] for c in range(x.shape[1]) if x[:, c].any()})
+        return out
+
     def _push(self, group: Group, force: Array, wave: int) -> Series:
         """Torques of a force during a push, ``wave`` half sines long."""
         shape = dict(group.shape)
@@ -222,6 +240,8 @@ class JointProblem:
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
         out: list[Series] = []
+        if group.cause == "elasticity":
+            out = self._swaying(group, float(values[group.columns[0]]))
         members = group.members or (group.columns,)
         for member in members:
             for c in {c for k in member for c in self.series[k]}:
@@ -303,7 +323,7 @@ class _Builder:
         known = range(self.J) if more.joints is None else more.joints
         self.channel = {j: c for c, j in enumerate(known)}
         self.out = JointProblem(
-            model, self.parts, self._cells(residual), joints=self.joints, channel=self.channel
+            model, self.parts, self.cut, self._cells(residual), joints=self.joints, channel=self.channel
         )
         self.out.dry = np.array(self.given.coulomb)
 
@@ -626,6 +646,8 @@ class _Builder:
             inertial_parameters(0.0, np.zeros(3), self.given.inertia[body]),
         )
         self.group("link_inertia", n, [inertia], [2.0], family=family)
+        whole = [mass, *coms, inertia]
+        self.group("link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], family=family, shape=(("whole", 1.0),))
         if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))

@@ -31,6 +31,8 @@ def physical(
         x, covariance: of these columns, shapes (k,) and (k, k).
     """
     names = NAMES[group.cause]
+    if group.cause == "link_mass" and len(x) > 1:
+        names = (*names, *NAMES["link_com"], "inertia_share")
     change = _change(problem, group)
     if change is not None:
         value = change(x)
@@ -55,7 +57,7 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
     tree = Tree.of(problem.model.model)
     if group.cause == "link_mass":
         mass = float(tree.mass[problem.model.model.body(group.place).id])
-        return lambda x: x * mass
+        return lambda x: np.append(x[0] * mass, x[1:])
     if group.cause == "payload":
         return load_of
     if group.cause == "gravity_direction":

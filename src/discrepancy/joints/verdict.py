@@ -256,17 +256,17 @@ class _Judge:
             squares, _ = whole.left(self.parts.posterior(whole, prior).mean, np.zeros((len(prior),) * 2))
             left.append(float(np.sum(squares / variance)))
         several = len(self.parts.cells) > 1
-        held = (
-            [sum(float(np.sum(s)) for _, s in self.parts.foretold(prior)) for prior in steps]
-            if several
-            else None
+        each = (
+            [[float(np.sum(s)) for _, s in self.parts.foretold(prior)] for prior in steps] if several else []
         )
-        folds = [self._folds(o.chosen) if several and not o.chosen.group.event else () for o in kept]
+        held = [sum(parts) for parts in each]
         worth = {}
         for k, o in enumerate(kept):
             share = _share(left, k, float(np.sum(whole.rows)))
-            out = None if held is None or o.chosen.group.event else _share(held, k, float(np.sum(whole.rows)))
-            worth[o.chosen.group.key] = {"in_sample": share, "held_out": out, "folds": folds[k]}
+            lasts = several and not o.chosen.group.event
+            out = _share(held, k, float(np.sum(whole.rows))) if lasts else None
+            folds = tuple(0.5 * (a - b) for a, b in zip(each[k], each[k + 1], strict=True)) if lasts else ()
+            worth[o.chosen.group.key] = {"in_sample": share, "held_out": out, "folds": folds}
         done = []
         for f in findings:
             key = next(
@@ -275,17 +275,6 @@ class _Judge:
             )  # fmt: skip
             done.append(replace(f, **worth[key]))
         return done
-
-    def _folds(self, chosen: Chosen) -> tuple[float, ...]:
-        """By how much each part is likelier with a cause, foretold by the others."""
-        prior = self.parts.prior
-        without = self._prior([c for c in self.state.chosen if c is not chosen])
-        every = [self.parts.posterior(self.parts.but(None), p).log_evidence for p in (prior, without)]
-        out = []
-        for t in range(len(self.parts.cells)):
-            some = [self.parts.posterior(self.parts.but(t), p).log_evidence for p in (prior, without)]
-            out.append(float((every[0] - some[0]) - (every[1] - some[1])))
-        return tuple(out)
 
     def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
         both = [self.parts.foretold(prior) for prior in (self._prior((), tolerated=False), self._prior(kept))]

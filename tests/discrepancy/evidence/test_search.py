@@ -1,0 +1,101 @@
+"""Noise, errors of laws and edges of logs on problems whose answer is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from discrepancy.evidence.cells import Bands, Cells, Series
+from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.search import Chosen, Search, floor_of
+from estimator.arrays import Array
+
+RATE_HZ, LENGTH, EDGES_HZ = 100.0, 3000, np.array([0.0, 1.0, 4.0, 10.0])
+TIME = np.arange(LENGTH) / RATE_HZ
+
+
+@dataclass
+class Machine:
+    """One channel; a cause of one column whose law may have another form."""
+
+    cells: Cells
+    groups: list[Group] = field(default_factory=list)
+    families: Sequence[Sequence[int]] = ()
+    laws: Sequence[Sequence[int]] = ()
+    others: Sequence[Array] = ()
+
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        return np.zeros(self.cells.count)
+
+    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+        return []
+
+    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+        return []
+
+    def forms(self, group: Group, values: Array) -> list[Series]:
+        return [{0: [float(values[0]) * x]} for x in self.others]
+
+
+def wave(rng: np.random.Generator) -> Array:
+    """A smooth series of about unit size, below two hertz."""
+    f = rng.uniform(0.1, 2.0, 8)
+    return np.sin(2.0 * np.pi * TIME[:, None] * f + rng.uniform(0.0, 6.0, 8)).sum(axis=1) / 2.0
+
+
+def test_the_floor_is_the_noise_however_much_the_dictionary_explains() -> None:
+    rng = np.random.default_rng(1)
+    noise, columns = 0.02, [wave(rng) for _ in range(6)]
+    y = 5.0 * sum(columns) + noise * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]} for x in columns])
+    floor = floor_of(Machine(cells), np.full(6, 100.0))
+    assert np.sqrt(floor[0]) == pytest.approx(noise, rel=0.2)
+
+
+def test_noise_above_the_bands_stays_out_of_them() -> None:
+    """The second derivative of noise has hardly any power at low frequencies, unless a cut leaks it."""
+    power = []
+    for fade_s in (0.0, 0.5):
+        rng, own = np.random.default_rng(2), []
+        bands = Bands([RATE_HZ], [LENGTH], EDGES_HZ, fade_s)
+        for _ in range(20):
+            noise = np.diff(rng.standard_normal(LENGTH + 2), 2)
+            own.append(Cells.of(bands, [noise[:, None]]).channels[0].squares[0])
+        power.append(np.mean(own))
+    assert power[1] < 0.05 * power[0]
+
+
+def test_scores_of_columns_that_fade() -> None:
+    rng = np.random.default_rng(3)
+    y, x = rng.standard_normal((2, LENGTH))
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ, 0.5), [y[:, None]])
+    cells.add([{0: [x]}])
+    p = Posterior(cells, np.zeros(1), np.array([[0.5, 1.0, 2.0]]))
+    (score,) = cells.weighted_residual(p.mean, p.variance)
+    _, b, _ = cells.weighted(p.variance)
+    assert x @ score[:, 0] == pytest.approx(b[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("other", [0.0, 0.1])
+def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) -> None:
+    """Its share is learnt: small where the law is exact, as large as it is where the law has another form."""
+    rng = np.random.default_rng(4)
+    x, forms = wave(rng), [wave(rng) for _ in range(8)]
+    y = 2.0 * x * 1.0 + 2.0 * other * (rng.standard_normal(8) @ forms) + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]}])
+    machine = Machine(cells, [Group("cause", "joint", (0,), (3.0,))], others=forms)
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    plain = search.value([Chosen(machine.groups[0], 1.0)], None)
+    state = search._settled(search.formed(plain))
+    share = np.sqrt(state.posterior.prior[list(state.chosen[0].forms)])
+    if other:
+        assert share == pytest.approx(0.1, rel=0.6)
+        assert state.evidence > plain.evidence + 100.0
+    else:
+        assert share.max() < 0.01
+        assert state.evidence > plain.evidence - 6.0
