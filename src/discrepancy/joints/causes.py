@@ -318,7 +318,10 @@ OTHERS = (
     ),
     OtherCause(
         "link_mass", "mass of {link}", ("excess_kg",),
-        lambda n: f"{n.place} has {n('excess_kg', 'kg')} {n.either('excess_kg', 'more', 'less')} {n.than}",
+        lambda n: (
+            f"{n.place} has {n('excess_kg', 'kg')} {n.either('excess_kg', 'more', 'less')} {n.than}"
+            + (f", and its centre of mass is off by {n.point('mm', 1e3)}" if "x_m" in n.values else "")
+        ),
         "Weigh the link; or use a known weight, if torques may be off in scale.",
     ),
     OtherCause(

@@ -50,19 +50,19 @@ def format_verdict(values: Values, *, verbose: bool = False) -> str:
         values: a verdict in the form of ``verdict_to_dict``.
         verbose: whether to tell rivals, limits, rollouts, notes and evidence, too.
     """
-    lines = [*wrapped(" ".join(_sentences(values)), ""), *_table(values, verbose=verbose)]
+    lines = [*wrapped(" ".join(_sentences(values, verbose=verbose)), ""), *_table(values, verbose=verbose)]
     if verbose:
         lines += _rest(values)
     return "\n".join(lines)
 
 
-def _sentences(values: Values) -> Iterable[str]:
+def _sentences(values: Values, *, verbose: bool) -> Iterable[str]:
     yield _verdict(values)
     if values["causes"]:
         yield _found(values)
     yield from values["remains"][:1]
     yield from _gain(values)
-    yield from _advice(values)
+    yield from _advice(values, verbose=verbose)
 
 
 def _verdict(values: Values) -> str:
@@ -71,12 +71,14 @@ def _verdict(values: Values) -> str:
     word = word if values["finished"] else f"UNFINISHED, SO FAR {word}"
     data = "the trial" if count == 1 else f"the {count} trials"
     account = "one finding accounts for" if named == 1 else f"{named} findings account for"
+    wrong = f"what {'has changed' if values['reference'] else 'the model gets wrong'} in {data}"
+    nothing = f"the model explains {data} within noise and tolerances"
     said = {
-        "consistent": f"the model explains {data} within noise and tolerances",
+        "consistent": f"nothing but noise has changed in {data}" if values["reference"] else nothing,
         "miscalibrated": f"in {data} all places of a kind are off by more than their tolerances",
-        "explained": f"{account} what the model gets wrong in {data}",
-        "partly_explained": f"{account} a part of what the model gets wrong in {data}",
-        "unexplained": f"no cause of the tables accounts for what the model gets wrong in {data}",
+        "explained": f"{account} {wrong}",
+        "partly_explained": f"{account} a part of {wrong}",
+        "unexplained": f"no cause of the tables accounts for {wrong}",
     }[verdict]
     return f"{word}: {said}."
 
@@ -90,7 +92,7 @@ def _found(values: Values) -> str:
     listed = (
         names[0] if len(names) == 1 else f"{between.join(names[:-1])}{between.rstrip(', ')} and {names[-1]}"
     )
-    than = "the reference" if values.get("reference") else "its model"
+    than = "the reference" if values["reference"] else "its model"
     return f"The robot differs from {than} by {listed}."
 
 
@@ -115,7 +117,7 @@ def _gain(values: Values) -> Iterable[str]:
             yield "In trials left out of the fit the torques' error is no smaller with that."
 
 
-def _advice(values: Values) -> Iterable[str]:
+def _advice(values: Values, *, verbose: bool) -> Iterable[str]:
     open_ = [cause for cause in values["causes"] if len(cause["told"]) > 1 and cause["separate"]]
     if not values["finished"]:
         yield "Let the search come to its end before you rely on this."
@@ -127,7 +129,7 @@ def _advice(values: Values) -> Iterable[str]:
         yield "Correct the model by the values below, or repair the robot there."
     elif values["verdict"] == "consistent":
         if values["detection_limits"]:
-            yield "What would have been noticed is listed with --verbose."
+            yield f"What would have been noticed is listed {'below' if verbose else 'with --verbose'}."
     else:
         yield "The pictures that --out writes show at which speed, position and load the torques part."
 

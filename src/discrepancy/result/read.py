@@ -52,11 +52,13 @@ class WrittenDiagnosis:
         verdict: one of the keys of ``VERDICTS``.
         causes: in the order of discovery.
         recordings: names of the trials it was made from.
+        of_joints: whether it is of one robot of joints, not of a team.
     """
 
     verdict: str
     causes: tuple[NamedCause, ...]
     recordings: tuple[str, ...]
+    of_joints: bool = False
 
     def is_of(self, recording: str) -> bool:
         """Whether it was made from a recording, by its file's name, or from parts of it (``team.long.parts``)."""
@@ -103,7 +105,7 @@ def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
         recordings = tuple(str(name) for name in values["recordings"])
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputError(f"{path}: not a complete diagnosis ({type(error).__name__}: {error})") from error
-    return WrittenDiagnosis(verdict, causes, recordings)
+    return WrittenDiagnosis(verdict, causes, recordings, is_of_joints(values))
 
 
 def _cause(values: Mapping[str, Any]) -> NamedCause:

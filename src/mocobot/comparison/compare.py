@@ -54,6 +54,13 @@ def compare(a: Path | str | Written, b: Path | str | Written) -> Comparison:
         raise InputError(
             f"{one.name} is {_a(one.kind)} and {other.name} {_a(other.kind)}; both must be of one kind"
         )
+    if one.kind == "diagnosis" and {one.value.get("machine"), other.value.get("machine")} >= {
+        "team",
+        "joints",
+    }:
+        raise InputError(
+            f"{one.name} and {other.name} are diagnoses of a team and of one robot's joints; both must be of one kind"
+        )
     groups, changes, notes = _compared(one.kind, one.value, other.value)
     notes = [*_shared(one, other), *notes]
     return Comparison(one.kind, one.name, other.name, tuple(groups), tuple(changes), tuple(notes))

@@ -232,6 +232,8 @@ def _estimated(recording: Recording, notes: list[str]) -> PayloadEstimate | None
 
 
 def _check_diagnosis(diagnosis: WrittenDiagnosis, recording: Recording, notes: list[str]) -> None:
+    if diagnosis.of_joints:
+        raise InputError(f"the diagnosis is of one robot's joints; {recording.name} is of a team")
     if diagnosis.robots() > recording.metadata.robots:
         raise InputError(
             f"the diagnosis names robot {diagnosis.robots()}; {recording.name} is of "

@@ -37,6 +37,8 @@ from joint_verdicts import (
 )  # fmt: skip
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.comparison.diagnoses import changes_of, groups_of
+from mocobot_view.replay.replay_trial import replay_trial
+from recordings import small_recording
 
 
 def values(folder: Path, findings: Sequence[Finding] = (), **more: Any) -> dict[str, Any]:
@@ -104,6 +106,9 @@ def test_every_cause_tells_its_numbers_and_what_parts_it(name: str, slide: bool)
          "near standstill joint 4 rubs with 0.080 +- 0.010 N more than in fast motion, fading over 0.3 m/s"),
         ("link_com", False, {"x_m": 0.1, "y_m": 0.2, "z_m": -0.3},
          "the centre of mass of joint 4 is off by (100 +- 10, 200 +- 10, -300 +- 10) mm"),
+        ("link_mass", False, {"excess_kg": -0.3, "x_m": 0.1, "y_m": 0.2, "z_m": 0.3},
+         "joint 4 has 0.300 +- 0.010 kg less than modelled, and its centre of mass is off by "
+         "(100 +- 10, 200 +- 10, 300 +- 10) mm"),
         ("unlisted", False, {}, "something that no table lists acts at joint 4"),
     ],
 )  # fmt: skip
@@ -210,6 +215,7 @@ CASES: dict[str, dict[str, Any]] = {
     "partly": {"findings": [finding("unlisted", place="turn")], "verdict": "partly_explained",
                "chi2_per_n": (9.0, 8.0, 7.0), "scatter": (off_everywhere(),)},
     "besides": {"findings": [offset_or_spring(), a_payload()], "scatter": (off_everywhere(),)},
+    "no change": {"reference": ("healthy.csv",)},
     "unexplained": {"verdict": "unexplained", "chi2_per_n": (9.0, 8.0, 7.0)},
     "unfinished": {"findings": [offset_or_spring()], "finished": False},
     "one trial": {"findings": [offset_or_spring()], "trials": TRIALS[:1], "validated": False,
@@ -225,7 +231,7 @@ def test_at_most_five_sentences_and_one_narrow_table(tmp_path: Path, case: str) 
     assert len(re.findall(r"\.(?= |$)", first_part(short))) <= 5
     assert len(short.split("\n\n")) <= 2
     assert max(map(len, long.splitlines())) <= 100
-    assert first_part(long) == first_part(short)
+    assert first_part(long).replace("listed below", "listed with --verbose") == first_part(short)
     assert "[[" not in short
     assert "[[Misfit]]" in long
     assert "A note." in long
@@ -300,6 +306,7 @@ def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
     ("case", "begins", "says"),
     [
         ("consistent", "CONSISTENT: the model explains the 2 trials", "--verbose"),
+        ("no change", "CONSISTENT: nothing but noise has changed in the 2 trials.", "--verbose"),
         ("miscalibrated", "MISCALIBRATED:", "Correct the model by these values"),
         (
             "partly",
@@ -318,7 +325,11 @@ def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
             "EXPLAINED: one finding accounts for what the model gets wrong in the trial.",
             "not tested",
         ),
-        ("reference", "EXPLAINED:", "differs from the reference by payload at link carriage"),
+        (
+            "reference",
+            "EXPLAINED: one finding accounts for what has changed in the 2 trials.",
+            "differs from the reference by payload at link carriage",
+        ),
         ("many", "EXPLAINED: 12 findings account", "and 8 more"),
     ],
 )
@@ -412,6 +423,18 @@ def test_two_days_are_compared_place_by_place(tmp_path: Path) -> None:
     assert [line.split(", ")[0] for line in alone] == [
         "Named in A alone: friction in all joints", "Named in B alone: push on the last link"
     ]  # fmt: skip
+
+
+def test_a_team_and_a_robot_of_joints_are_not_mixed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, told in (("team", small_diagnosis()), ("arm", values(tmp_path))):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "diagnosis.json").write_text(json.dumps(told))
+    said = refused(capsys, "compare", tmp_path / "team", tmp_path / "arm")
+    assert "are diagnoses of a team and of one robot's joints; both must be of one kind" in said
+    with pytest.raises(InputError, match="the diagnosis is of one robot's joints; "):
+        replay_trial(small_recording(), "rec", diagnosis=read_diagnosis(tmp_path / "arm"))
 
 
 def test_diagnoses_of_version_2_are_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -186,4 +186,9 @@ def test_bodies_without_a_name_get_one_from_their_joint(tmp_path: Path) -> None:
     """Findings name bodies; the one that has the name already keeps it."""
     inside = f'<body name="link of one">{BODY}<joint name="two"/><body>{BODY}</body></body>'
     model = load_model(written(tmp_path, mjcf(f'<body>{BODY}<joint name="one"/>{inside}</body>')))
-    assert [model.model.body(b).name for b in range(4)] == ["world", "link of one (1)", "link of one", "body 3"]
+    assert [model.model.body(b).name for b in range(4)] == [
+        "world",
+        "link of one (1)",
+        "link of one",
+        "body 3",
+    ]
