@@ -190,7 +190,7 @@ class Posterior:
     def blocks(self) -> list[Array]:
         """Covariance of the values that each channel sees, in the order of its columns."""
         s, L, _ = self._factor
-        at, out = np.full(len(self.prior), -1), []
+        at, out = np.full(self.cells.count, -1), []  # columns may have been added since
         at[self.active] = np.arange(len(s))
         for own, channel in zip(L.inverses(), self.cells.channels, strict=True):
             place = at[channel.columns]
@@ -207,10 +207,10 @@ class Posterior:
     @cached_property
     def variances(self) -> Array:
         """Variances of the values, shape (K,)."""
-        out = np.zeros(len(self.prior))
+        out = np.zeros(self.cells.count)
         for block, channel in zip(self.blocks, self.cells.channels, strict=True):
             out[channel.columns] = np.diag(block)
-        return out
+        return out[: len(self.prior)]
 
     def possible(self, group: Group, scale: float) -> float:
         """Log evidence that the bounds of a group's values add, where the group is in the model."""
