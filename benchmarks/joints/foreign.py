@@ -197,7 +197,10 @@ def make(part: str, seed: int, folder: Path) -> tuple[SerialModel, list[JointLog
             _load(true, kg, rng, faults, values)
         else:
             # A zero where it shows most; a scale not at the first joint, where it is the link's inertia; one each.
-            shows = {"joint_zero": np.argsort(slope * ~slides)[-3:], "torque_scale": np.arange(1, J)}
+            shows = {
+                "joint_zero": [k for k in np.argsort(slope * ~slides)[-3:] if not slides[k]],
+                "torque_scale": np.arange(1, J),
+            }
             taken = {f["place"] for f in faults}
             j = int(rng.choice([k for k in shows.get(cause, range(J)) if f"joint{k + 1}" not in taken]))
             faults.append(_fault(str(cause), j, (true, reads), (chain[j], asks[j], inertia[j]), rng))

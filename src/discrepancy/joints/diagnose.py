@@ -148,7 +148,7 @@ def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
         k = list(c.group.columns)
         prior[k] = np.maximum(prior[k], (PLAIN * np.array(c.group.slab)) ** 2)
     p = Posterior(outcome.problem.cells, prior, state.posterior.variance)
-    se = np.sqrt(np.diag(p.covariance))
+    se = np.sqrt(p.variances)
     return {
         outcome.problem.labels[k] if k < len(outcome.problem.labels) else f"{c.group.place} {n}": (
             float(p.mean[k]),
