@@ -9,8 +9,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.recording.joint_log import Drive, JointLog
+from discrepancy.joints.model import SerialModel, load_model
+from mocobot_logs.joints.joint_log import Drive, JointLog
 
 TIMESTEP_S, RATE_HZ, SECONDS, LOGS, BANDWIDTH_PER_S = 5e-4, 1000.0, 30.0, 2, 15.0
 CHAINS = ("chain3", "chain4", "chain5", "chain6", "chain7")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -281,6 +281,6 @@ def _possible(group: Group, mean: Array, se: Array, scale: float) -> float:
     """Log of the share of the posterior that is possible over that of the prior, one value at a time."""
     total = 0.0
     for value, error, least, size in zip(mean, se, group.least, group.slab, strict=True):
-        if np.isfinite(least):
+        if np.isfinite(least) and error > 0.0:
             total += float(log_ndtr((value - least) / error) - log_ndtr(-least / (size * scale)))
     return total

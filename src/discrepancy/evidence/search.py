@@ -122,8 +122,6 @@ class Search:
         chosen: Sequence[Chosen],
         near: Posterior | None,
         steps: int | None = None,
-        *,
-        open_at: int | None = None,
     ) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
@@ -131,13 +129,10 @@ class Search:
             chosen: the set.
             near: where learning begins; None begins at the floor.
             steps: of learning.
-            open_at: a channel whose noise may be anything.
         """
         cells, s = self.problem.cells, self.settings
         nominal = self.prior(chosen, None if near is None else near.mean)
-        weight = np.full((len(cells.channels), 1), s.floor_rows)
-        if open_at is not None:
-            weight[open_at] = 1.0
+        weight = s.floor_rows
         loose = (*self.problem.laws, *(c.forms for c in chosen if c.forms))
         kin = [(np.asarray(k), s.spread_rows, np.inf) for k in self.problem.families]
         kin += [(np.asarray(k), 0.0, s.most_spread) for k in loose]

@@ -16,19 +16,19 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
-from discrepancy.joints.unlisted import SIGNALS, functions
-from discrepancy.serial.causes.elasticity import along
-from discrepancy.serial.mechanics.regressor import (
+from discrepancy.joints.mechanics.along import along
+from discrepancy.joints.mechanics.regressor import (
     body_regressor,
     force_torque,
     inertial_parameters,
     rigid_torque,
     torque_of,
 )
-from discrepancy.serial.mechanics.shift import by_acceleration, by_displacement
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.rows.signals import Signals
+from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.signals import Signals
+from discrepancy.joints.unlisted import SIGNALS, functions
 from estimator.arrays import Array
 from estimator.filtering import low_pass
 
