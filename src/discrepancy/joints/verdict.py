@@ -113,8 +113,7 @@ class _Judge:
         for o in self.odds:
             told = sum(p for g, p in self._ranked(o) if g is not None)
             (kept if told >= NAMED else suspected).append(o)
-        findings = [f for o in kept for f in self._findings(o)]
-        findings = self._with_worth(findings, kept)
+        findings = self._with_worth(kept)
         scatter = self._scatter()
         chi2 = self._chi2()
         foretold = self._foretold([o.chosen for o in kept])
@@ -160,7 +159,10 @@ class _Judge:
 
     def _findings(self, o: Odds, values: Posterior | None = None) -> list[Finding]:
         """One finding; members of a kind of which less than half are off are findings of their own."""
-        c = o.chosen.group
+        c, probability = o.chosen.group, o.probability
+        first = next((r for r in o.rivals if r.probability > o.probability), None)
+        if first and first.group and first.group.cause == "unlisted":  # what stands for it is not what it is
+            c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
         kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
@@ -175,7 +177,7 @@ class _Judge:
             place=c.place,
             joint=self._joint(c.place),
             members=() if unlisted else self._members(c, values or self.whole),
-            probability=o.probability + kin,
+            probability=probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,
             unlisted=open_,
@@ -244,7 +246,7 @@ class _Judge:
                 prior[self.parts.columns_of([k])] = nominal[k] if k < len(nominal) else 0.0
         return prior
 
-    def _with_worth(self, findings: list[Finding], kept: Sequence[Odds]) -> list[Finding]:
+    def _with_worth(self, kept: Sequence[Odds]) -> list[Finding]:
         """Findings with the shares of the misfit that they remove one after another, and nats by part."""
         steps = [self._prior([o.chosen for o in kept[:k]], tolerated=False) for k in range(len(kept) + 1)]
         whole = self.parts.but(None)
@@ -258,20 +260,13 @@ class _Judge:
             [[float(np.sum(s)) for _, s in self.parts.foretold(prior)] for prior in steps] if several else []
         )
         held = [sum(parts) for parts in each]
-        worth = {}
+        done = []
         for k, o in enumerate(kept):
             share = _share(left, k, float(np.sum(whole.rows)))
             lasts = several and not o.chosen.group.event
             out = _share(held, k, float(np.sum(whole.rows))) if lasts else None
             folds = tuple(0.5 * (a - b) for a, b in zip(each[k], each[k + 1], strict=True)) if lasts else ()
-            worth[o.chosen.group.key] = {"in_sample": share, "held_out": out, "folds": folds}
-        done = []
-        for f in findings:
-            key = next(
-                o.chosen.group.key for o in kept
-                if o.over_nothing == f.over_nothing and (o.chosen.group.place == f.place or o.chosen.group.members)
-            )  # fmt: skip
-            done.append(replace(f, **worth[key]))
+            done += [replace(f, in_sample=share, held_out=out, folds=folds) for f in self._findings(o)]
         return done
 
     def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
