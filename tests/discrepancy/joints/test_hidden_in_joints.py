@@ -199,7 +199,7 @@ def scaled(log: JointLog) -> JointLog:
 
 def saturated(log: JointLog) -> JointLog:
     """A fourth too large at small torques, and less so the larger these are."""
-    return replace(log, torque=log.torque + 0.25 * SHOULDER * 8.0 * np.tanh(log.torque / 8.0))
+    return replace(log, torque=log.torque + 0.25 * SHOULDER * 12.0 * np.tanh(log.torque / 12.0))
 
 
 def late(log: JointLog) -> JointLog:
@@ -213,8 +213,8 @@ def turned(log: JointLog) -> JointLog:
 
 
 def bending(log: JointLog) -> JointLog:
-    """A motor before a spring of 500 N m/rad, with an encoder: it stands ahead of its link by torque over stiffness."""
-    return replace(log, q=log.q + SHOULDER * 2e-3 * log.torque)
+    """A motor before a spring of 170 N m/rad, with an encoder: it stands ahead of its link by torque over stiffness."""
+    return replace(log, q=log.q + SHOULDER * 6e-3 * log.torque)
 
 
 def compensated(log: JointLog) -> JointLog:
@@ -234,7 +234,7 @@ READINGS: dict[str, tuple[Read, str, str, dict[str, float]]] = {
     "saturated": (saturated, "torque_scale", "shoulder", {}),
     "late": (late, "torque_delay", "shoulder", {"delay_s": 0.012}),
     "turned": (turned, "joint_zero", "elbow", {"zero_rad": 0.05}),
-    "bending": (bending, "elasticity", "shoulder", {"compliance_rad_per_Nm": 2e-3}),
+    "bending": (bending, "elasticity", "shoulder", {"compliance_rad_per_Nm": 6e-3}),
     "compensated": (compensated, "gravity_compensation", "robot", {"share": 0.9}),
 }
 
