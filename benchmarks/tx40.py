@@ -17,17 +17,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
-from discrepancy.candidate import Candidate
-from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.problem import Problem
-from discrepancy.rules import serial as rules
 from discrepancy.serial.diagnosis import diagnose_rig
 from discrepancy.serial.errors import with_errors
 from discrepancy.serial.laws.rig import LawfulSerialRig
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
+
+from discrepancy.candidate import Candidate
+from discrepancy.joints.model import SerialModel, load_model
+from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rules import serial as rules
+from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.parse import read_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
 

@@ -16,13 +16,13 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
+from discrepancy.serial.logs import parts_of
+from discrepancy.serial.rig import SerialRig
 from mujoco import sysid
 
-from discrepancy.serial.logs import parts_of
-from discrepancy.serial.model import load_spec
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rig import SerialRig
+from discrepancy.joints.model import load_spec
 from estimator.filtering import differentiate, low_pass
+from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.mjcf import SOLIMP, SOLREF
 from tx40 import TOP, read, shown
 

@@ -17,20 +17,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-
-from discrepancy.engine.explanation import Found
 from discrepancy.serial.diagnosis import diagnose_rig
 from discrepancy.serial.laws.rig import LawfulSerialRig
-from discrepancy.serial.model import load_model, load_spec
-from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
 from discrepancy.serial.rolled.closed import LoopDrive
 from discrepancy.serial.rolled.fitted import Fitted, extended, steps_per
 from discrepancy.serial.rolled.free import compared
 from discrepancy.serial.rolled.readings import Readings
-from discrepancy.serial.servo.commanded import Servo, servo_of
-from discrepancy.serial.servo.loop import LoopLaw, loop_laws
+
+from discrepancy.engine.explanation import Found
+from discrepancy.joints.model import load_model, load_spec
+from discrepancy.joints.servo.commanded import Servo, servo_of
+from discrepancy.joints.servo.loop import LoopLaw, loop_laws
 from mocobot.serial import read_logs
+from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.built import build
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.rollout import Start

@@ -21,11 +21,11 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import tyro
+from discrepancy.serial.diagnosis import diagnose_serial
 
 from arm import machine
 from arm.sets import ArmSet, Kind, make
 from arm.tables import misses, tables
-from discrepancy.serial.diagnosis import diagnose_serial
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+from discrepancy.serial.logs import parts_of
+from discrepancy.serial.rig import SerialRig
 
 from arm import machine
 from arm.forms import Form
 from discrepancy.candidate import Candidate
 from discrepancy.rules import inference
-from discrepancy.serial.logs import parts_of
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rig import SerialRig
+from mocobot_logs.joints.joint_log import JointLog
 
 GAIN = 38.0
 """Of chi-square over noise and tolerances, at the detection limit: found nine times in ten (``mocobot.campaign``)."""

@@ -9,8 +9,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.recording.joint_log import Drive, JointLog
+from discrepancy.joints.model import SerialModel, load_model
+from mocobot_logs.joints.joint_log import Drive, JointLog
 
 Torques = Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
 """Torques that act on the joints besides [N m], from positions, velocities, drive torques and time."""

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from discrepancy.serial.rig import SerialRig
 
 from arm import machine
 from arm.forms import CAUSE_OF, MOST, NOT_FIRST, NOWHERE, TYPICAL, Form
 from arm.limits import Shown, read
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rig import SerialRig
+from mocobot_logs.joints.joint_log import JointLog
 
 KINDS = ("clean", "single", "single", "pairs", "single", "clean", "single", "unlisted", "triples", "left-out")
 """Of successive seeds."""

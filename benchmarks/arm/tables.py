@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from discrepancy.serial.causes import CAUSES
+
 from mocobot.campaign.summary import interval, reliability
 
 Item = Mapping[str, Any]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mocobot
-from discrepancy.serial.model import load_model
+from discrepancy.joints.model import load_model
 from discrepancy.team.tolerances import read_tolerances
 from estimator.errors import InputError
 from mocobot.cli import COMMANDS

@@ -27,9 +27,9 @@ from arm.sets import ArmSet
 from arm.sets import make as make_arm
 from discrepancy.evidence.odds import odds_of
 from discrepancy.joints.diagnose import diagnose, labels_of
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.joints.model import SerialModel
 from joints.foreign import make, thinned
+from mocobot_logs.joints.joint_log import JointLog
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 KINDS = ("clean", "single", "clean", "single", "pairs")
@@ -104,8 +104,7 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
     outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)))
     causes = []
     for o in odds_of(outcome.search, outcome.state):
-        none = {True: ("open", ""), False: ("nothing", "")}
-        rivals = [(r.group.key if r.group else none[r.open], r.probability) for r in o.rivals]
+        rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
         told = [None if g is None else g.key for g in o.told()]
         causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})

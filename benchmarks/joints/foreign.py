@@ -9,8 +9,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.recording.joint_log import Drive, JointLog
+from discrepancy.joints.model import SerialModel, load_model
+from mocobot_logs.joints.joint_log import Drive, JointLog
 
 TIMESTEP_S, RATE_HZ, SECONDS, LOGS, BANDWIDTH_PER_S = 5e-4, 1000.0, 30.0, 2, 15.0
 CHAINS = ("chain3", "chain4", "chain5", "chain6", "chain7")
@@ -197,7 +197,10 @@ def make(part: str, seed: int, folder: Path) -> tuple[SerialModel, list[JointLog
             _load(true, kg, rng, faults, values)
         else:
             # A zero where it shows most; a scale not at the first joint, where it is the link's inertia; one each.
-            shows = {"joint_zero": np.argsort(slope * ~slides)[-3:], "torque_scale": np.arange(1, J)}
+            shows = {
+                "joint_zero": [k for k in np.argsort(slope * ~slides)[-3:] if not slides[k]],
+                "torque_scale": np.arange(1, J),
+            }
             taken = {f["place"] for f in faults}
             j = int(rng.choice([k for k in shows.get(cause, range(J)) if f"joint{k + 1}" not in taken]))
             faults.append(_fault(str(cause), j, (true, reads), (chain[j], asks[j], inertia[j]), rng))

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.joints.diagnosed import JointDiagnosed
+from discrepancy.joints.mechanics.motion import Motion
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.regressor import body_regressor
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.rolled.told import rolled_out
 from discrepancy.joints.values import NAMES
 from discrepancy.joints.verdict import judged
-from discrepancy.serial.mechanics.motion import Motion
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.regressor import body_regressor
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel, load_model
 from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.api.look import Look

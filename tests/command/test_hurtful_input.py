@@ -17,7 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from command import refused, run
-from discrepancy.serial.model import load_model
+from discrepancy.joints.model import load_model
 from estimator.errors import InputError
 from estimator.recording.parquet import write_recording
 from estimator.strict import parse_json, read_json, read_toml

@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from discrepancy.serial.model import SerialModel, load_model
+from discrepancy.joints.model import SerialModel, load_model
 from mocobot_logs.joints.joint_log import Drive, JointLog
 
 ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001"/><worldbody>

@@ -20,8 +20,8 @@ from discrepancy.joints.findings import (
     Rival,
     Scatter,
 )
+from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.result.traces import Trace
-from discrepancy.serial.model import SerialModel, load_model
 
 ROBOT = """<mujoco><worldbody>
 <body name="base_link"><joint name="turn" axis="0 0 1"/>

@@ -172,15 +172,27 @@ class Cells:
             yy += float(weight @ channel.squares)
         return G, b, yy
 
-    def left(self, x: Array, covariance: Array) -> tuple[Array, Array]:
-        """Squares that values leave, and those that their covariance explains besides, shape (C, bands) each."""
+    def left(self, x: Array, covariance: Array | Sequence[Array]) -> tuple[Array, Array]:
+        """Squares that values leave, and those that their covariance explains besides, shape (C, bands) each.
+
+        Args:
+            x: values, shape (K,).
+            covariance: of all values, shape (K, K), or of those that each channel sees.
+        """
         out = np.zeros((2, len(self.channels), len(self.bands.edges_hz) - 1))
         for c, channel in enumerate(self.channels):
             own, at = x[channel.columns], channel.columns
-            out[0, c] = (
-                channel.squares
-                - 2.0 * channel.products @ own
-                + np.einsum("bij,i,j->b", channel.grams, own, own, optimize=True)
-            )
-            out[1, c] = np.einsum("bij,ij->b", channel.grams, covariance[np.ix_(at, at)])
+            spread = covariance[np.ix_(at, at)] if isinstance(covariance, np.ndarray) else covariance[c]
+            both = np.stack([np.outer(own, own).ravel(), spread.ravel()], axis=1)
+            explained = channel.grams.reshape(len(channel.grams), -1) @ both
+            out[0, c] = channel.squares - 2.0 * channel.products @ own + explained[:, 0]
+            out[1, c] = explained[:, 1]
         return np.maximum(out[0], 0.0), out[1]
+
+    @property
+    def owners(self) -> NDArray[np.intp]:
+        """The channel that alone sees a column, -1 of columns that several see, shape (K,)."""
+        out = np.full(self.count, -2)
+        for c, channel in enumerate(self.channels):
+            out[channel.columns] = np.where(out[channel.columns] == -2, c, -1)
+        return np.maximum(out, -1)

@@ -15,13 +15,11 @@ class Rival:
     """What may be in a cause's place.
 
     Attributes:
-        group: a cause; None: nothing, or something that no entry describes.
-        open: whether it is the latter.
+        group: a cause; None: nothing.
         probability: of it.
     """
 
     group: Group | None
-    open: bool
     probability: float
 
 
@@ -63,13 +61,7 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
     without = search.value(rest, state.posterior)
-    weighed: list[tuple[float, Group | None, bool]] = [(without.evidence, None, False)]
-    channels = {
-        c for c, channel in enumerate(cells.channels) if set(own.group.columns) & set(channel.columns)
-    }
-    if len(channels) == 1:
-        free = search.value(rest, without.posterior, open_at=channels.pop())
-        weighed.append((free.evidence - search.against - search.settings.open_nats, None, True))
+    weighed: list[tuple[float, Group | None]] = [(without.evidence, None)]
     offers = [o for o in search.offers(without) if o[1].group.name != own.group.name]
     best = state.evidence
     for gain, chosen in offers[: search.settings.most_rivals]:
@@ -78,17 +70,17 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
         count = cells.count
         kept = [c for c in rest if not (chosen.group.members and c.group.cause == chosen.group.cause)]
         rival = search.formed(search.value((*kept, chosen), without.posterior))
-        weighed.append((rival.evidence, chosen.group, False))
+        weighed.append((rival.evidence, chosen.group))
         cells.truncate(count)
     logs = np.array([state.evidence, *(w[0] for w in weighed)])
     share = np.exp(logs - logs.max())
     share /= share.sum()
-    merged: dict[tuple[str, str] | bool, Rival] = {}
-    for (_, group, is_open), p in zip(weighed, share[1:], strict=True):
-        key = is_open if group is None else group.key
+    merged: dict[tuple[str, str] | None, Rival] = {}
+    for (_, group), p in zip(weighed, share[1:], strict=True):
+        key = None if group is None else group.key
         if key == own.group.key:
             share[0] += p  # another shape of the same cause
         elif key not in merged or merged[key].probability < p:
-            merged[key] = Rival(group, is_open, float(p))
+            merged[key] = Rival(group, float(p))
     rivals = sorted(merged.values(), key=lambda r: -r.probability)
     return Odds(own, float(share[0]), float(state.evidence - without.evidence), tuple(rivals))

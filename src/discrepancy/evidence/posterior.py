@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, get_lapack_funcs, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from discrepancy.evidence.cells import Cells
@@ -57,6 +57,80 @@ class Group:
 
 
 @dataclass(frozen=True, eq=False)
+class Arrow:
+    """Cholesky factor of I + s G s, whose parts meet only in the columns that come last.
+
+    Attributes:
+        parts: positions of each part.
+        last: positions of the columns that all parts share.
+        own: factor of each part, and the last one's.
+        beside: what each part has in common with the last.
+    """
+
+    parts: list[NDArray[np.intp]]
+    last: NDArray[np.intp]
+    own: list[Array]
+    beside: list[Array]
+
+    @classmethod
+    def of(
+        cls,
+        G: Array,
+        active: NDArray[np.intp],
+        s: Array,
+        parts: list[NDArray[np.intp]],
+        last: NDArray[np.intp],
+    ) -> Arrow:
+        """Of the active columns of G and their scales."""
+
+        def block(i: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
+            return s[i][:, None] * G[np.ix_(active[i], active[k])] * s[k]
+
+        rest = block(last, last) + np.eye(len(last))
+        own, beside = [], []
+        for p in parts:
+            own.append(
+                cholesky(block(p, p) + np.eye(len(p)), lower=True, overwrite_a=True, check_finite=False)
+            )
+            beside.append(solve_triangular(own[-1], block(p, last), lower=True, check_finite=False))
+            rest -= beside[-1].T @ beside[-1]
+        own.append(cholesky(rest, lower=True, overwrite_a=True, check_finite=False))
+        return cls(parts, last, own, beside)
+
+    @property
+    def half_log_det(self) -> float:
+        """Half the logarithm of the matrix's determinant."""
+        return float(sum(np.sum(np.log(np.diag(L))) for L in self.own))
+
+    def forward(self, x: Array) -> Array:
+        """L^-1 x, shape (n, k)."""
+        out, rest = np.empty_like(x), x[self.last].copy()
+        for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
+            out[p] = solve_triangular(L, x[p], lower=True, check_finite=False)
+            rest -= B.T @ out[p]
+        out[self.last] = solve_triangular(self.own[-1], rest, lower=True, check_finite=False)
+        return out
+
+    def backward(self, z: Array) -> Array:
+        """L'^-1 z, shape (n,)."""
+        out = np.empty_like(z)
+        out[self.last] = solve_triangular(self.own[-1], z[self.last], lower=True, trans=1, check_finite=False)
+        for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
+            out[p] = solve_triangular(L, z[p] - B @ out[self.last], lower=True, trans=1, check_finite=False)
+        return out
+
+    def inverses(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
+        """Of each part and the last together: positions, and that block of the inverse."""
+        root = solve_triangular(self.own[-1], np.eye(len(self.last)), lower=True, check_finite=False)
+        last = root.T @ root
+        for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
+            E = solve_triangular(L, B, lower=True, trans=1, check_finite=False)
+            root = solve_triangular(L, np.eye(len(p)), lower=True, check_finite=False)
+            cross = E @ last
+            yield np.append(p, self.last), np.block([[root.T @ root + cross @ E.T, -cross], [-cross.T, last]])
+
+
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """Posterior of columns x ~ N(0, S), with noise of one variance for each channel and band.
 
@@ -80,61 +154,77 @@ class Posterior:
         return self.cells.weighted(self.variance)
 
     @cached_property
-    def _factor(self) -> tuple[Array, Array, Array]:
-        """Scales s, lower Cholesky factor L of I + s G s, and z = L^-1 s b."""
+    def _factor(self) -> tuple[Array, Arrow, Array]:
+        """Scales s, Cholesky factor L of I + s G s, and z = L^-1 s b."""
         G, b, _ = self._weighted
         a = self.active
         s = np.sqrt(self.prior[a])
-        A = s[:, None] * G[np.ix_(a, a)] * s
-        A[np.diag_indices(len(a))] += 1.0
-        L = cholesky(A, lower=True, overwrite_a=True, check_finite=False)
-        return s, L, solve_triangular(L, s * b[a], lower=True, check_finite=False)
+        owner = self.cells.owners[a]
+        parts = [np.flatnonzero(owner == c) for c in range(len(self.cells.channels))]
+        L = Arrow.of(G, a, s, parts, np.flatnonzero(owner < 0))
+        return s, L, L.forward((s * b[a])[:, None])[:, 0]
 
     @cached_property
     def log_evidence(self) -> float:
         """Log density of the rows, without the constant of pi."""
         _, L, z = self._factor
         yy = self._weighted[2]
-        return float(
-            -0.5 * (np.sum(self.cells.rows * np.log(self.variance)) + yy - z @ z) - np.sum(np.log(np.diag(L)))
-        )
+        return float(-0.5 * (np.sum(self.cells.rows * np.log(self.variance)) + yy - z @ z) - L.half_log_det)
 
     @cached_property
     def mean(self) -> Array:
         """Values of all columns, shape (K,)."""
         s, L, z = self._factor
         x = np.zeros(len(self.prior))
-        x[self.active] = s * solve_triangular(L, z, lower=True, trans=1, check_finite=False)
+        x[self.active] = s * L.backward(z)
         return x
 
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the values, shape (K, K)."""
         s, L, _ = self._factor
-        (potri,) = get_lapack_funcs(("potri",), (L,))
-        inverse, _ = potri(L, lower=1)
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        inverse = L.forward(np.eye(len(s)))
         out = np.zeros((len(self.prior), len(self.prior)))
-        out[np.ix_(self.active, self.active)] = s[:, None] * inverse * s
+        out[np.ix_(self.active, self.active)] = s[:, None] * (inverse.T @ inverse) * s
         return out
 
-    def errors(self, columns: Sequence[int]) -> Array:
-        """Standard deviations of the values of some columns that are in the model."""
+    @cached_property
+    def blocks(self) -> list[Array]:
+        """Covariance of the values that each channel sees, in the order of its columns."""
         s, L, _ = self._factor
-        at = np.searchsorted(self.active, columns)
-        unit = np.zeros((len(s), len(at)))
-        unit[at, np.arange(len(at))] = s[at]
-        return np.sqrt(np.sum(solve_triangular(L, unit, lower=True, check_finite=False) ** 2, axis=0))
+        at, out = np.full(self.cells.count, -1), []  # columns may have been added since
+        at[self.active] = np.arange(len(s))
+        for own, channel in zip(L.inverses(), self.cells.channels, strict=True):
+            place = at[channel.columns]
+            seen = np.flatnonzero(place >= 0)
+            k, inverse = own
+            where = np.zeros(len(s), dtype=np.intp)
+            where[k] = np.arange(len(k))
+            pick = where[place[seen]]
+            block = np.zeros((len(place), len(place)))
+            block[np.ix_(seen, seen)] = s[place[seen], None] * inverse[np.ix_(pick, pick)] * s[place[seen]]
+            out.append(block)
+        return out
+
+    @cached_property
+    def variances(self) -> Array:
+        """Variances of the values, shape (K,)."""
+        out = np.zeros(self.cells.count)
+        for block, channel in zip(self.blocks, self.cells.channels, strict=True):
+            out[channel.columns] = np.diag(block)
+        return out[: len(self.prior)]
 
     def possible(self, group: Group, scale: float) -> float:
         """Log evidence that the bounds of a group's values add, where the group is in the model."""
         if not group.least:
             return 0.0
-        return _possible(group, self.mean[list(group.columns)], self.errors(group.columns), scale)
+        return _possible(
+            group, self.mean[list(group.columns)], np.sqrt(self.variances[list(group.columns)]), scale
+        )
 
     def better_noise(self, floor: Array, weight: Array | float) -> Array:
         """Variances by MacKay's step: squares left over rows that are not fitted, about a floor."""
-        left, fitted = self.cells.left(self.mean, self.covariance)
+        left, fitted = self.cells.left(self.mean, self.blocks)
         free = np.maximum(self.cells.rows - fitted / self.variance, 0.05 * self.cells.rows)
         return (weight * floor + left) / (weight + free)
 
@@ -143,7 +233,7 @@ class Posterior:
         """Information matrix R and score Q of all columns beside the active ones' priors, shapes (K, K) and (K,)."""
         s, L, z = self._factor
         G, b, _ = self._weighted
-        U = solve_triangular(L, s[:, None] * G[self.active], lower=True, check_finite=False)
+        U = L.forward(s[:, None] * G[self.active])
         return G - U.T @ U, b - U.T @ z
 
     def errors_of(self, columns: Sequence[int]) -> Array:
@@ -191,6 +281,6 @@ def _possible(group: Group, mean: Array, se: Array, scale: float) -> float:
     """Log of the share of the posterior that is possible over that of the prior, one value at a time."""
     total = 0.0
     for value, error, least, size in zip(mean, se, group.least, group.slab, strict=True):
-        if np.isfinite(least):
+        if np.isfinite(least) and error > 0.0:
             total += float(log_ndtr((value - least) / error) - log_ndtr(-least / (size * scale)))
     return total

@@ -122,8 +122,6 @@ class Search:
         chosen: Sequence[Chosen],
         near: Posterior | None,
         steps: int | None = None,
-        *,
-        open_at: int | None = None,
     ) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
@@ -131,13 +129,10 @@ class Search:
             chosen: the set.
             near: where learning begins; None begins at the floor.
             steps: of learning.
-            open_at: a channel whose noise may be anything.
         """
         cells, s = self.problem.cells, self.settings
         nominal = self.prior(chosen, None if near is None else near.mean)
-        weight = np.full((len(cells.channels), 1), s.floor_rows)
-        if open_at is not None:
-            weight[open_at] = 1.0
+        weight = s.floor_rows
         loose = (*self.problem.laws, *(c.forms for c in chosen if c.forms))
         kin = [(np.asarray(k), s.spread_rows, np.inf) for k in self.problem.families]
         kin += [(np.asarray(k), 0.0, s.most_spread) for k in loose]
@@ -150,7 +145,7 @@ class Search:
         for _ in range(steps or (s.start_steps if near is None else s.noise_steps)):
             S = nominal.copy()
             for f, (k, rows, most) in enumerate(kin):
-                share = np.sum((p.mean[k] ** 2 + np.diag(p.covariance)[k]) / nominal[k])
+                share = np.sum((p.mean[k] ** 2 + p.variances[k]) / nominal[k])
                 spread[f] = np.clip((rows + share) / (rows + len(k)), s.least_spread, most)
                 S[k] *= spread[f]
             p = Posterior(cells, S, p.better_noise(self.floor, weight))
@@ -175,11 +170,11 @@ class Search:
         return S
 
     def fixed(self, chosen: Iterable[Chosen]) -> State:
-        """A set as it is, with its laws' errors."""
+        """A set with its laws' errors, without causes that it is likelier without."""
         state = self.value((), None)
         for one in chosen:
             state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
-        return state
+        return self._pruned(self._settled(state), fresh=False)
 
     def run(self, state: State) -> State:
         """The likeliest set from another on."""
@@ -340,7 +335,7 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
     # safe with more columns than rows.
     p = Posterior(cells, slabs, least)
     for _ in range(settings.floor_steps):
-        left, fitted = cells.left(p.mean, p.covariance)
+        left, fitted = cells.left(p.mean, p.blocks)
         better = np.maximum((left + fitted) / cells.rows, least)
         settled = np.all(np.abs(np.log(better / p.variance)) < settings.floor_change)
         p = Posterior(cells, slabs, better)

@@ -28,7 +28,6 @@ class Settings:
         floor_change: relative change of its variances below which that has settled.
         rounds: times the problem is made linear again.
         event_steps: times the instants of an event are moved.
-        open_nats: log odds of a listed cause over something unlisted at its place, before the data are seen.
         within_nats: linear gain below the best beyond which a rival is not weighed (15: 3e-7 of its odds).
         most_rivals: rivals that are weighed exactly.
         clean_chi2: squares left over the floor's variance, per row, up to which nothing is left to explain.
@@ -53,7 +52,6 @@ class Settings:
     floor_change: float = 0.05
     rounds: int = 3
     event_steps: int = 4
-    open_nats: float = 1.0
     within_nats: float = 15.0
     most_rivals: int = 8
     clean_chi2: float = 1.5

@@ -13,12 +13,12 @@ import numpy as np
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import Given, JointProblem, joint_problem
+from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, trials_of
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.signals import Signals
 from estimator.arrays import Array
+from mocobot_logs.joints.joint_log import JointLog
 
 PLAIN = 3.0
 """Values are fitted with so many times their prior standard deviation, so that it shrinks nothing."""
@@ -148,7 +148,7 @@ def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
         k = list(c.group.columns)
         prior[k] = np.maximum(prior[k], (PLAIN * np.array(c.group.slab)) ** 2)
     p = Posterior(outcome.problem.cells, prior, state.posterior.variance)
-    se = np.sqrt(np.diag(p.covariance))
+    se = np.sqrt(p.variances)
     return {
         outcome.problem.labels[k] if k < len(outcome.problem.labels) else f"{c.group.place} {n}": (
             float(p.mean[k]),

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.joints.causes import WORDS
 from discrepancy.joints.findings import Finding, JointVerdict, Member
+from discrepancy.joints.model import SerialModel, load_spec
 from discrepancy.joints.said import titled
 from discrepancy.joints.values import axes_of_tilt
-from discrepancy.serial.model import SerialModel, load_spec
 from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended as write

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.servo.motor import Motor
+from discrepancy.joints.signals import Signals
 from discrepancy.result.traces import Trace
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.rows.signals import Signals
-from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 
 Verdict = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]

@@ -13,11 +13,11 @@ from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.causes import WORDS
 from discrepancy.joints.findings import Finding, Foretold, JointVerdict, Limit, Member, Offer, Rival, Scatter
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.said import Said, joint_in_words, link_in_words, titled
 from discrepancy.result.json import plain
 from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.remains import scatter_sentence
-from discrepancy.serial.model import SerialModel
 from estimator.arrays import Array
 
 Values = dict[str, Any]

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import welch
 
-from discrepancy.serial.mechanics.regressor import rigid_torque, torque_of
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.signals import Signals, smoothing_hz, work_step
+from discrepancy.joints.mechanics.regressor import rigid_torque, torque_of
+from discrepancy.joints.signals import Signals, smoothing_hz, work_step
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+from mocobot_logs.joints.joint_log import JointLog
 
 TORQUE_BAND_HZ = (30.0, 120.0)
 """Where the torque's noise is read off: next to the rows, where little moves."""

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.noise import sensor_noise
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.signals import Signals
-from discrepancy.serial.servo.motor import Motor, with_torques
+from discrepancy.joints.servo.motor import Motor, with_torques
+from discrepancy.joints.signals import Signals
 from estimator.arrays import Array
 from estimator.errors import InputError
+from mocobot_logs.joints.joint_log import JointLog
 
 EDGE_S = 0.1
 """Left out at both ends, where smoothing is spoilt: six periods of its cut-off."""

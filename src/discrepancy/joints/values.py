@@ -9,9 +9,9 @@ import numpy as np
 
 from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS
+from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.problem import JointProblem, horizontal
 from discrepancy.joints.said import parameter_name
-from discrepancy.serial.mechanics.tree import Tree
 from estimator.arrays import Array
 
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}

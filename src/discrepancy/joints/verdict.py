@@ -27,17 +27,17 @@ from discrepancy.joints.findings import (
     Scatter,
     Verdict,
 )
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.parts import Parts
 from discrepancy.joints.problem import Given
+from discrepancy.joints.servo.loop import loop_laws, sentences
+from discrepancy.joints.servo.motor import driven_by_voltage
 from discrepancy.joints.trials import Trials, notes_of, resting, trials_of
 from discrepancy.joints.unlisted import SIGNALS
 from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.servo.loop import loop_laws, sentences
-from discrepancy.serial.servo.motor import driven_by_voltage
 from estimator.arrays import Array
+from mocobot_logs.joints.joint_log import JointLog
 
 NAMED = 0.5
 """Least probability of the told set of a cause that is named."""
@@ -153,7 +153,7 @@ class _Judge:
     @staticmethod
     def _ranked(o: Odds) -> list[tuple[Group | None, float]]:
         """What a cause may be, the likeliest first; None is nothing."""
-        return [(o.chosen.group, o.probability), *((r.group, r.probability) for r in o.rivals if not r.open)]
+        return [(o.chosen.group, o.probability), *((r.group, r.probability) for r in o.rivals)]
 
     def _joint(self, place: str) -> int | None:
         return self.model.joints.index(place) + 1 if place in self.model.joints else None
@@ -161,12 +161,10 @@ class _Judge:
     def _findings(self, o: Odds, values: Posterior | None = None) -> list[Finding]:
         """One finding; members of a kind of which less than half are off are findings of their own."""
         c = o.chosen.group
-        open_ = sum(r.probability for r in o.rivals if r.open)
-        nothing = sum(r.probability for r in o.rivals if r.group is None and not r.open)
-        best = max((r.probability for r in o.rivals), default=0.0)
+        open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
+        nothing = sum(r.probability for r in o.rivals if r.group is None)
         kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
-        unlisted = c.cause == "unlisted" or open_ >= max(o.probability + kin, best)
-        own = (o.probability if c.cause == "unlisted" else 0.0) + open_
+        unlisted = c.cause == "unlisted"
         rivals = tuple(
             Rival(r.group.cause, r.group.place, self._joint(r.group.place), r.probability,
                   float(np.log(max(o.probability, 1e-12) / max(r.probability, 1e-12))))
@@ -177,7 +175,7 @@ class _Judge:
             place=c.place,
             joint=self._joint(c.place),
             members=() if unlisted else self._members(c, values or self.whole),
-            probability=own if unlisted else o.probability + kin,
+            probability=o.probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,
             unlisted=open_,
@@ -186,7 +184,7 @@ class _Judge:
             of=list(SIGNALS)[int(dict(c.shape)["signal"])] if c.cause == "unlisted" else "",
             event=self._event(c),
             rivals=rivals,
-            told=tuple(dict.fromkeys(_told(g, c.place) for g in o.told())),
+            told=tuple(g.key for g in o.told() if g),
         )
         off = [m for m in plain.members if _is_off(m)]
         if not c.members or 2 * len(off) >= len(plain.members) or not off:
@@ -416,10 +414,6 @@ class _Judge:
                 )
             )
         return out
-
-
-def _told(group: Group | None, place: str) -> tuple[str, str]:
-    return ("unlisted", place) if group is None else group.key
 
 
 def _is_off(member: Member) -> bool:

@@ -4,7 +4,6 @@
 campaigns in docs/diagnosis/validation.md were run with it, and no study compares it with others.
 What one cause alone has (tolerances, typical sizes, grids of its shapes) is in its file.
 
-The rules of serial robots have names of their own: ``from discrepancy.rules import serial``.
 """
 
 from discrepancy.rules.inference import *  # noqa: F403

@@ -28,7 +28,7 @@ def run(options: Map) -> None:
 
 def _run_joints(options: Map, model: Path) -> None:
     """The map of a log of one robot's joints."""
-    from discrepancy.serial.model import load_model
+    from discrepancy.joints.model import load_model
     from mocobot_logs.joints.draft import draft_joint_map
 
     robot = load_model(model)

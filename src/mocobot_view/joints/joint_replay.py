@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.model import SerialModel
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+from mocobot_logs.joints.joint_log import JointLog
 from mocobot_view.bodies.primitives import Triangles, capsule, join
 from mocobot_view.bodies.shapes import Shape, body_shape
 

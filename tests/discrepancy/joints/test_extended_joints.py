@@ -21,13 +21,13 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.joints.effects import effects_of, write_extended
 from discrepancy.joints.findings import Event, Finding, Member
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.problem import Given, JointProblem, joint_problem
 from discrepancy.joints.rolled.robot import LoggedTorques, Robot
+from discrepancy.joints.signals import Signals
 from discrepancy.joints.values import absolute, physical
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.rows.signals import Signals
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.extended import load_effects, step

@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 
 from discrepancy.joints.findings import Event, Finding, Member
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.rolled.closed import laws_without, longest
 from discrepancy.joints.rolled.free import diverged, in_neither, rms, starts, usable
 from discrepancy.joints.rolled.robot import LoggedTorques, Robot
 from discrepancy.joints.rolled.told import rolled_out
+from discrepancy.joints.signals import Signals
 from discrepancy.result.text_rollouts import rollout_lines
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.recording.joint_log import Drive, JointLog
-from discrepancy.serial.rows.signals import Signals
+from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import step
 from serial_made import simulated

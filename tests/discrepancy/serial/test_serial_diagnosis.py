@@ -8,11 +8,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-
-from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.serial.diagnosis import diagnose_serial
-from discrepancy.serial.model import SerialModel, load_model
 from discrepancy.serial.rig import SerialRig
+
+from discrepancy.joints.model import SerialModel, load_model
+from discrepancy.result.diagnosed import Diagnosed
 from estimator.errors import InputError
 from mocobot_sim.serial.extended import load_effects, step
 from serial_made import ARM, a_little_off, nominal, nominal_file, nothing, simulated, spec

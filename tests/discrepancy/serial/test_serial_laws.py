@@ -9,20 +9,20 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.diagnosis import diagnose_serial
+from discrepancy.serial.laws.places import POSITION, TORQUE
+from discrepancy.serial.laws.rig import LawfulSerialRig
 
 from discrepancy.candidate import Parameter
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.signals import Signals
 from discrepancy.laws.candidate import LawCandidate, candidate_of
 from discrepancy.laws.place import Place
 from discrepancy.laws.term import Term
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.rules import LAW_INSTEAD
-from discrepancy.serial.candidate import SerialCandidate
-from discrepancy.serial.diagnosis import diagnose_serial
-from discrepancy.serial.laws.places import POSITION, TORQUE
-from discrepancy.serial.laws.rig import LawfulSerialRig
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.rows.signals import Signals
 from estimator.errors import InputError
 from mocobot_sim.serial.extended import load_effects, step
 from mocobot_sim.serial.law import ActingLaw, JointLaw, State

@@ -6,17 +6,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.serial.mechanics.motion import Motion
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.regressor import (
+from discrepancy.joints.mechanics.motion import Motion
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.regressor import (
     body_regressor,
     force_torque,
     inertial_parameters,
     rigid_torque,
     torque_of,
 )
-from discrepancy.serial.mechanics.shift import by_acceleration, by_displacement
-from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
+from discrepancy.joints.mechanics.tree import Tree
 
 BRANCHED = """
 <mujoco><compiler angle="radian"/><worldbody>

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.serial.mechanics.motion import Motion
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import load_spec
+from discrepancy.joints.mechanics.motion import Motion
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.regressor import body_regressor, inertial_parameters
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import load_spec
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended
 from mocobot_sim.serial.mjcf import into_mjcf, real_inertia

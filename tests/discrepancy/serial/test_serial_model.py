@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import load_model
 from discrepancy.serial.words import SerialWords
+
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import load_model
 from estimator.errors import InputError
 
 MODELS = Path(__file__).resolve().parents[3] / "models"

@@ -7,12 +7,12 @@ import re
 import mujoco
 import numpy as np
 import pytest
-
-from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.serial.diagnosis import diagnose_serial
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
+
+from discrepancy.joints.model import SerialModel
+from discrepancy.result.diagnosed import Diagnosed
+from mocobot_logs.joints.joint_log import JointLog
 from serial_made import a_little_off, nominal, simulated, spec
 
 FRICTION = {"waist": 1.0, "shoulder": 1.5, "elbow": 0.8, "roll": 0.2}

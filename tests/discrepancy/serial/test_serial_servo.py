@@ -7,13 +7,13 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-
 from discrepancy.serial.diagnosis import diagnose_serial
-from discrepancy.serial.model import SerialModel, load_model
-from discrepancy.serial.recording.joint_log import Drive, JointLog
-from discrepancy.serial.servo.loop import loop_laws
-from discrepancy.serial.servo.motor import with_torques
+
+from discrepancy.joints.model import SerialModel, load_model
+from discrepancy.joints.servo.loop import loop_laws
+from discrepancy.joints.servo.motor import with_torques
 from estimator.errors import InputError
+from mocobot_logs.joints.joint_log import Drive, JointLog
 
 PENDULUM = """
 <mujoco><compiler angle="radian"/><option timestep="0.0005" integrator="implicitfast"/><worldbody>

@@ -8,6 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.causes.friction import bent
+from discrepancy.serial.causes.stribeck import slowest_fading
+from discrepancy.serial.rig import SerialRig
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -16,14 +20,10 @@ from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import scan
 from discrepancy.inference.search import search
+from discrepancy.joints.model import load_model
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rules import PRIOR_ODDS
 from discrepancy.rules import serial as rules
-from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.causes.friction import bent
-from discrepancy.serial.causes.stribeck import slowest_fading
-from discrepancy.serial.model import load_model
-from discrepancy.serial.rig import SerialRig
 from serial_made import ARM, nominal, nominal_file, simulated, spec
 
 TILT, ZERO, SHARE = 0.03, 0.01, 0.2

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.forms import forms_beside
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
-from discrepancy.serial.servo.motor import with_torques
+
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.servo.motor import with_torques
+from discrepancy.rules import serial as rules
+from mocobot_logs.joints.joint_log import JointLog
 from test_serial_servo import logs, model  # noqa: F401 (fixtures)
 
 

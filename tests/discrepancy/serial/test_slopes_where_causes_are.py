@@ -8,17 +8,17 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-
-from discrepancy.candidate import Candidate
-from discrepancy.least_squares.problem import Problem
-from discrepancy.least_squares.renewed import renewed
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.payload import AXES, ball_inertia
 from discrepancy.serial.diagnosis import diagnose_serial
-from discrepancy.serial.mechanics.motion import Motion
-from discrepancy.serial.mechanics.regressor import inertial_parameters, rigid_torque
 from discrepancy.serial.rig import SerialRig
 from discrepancy.serial.rows.applied import Applied
+
+from discrepancy.candidate import Candidate
+from discrepancy.joints.mechanics.motion import Motion
+from discrepancy.joints.mechanics.regressor import inertial_parameters, rigid_torque
+from discrepancy.least_squares.problem import Problem
+from discrepancy.least_squares.renewed import renewed
 from serial_made import nominal, simulated, spec
 
 Values = list[tuple[Candidate, np.ndarray]]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from discrepancy.serial.model import load_spec
+from discrepancy.joints.model import load_spec
 from estimator.errors import InputError
 from mocobot_sim.extended.extended import load_extended, write_extended
 from mocobot_sim.scene.models import payload_path

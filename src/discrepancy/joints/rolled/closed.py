@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from discrepancy.joints.rolled.free import Trial, usable
 from discrepancy.joints.rolled.robot import LoggedTorques, Readings, Robot
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.signals import Signals
-from discrepancy.serial.servo.commanded import Commanded, Servo, servo_of
-from discrepancy.serial.servo.loop import LoopLaw, loop_laws
-from discrepancy.serial.servo.motor import Motor
+from discrepancy.joints.servo.commanded import Commanded, Servo, servo_of
+from discrepancy.joints.servo.loop import LoopLaw, loop_laws
+from discrepancy.joints.servo.motor import Motor
+from discrepancy.joints.signals import Signals
 from estimator.arrays import Array
+from mocobot_logs.joints.joint_log import JointLog
 
 MOST_LOOP_S = 100.0
 """Of closed loops in all trials together, each as long as the others. Chosen: they take seconds, too."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from discrepancy.joints.findings import Event
 from discrepancy.joints.rolled.robot import LoggedTorques, Robot
-from discrepancy.serial.rows.signals import Signals, smoothing_hz
+from discrepancy.joints.signals import Signals, smoothing_hz
 from estimator.arrays import Array
 
 HORIZONS_S = (0.1, 0.2, 0.5)

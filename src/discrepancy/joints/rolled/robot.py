@@ -10,10 +10,10 @@ import numpy as np
 
 from discrepancy.joints.effects import all_effects, label
 from discrepancy.joints.findings import Finding
-from discrepancy.serial.model import SerialModel, load_spec
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.signals import Signals
+from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.signals import Signals
 from estimator.arrays import Array
+from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.built import Built, build
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.rollout import Drive, Start, rollout

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from discrepancy.serial.mechanics.motion import Motion, cross, dot, rigid, times, turned, vectors
-from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.joints.mechanics.motion import Motion, cross, dot, rigid, times, turned, vectors
+from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 
 PARAMETERS = ("m", "hx", "hy", "hz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")

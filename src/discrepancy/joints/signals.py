@@ -9,13 +9,30 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.rules import serial as rules
-from discrepancy.serial.mechanics.motion import Motion
-from discrepancy.serial.mechanics.regressor import force_torque
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.joints.mechanics.motion import Motion
+from discrepancy.joints.mechanics.regressor import force_torque
+from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+from mocobot_logs.joints.joint_log import JointLog
+
+SMOOTH_HZ = 60.0
+"""Cut-off before the nonlinear formulas. Chosen: three times the rows', so that filtering and they commute."""
+SMOOTH_SHARE = 0.2
+"""The same over the sampling rate, at most. Chosen: a cut-off must stay below half of it."""
+WORK_RATIO = 4.0
+"""Rate of the mechanics over ``SMOOTH_HZ``, about. Derived: what it folds back has been damped to 1/80."""
+CUTOFF_HZ = 20.0
+"""Cut-off of the rows. Chosen: arms move below 5 Hz, and bend from some 10 Hz on."""
+CUTOFF_SHARE = 0.15
+"""The same over the sampling rate, at most. Chosen."""
+SLOW_SHARES = (0.01, 0.003, 0.03, 0.1)
+"""Of a joint's typical speed, below which the direction of friction fades; the first is the catalogue's. Chosen."""
+SLOW_ROUNDINGS = 2.0
+"""The same, at least, over what rounding of the positions makes of a velocity. Chosen: two standard deviations; a joint
+that creeps through the steps of a coarse encoder has no direction."""
+LEAST_SPEED = 1e-6
+"""Typical speed of a joint that does not move [rad/s or m/s]. Chosen: no more than a number to divide by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +86,7 @@ class Signals:
         here = slice(None, None, step)
         q, dq, ddq, torque = q[here], dq[here], ddq[here], torque[here]
         inverse = inverse_torque(q, dq, ddq)
-        typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), rules.LEAST_SPEED)
+        typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), LEAST_SPEED)
         return cls(
             log, tree, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical, cutoff_hz(rate),
             None if log.enabled is None else log.enabled[here],
@@ -103,7 +120,7 @@ class Signals:
         cutoff, rate = smoothing_hz(self.log.rate_hz), self.log.rate_hz
         # Rounding as white noise of step^2 / 12, low-passed and differentiated.
         rounding = self.log.position_step * 2.0 * np.pi * np.sqrt(cutoff**3 / (18.0 * rate))
-        return np.maximum(rules.SLOW_SHARES[0] * self.typical, rules.SLOW_ROUNDINGS * rounding)
+        return np.maximum(SLOW_SHARES[0] * self.typical, SLOW_ROUNDINGS * rounding)
 
     def direction(self, slow: Array) -> Array:
         """Direction of motion in [-1, 1], shape (W, J); it fades below the speeds ``slow``, shape (J,) or ()."""
@@ -112,17 +129,17 @@ class Signals:
 
 def smoothing_hz(rate_hz: float) -> float:
     """Cut-off of the first filter."""
-    return min(rules.SMOOTH_HZ, rules.SMOOTH_SHARE * rate_hz)
+    return min(SMOOTH_HZ, SMOOTH_SHARE * rate_hz)
 
 
 def cutoff_hz(rate_hz: float) -> float:
     """Cut-off of the rows of a log of some rate, whose drives tell their torques."""
-    return min(rules.CUTOFF_HZ, rules.CUTOFF_SHARE * rate_hz)
+    return min(CUTOFF_HZ, CUTOFF_SHARE * rate_hz)
 
 
 def work_step(rate_hz: float) -> int:
     """Samples of a log to one of the mechanics."""
-    return max(1, int(rate_hz / (rules.WORK_RATIO * smoothing_hz(rate_hz))))
+    return max(1, int(rate_hz / (WORK_RATIO * smoothing_hz(rate_hz))))
 
 
 def _filled(log: JointLog) -> tuple[Array, NDArray[np.bool_]]:

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discrepancy.rules import serial as rules
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.servo.loop import LoopLaw
-from discrepancy.serial.servo.motor import Motor
+from discrepancy.joints.servo.loop import LoopLaw
+from discrepancy.joints.servo.motor import Motor
 from estimator.arrays import Array
+from mocobot_logs.joints.joint_log import JointLog
+
+MOST_LOOP_SHARE = 0.1
+"""Of a duty's variance, that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ def servo_of(
 
 def _fitted(laws: Sequence[LoopLaw], j: int, gain: float) -> float | None:
     """Output per rad at a gain: as it was fitted there, or as laws at other gains have it per unit of gain."""
-    good = [law for law in laws if law.joint == j and law.share < rules.MOST_LOOP_SHARE]
+    good = [law for law in laws if law.joint == j and law.share < MOST_LOOP_SHARE]
     same = [law.per_rad for law in good if law.gain == gain or (np.isnan(law.gain) and np.isnan(gain))]
     if same:
         return same[0]

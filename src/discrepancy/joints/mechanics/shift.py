@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from discrepancy.serial.mechanics.motion import Motion, cross, rigid
-from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.joints.mechanics.motion import Motion, cross, rigid
+from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 
 

@@ -8,15 +8,21 @@ from functools import partial
 
 import numpy as np
 
-from discrepancy.rules import serial as rules
-from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.tree import Tree
-from discrepancy.serial.model import SerialModel
-from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.signals import Signals
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.signals import Signals
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import low_pass
+from mocobot_logs.joints.joint_log import JointLog
+
+MOTOR_SHARE, MOVES_THROUGHOUT = 0.5, 0.98
+"""Cut-off of the fit of what a volt is worth, over the rows', and the share of its filter's window in which the joint
+moves. Chosen: noise of accelerations would make the torque look smaller than it is."""
+LEAST_DRIVEN_SHARE = 0.1
+"""Of the square of what a drive was given, that the model's torque must account for. Chosen: of a joint that only rubs,
+nobody can tell what a volt is worth."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +124,7 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
     for s in signals:
         side, load, speed = np.clip(s.dq[:, j] / s.slow[j], -1.0, 1.0), s.inverse[:, j], s.dq[:, j]
         on = np.ones(len(speed)) if s.enabled is None else s.enabled
-        cutoff = rules.MOTOR_SHARE * s.cutoff_hz
+        cutoff = MOTOR_SHARE * s.cutoff_hz
         # Noise has no sign, and would be a load where there is none.
         passed = np.abs(low_pass(load, s.rate_hz, cutoff))
         each = [
@@ -133,7 +139,7 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
         ]
         smooth = low_pass(np.column_stack(each), s.rate_hz, cutoff)
         moves = (s.usable[:, j] & (np.abs(speed) > s.slow[j])).astype(float)
-        at = low_pass(moves[:, None], s.rate_hz, cutoff)[:, 0] > rules.MOVES_THROUGHOUT
+        at = low_pass(moves[:, None], s.rate_hz, cutoff)[:, 0] > MOVES_THROUGHOUT
         left.append(smooth[at, :-1])
         right.append(smooth[at, -1])
     A, b = np.concatenate(left), np.concatenate(right)
@@ -141,7 +147,7 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
     size = np.where(size > 0, size, 1.0)
     found = np.linalg.lstsq(A / size, b, rcond=None)[0] / size
     part = found[0] * A[:, 0]
-    if found[0] <= 0 or np.sum(part**2) < rules.LEAST_DRIVEN_SHARE * np.sum(b**2):
+    if found[0] <= 0 or np.sum(part**2) < LEAST_DRIVEN_SHARE * np.sum(b**2):
         raise InputError(
             f"{signals[0].log.name}: the drive of joint {name} does not go with the torque that the model asks for; "
             "`mocobot inspect` looks for wrong signs and joints"

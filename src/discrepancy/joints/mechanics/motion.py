@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 
 

@@ -8,10 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from discrepancy.rules import serial as rules
-from discrepancy.serial.recording.joint_log import JointLog
 from estimator.arrays import Array
 from estimator.statistics import measured
+from mocobot_logs.joints.joint_log import JointLog
+
+MOST_LOOP_SHARE = 0.1
+"""Of a duty's variance, that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
+LATE_S = 1e-3
+"""Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
+CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
+"""Of the largest duty, up to which the law of a loop is fitted; the share of the time in which that law asks for more
+than the largest by as much, from which it is cut off; and samples left out around a large one. Chosen: resampling
+ripples for three samples on either side."""
+LOOP_STRETCH_S = 1.0
+"""Stretches whose scatter gives a loop's standard errors. Chosen: longer than any loop remembers."""
+LEAST_ROWS = 40
+"""That a block must have to be one. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +89,7 @@ def sentences(laws: Sequence[LoopLaw], joints: Sequence[str]) -> Iterator[str]:
     """
     for j in dict.fromkeys(law.joint for law in laws):
         own = [law for law in laws if law.joint == j]
-        good = [law for law in own if law.share < rules.MOST_LOOP_SHARE]
+        good = [law for law in own if law.share < MOST_LOOP_SHARE]
         if not good:
             yield f"Loop of joint {joints[j]}: its duty does not go with the error of its position."
             continue
@@ -88,7 +100,7 @@ def sentences(laws: Sequence[LoopLaw], joints: Sequence[str]) -> Iterator[str]:
             off = np.ptp(per_gain) / per_gain.mean()
             more = f"; {per_gain.mean():.4g} per rad and unit of gain, the same within {100.0 * off:.1f} %"
         late, left = float(np.median([law.late_s for law in good])), max(law.left for law in good)
-        delay = f"is {1e3 * late:.1f} ms late and " if abs(late) > rules.LATE_S else ""
+        delay = f"is {1e3 * late:.1f} ms late and " if abs(late) > LATE_S else ""
         yield f"Loop of joint {joints[j]}: {said}{more}. It {delay}leaves {left:.2g} of full duty at most (rms)."
 
 
@@ -117,21 +129,21 @@ def _law(logs: Sequence[JointLog], j: int, gain: float) -> LoopLaw | None:
         columns = np.column_stack([error, -rate, np.ones(len(error))])
         every.append(columns[here])
         # What may be cut off does not follow the law.
-        here &= maximum_filter1d(np.abs(duty), rules.CUT_OFF_SAMPLES) < rules.CUT_OFF_SHARE * peak
+        here &= maximum_filter1d(np.abs(duty), CUT_OFF_SAMPLES) < CUT_OFF_SHARE * peak
         rows.append(columns[here])
         outputs.append(duty[here])
         start = stretches[-1].max(initial=0) + 1 if stretches else 0
-        stretches.append((start + log.time / rules.LOOP_STRETCH_S).astype(int)[here])
+        stretches.append((start + log.time / LOOP_STRETCH_S).astype(int)[here])
     A, b, stretch = np.concatenate(rows), np.concatenate(outputs), np.concatenate(stretches)
-    if len(b) < rules.LEAST_ROWS or np.linalg.matrix_rank(A) < A.shape[1]:
+    if len(b) < LEAST_ROWS or np.linalg.matrix_rank(A) < A.shape[1]:
         return None
     normal = np.linalg.inv(A.T @ A)
     found = normal @ (A.T @ b)
     left = b - A @ found
     scores = np.array([A[stretch == k].T @ left[stretch == k] for k in np.unique(stretch)])
     covariance = normal @ (scores.T @ scores) @ normal
-    beyond = np.abs(np.concatenate(every) @ found) > peak / rules.CUT_OFF_SHARE
-    cut = np.mean(beyond) > rules.LEAST_CUT_OFF
+    beyond = np.abs(np.concatenate(every) @ found) > peak / CUT_OFF_SHARE
+    cut = np.mean(beyond) > LEAST_CUT_OFF
     share = float(np.sum(left**2) / max(np.sum((b - b.mean()) ** 2), 1e-300))
     return LoopLaw(
         j, gain, float(found[0]), float(np.sqrt(covariance[0, 0])), float(found[1] / found[0]), float(found[2]),

@@ -1,1 +1,0 @@
-"""Laws at the joints of a serial robot."""

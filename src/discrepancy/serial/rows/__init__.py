@@ -1,1 +1,0 @@
-"""From samples of a log to rows of a linear problem."""
