@@ -119,6 +119,17 @@ def test_sentences(cause: str, slide: bool, numbers: dict[str, float], said: str
     assert sentence(Said(numbers, errors, "joint 4", slide)) == said
 
 
+def test_a_cause_without_a_sentence_lists_its_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = replace(
+        CAUSES[0], name="magnet", title="magnet at {joint}", parameters=("pull_Nm",), sentence=None
+    )
+    monkeypatch.setitem(WORDS, "magnet", bare)
+    (cause,) = values(tmp_path, [finding("magnet", member("turn", 1, pull_Nm=0.25))])["causes"]
+    assert cause["sentence"] == "Magnet at joint 1 (turn): pull_Nm 0.25."
+
+
 # --- JSON
 
 
