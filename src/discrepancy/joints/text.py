@@ -275,7 +275,8 @@ def _number(
 
 
 def _word(name: str) -> str:
-    return parameter(name)[0].replace("coulomb", "Coulomb")
+    word = parameter(name)[0].replace("coulomb", "Coulomb")
+    return word if word != "more" else "viscous" if "_per_" in name else "Coulomb"
 
 
 # --- the rest

@@ -307,6 +307,13 @@ def test_units_of_a_kind_stand_once(tmp_path: Path) -> None:
     assert rows[3].split("  ")[-1].strip() == "8.00 +- 0.16"
 
 
+def test_two_kinds_of_fading_friction_are_told_apart(tmp_path: Path) -> None:
+    fading = finding("warming", member("lift", 3, more_N=2.0, more_Ns_per_m=0.5))
+    rows = table(format_verdict(values(tmp_path, [fading])))
+    assert "Coulomb 2.000 +- 0.040 N" in rows[2]
+    assert "viscous 0.500 +- 0.010 N s/m" in rows[3]
+
+
 def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
     told = values(tmp_path, [a_payload()])
     assert "inertia xx" not in format_verdict(told)
