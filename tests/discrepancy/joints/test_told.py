@@ -204,6 +204,10 @@ def test_coupled_joints_and_places_of_links(tmp_path: Path) -> None:
     first, second = values(tmp_path, [pair, link])["causes"]
     assert first["place"] == "joints 1 and 2"
     assert "difference of joints 1 and 2" in first["sentence"]
+    offers = (Offer("coupled_drive", "joint2", 2, 20.0),)
+    assert (
+        values(tmp_path, before=offers)["evidence"]["before"][0]["name"] == "coupled drive of joints 1 and 2"
+    )
     assert (second["name"], second["joint"]) == ("mass of link base_link", None)
 
 
@@ -297,6 +301,8 @@ def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
     text = format_verdict(values(tmp_path, [some]))
     assert "by something unlisted at joint 1 (turn) by its position and direction." in first_part(text)
     assert "something unlisted by its" in table(text)[2]
+    (cause,) = values(tmp_path, [some])["causes"]
+    assert cause["sentence"].endswith("acts at joint 1 (turn) and goes with its position and direction.")
     assert " or " not in text.replace("or repair", "")
 
 
