@@ -620,9 +620,10 @@ class _Builder:
         self.group("gravity_compensation", "robot", [share], [0.5])
 
     def _link(self, body: int) -> None:
-        n, t, zero = self.model.model.body(body).name, self.tree, np.zeros((3, 3))
+        # Torques are linear in a link's inertial numbers: columns around the model's own are exact for its load.
+        n, t, zero = self.model.model.body(body).name, self.given, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
-        m, c = self.given.mass[body], t.com[body]
+        m, c = t.mass[body], t.com[body]
         loaded = body == self.tree.joint_body[self.tree.last_link] or body == self.tree.links[-1]
         family = f"load of {n}" if loaded else ""
 
@@ -631,25 +632,30 @@ class _Builder:
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
         mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
-        self.group("link_mass", n, [mass], [1.0], family=family)
+        half = -math.log(2.0)
+        self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):
             e = 1e-4 * np.eye(3)[k]
-            change = inertial_parameters(t.mass[body], c + e, zero) - inertial_parameters(
-                t.mass[body], c - e, zero
-            )
-            tolerance = INERTIA * max(abs(self.given.com[body][k]), LEAST_COM_M)
-            tolerance = self.sd("link_com", f"{'xyz'[k]}_m", tolerance)
+            change = inertial_parameters(m, c + e, zero) - inertial_parameters(m, c - e, zero)
+            tolerance = self.sd("link_com", f"{'xyz'[k]}_m", INERTIA * max(abs(c[k]), LEAST_COM_M))
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
+        spread = self.sd("link_inertia", "share", INERTIA)
         inertia = column(
-            f"{n} inertia share",
-            self.sd("link_inertia", "share", INERTIA),
-            inertial_parameters(0.0, np.zeros(3), self.given.inertia[body]),
+            f"{n} inertia share", spread, inertial_parameters(0.0, np.zeros(3), t.inertia[body])
         )
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         whole = [mass, *coms, inertia]
-        self.group("link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], family=family, shape=(("whole", 1.0),))
+        self.group(
+            "link_mass",
+            n,
+            whole,
+            [1.0, 0.1, 0.1, 0.1, 2.0],
+            log_prior=half,
+            family=family,
+            shape=(("whole", 1.0),),
+        )
         if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))

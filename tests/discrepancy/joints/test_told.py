@@ -363,6 +363,7 @@ def test_the_folder_is_whole_and_read_by_all(
     assert run(capsys, "report", out)[0] == 0
     page = re.sub("<[^>]+>", "", (out / "report.html").read_text())
     assert "of a robot&#39;s joints" in page or "of a robot's joints" in page
+    assert "speed [typical\\u00a0speeds]" in page
     for cause in diagnosis.causes:
         assert cause.sentence.split(" +- ")[0].split(": ")[-1] in page
     code, said, _ = run(capsys, "compare", out, out)
