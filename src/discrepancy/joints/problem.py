@@ -642,9 +642,7 @@ class _Builder:
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
         spread = self.sd("link_inertia", "share", INERTIA)
-        inertia = column(
-            f"{n} inertia share", spread, inertial_parameters(0.0, np.zeros(3), t.inertia[body])
-        )
+        inertia = column(f"{n} inertia share", spread, inertial_parameters(0.0, np.zeros(3), t.inertia[body]))
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         whole = [mass, *coms, inertia]
         self.group(
