@@ -74,6 +74,7 @@ class JointCause:
         positive: parameters that, with the model's own, cannot be negative.
         kind: whether all joints may have it alike: a cause of the robot.
         rubs: whether friction at rest has the first parameter in it.
+        loose: how far its law may be off, over what is usual; friction has no exact law.
     """
 
     name: str
@@ -85,6 +86,7 @@ class JointCause:
     positive: tuple[str, ...] = ()
     kind: bool = False
     rubs: bool = False
+    loose: float = 1.0
 
 
 def _faded(s: JointSignals, h: Shape) -> Array:
@@ -102,7 +104,7 @@ CAUSES = (
     JointCause(
         "friction", "friction in {joint}", ("coulomb_Nm", "viscous_Nms_per_rad"),
         lambda s, h: (s.direction, s.v), lambda z, h: (z.torque, z.torque / z.speed),
-        positive=("coulomb_Nm", "viscous_Nms_per_rad"), kind=True, rubs=True,
+        positive=("coulomb_Nm", "viscous_Nms_per_rad"), kind=True, rubs=True, loose=2.0,
     ),
     JointCause(
         "torque_offset", "offset of the torque of {joint}", ("offset_Nm",),
@@ -123,29 +125,29 @@ CAUSES = (
     JointCause(
         "stribeck", "Stribeck friction in {joint}", ("excess_Nm",),
         lambda s, h: (s.direction * np.exp(-np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
-        SPEEDS, rubs=True,
+        SPEEDS, rubs=True, loose=2.0,
     ),
     JointCause(
         "asymmetric_coulomb", "Coulomb friction in {joint} that differs by direction", ("asymmetry_Nm",),
-        lambda s, h: (np.abs(s.direction),), lambda z, h: (z.torque,),
+        lambda s, h: (np.abs(s.direction),), lambda z, h: (z.torque,), loose=2.0,
     ),
     JointCause(
         "asymmetric_viscous", "viscous friction in {joint} that differs by direction", ("asymmetry_Nms_per_rad",),
-        lambda s, h: (np.abs(s.v),), lambda z, h: (z.torque / z.speed,),
+        lambda s, h: (np.abs(s.v),), lambda z, h: (z.torque / z.speed,), loose=2.0,
     ),
     JointCause(
         "sublinear_friction", "sublinear friction in {joint}", ("bend_Nm",),
         lambda s, h: (s.direction * np.log1p(np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
-        SHARES,
+        SHARES, loose=2.0,
     ),
     JointCause(
         "load_friction", "friction by load in {joint}", ("share",),
-        lambda s, h: (s.direction * np.abs(s.load),), lambda z, h: (0.3,),
+        lambda s, h: (s.direction * np.abs(s.load),), lambda z, h: (0.3,), loose=2.0,
     ),
     JointCause(
         "warming", "fading friction in {joint}", ("more_Nm", "more_Nms_per_rad"),
         lambda s, h: (s.direction * _faded(s, h), s.v * _faded(s, h)), lambda z, h: (z.torque, z.torque / z.speed),
-        SHARES, rubs=True,
+        SHARES, rubs=True, loose=2.0,
     ),
     JointCause(
         "spring", "spring at {joint}", ("stiffness_Nm_per_rad", "offset_Nm"),

@@ -220,15 +220,18 @@ class JointProblem:
         if group.cause == "elasticity":
             out = self._swaying(group, float(values[group.columns[0]]))
         members = group.members or (group.columns,)
+        loose = named[group.cause].loose if group.cause in named else 1.0
         for member in members:
             for c in {c for k in member for c in self.series[k]}:
                 signals = self.joints[c]
                 if group.cause == "friction":
                     coulomb, viscous = (abs(float(values[k])) for k in member)
-                    out += [{c: x} for x in friction.other_forms(signals, coulomb, viscous, 1.0, 3.0)]
+                    out += [
+                        {c: x} for x in friction.other_forms(signals, coulomb, viscous, loose, 3.0 * loose)
+                    ]
                     continue
                 trace = [
-                    sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
+                    loose * sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
                     for t in range(len(signals))
                 ]
                 each = [friction.smooth(s) for s in signals]
