@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -174,22 +175,22 @@ class Search:
         state = self.value((), None)
         for one in chosen:
             state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
-        return self._pruned(self._settled(state), fresh=False)
+        return self._pruned(self.settled(state), fresh=False)
 
     def run(self, state: State) -> State:
         """The likeliest set from another on."""
-        state = self._pruned(self._settled(state), fresh=False)
+        state = self._pruned(self.settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
             self.say(f"{len(state.chosen)} found, looking for more")
             grown = self._grown(state) or self._exchanged(state) or self._grown(state, late=True)
-            settled = None if grown is None else self._settled(grown)
+            settled = None if grown is None else self.settled(grown)
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
                 break  # one objective that rises, or a search would go round in circles
             state = settled
         return self._pruned(state, fresh=False)
 
-    def _settled(self, state: State) -> State:
+    def settled(self, state: State) -> State:
         """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
         for _ in range(self.settings.settle_steps):
             before, state = state.evidence, self.value(state.chosen, state.posterior)
@@ -203,18 +204,46 @@ class Search:
         for out in state.chosen:
             rest = [c for c in state.chosen if c is not out]
             without = self.value(rest, state.posterior)
-            for gain, chosen in self.offers(without)[: self.settings.tried]:
-                if chosen.group.name == out.group.name or without.evidence + gain < state.evidence - 5.0:
-                    continue
+            count, parts = cells.count, self._dissolved(state, without, out.group)
+            if parts is not None and parts.evidence - state.evidence >= self.settings.need_nats:
+                self.say(f"{out.group.name} -> members: {parts.evidence - state.evidence:.0f} nats")
+                return parts
+            cells.truncate(count)
+            for chosen in self.rivals(without, out.group)[: self.settings.tried]:
                 count, kind = cells.count, chosen.group.cause if chosen.group.members else None
                 kept = [c for c in rest if c.group.cause != kind]
                 other = self.formed(self.value((*kept, chosen), without.posterior))
+                if other.evidence > state.evidence - self.settings.within_nats:
+                    other = self._pruned(self.settled(other))
                 if other.evidence - state.evidence >= self.settings.need_nats:
                     gap = other.evidence - state.evidence
                     self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
                     return other
                 cells.truncate(count)
         return None
+
+    def _dissolved(self, state: State, without: State, kind: Group) -> State | None:
+        """The set with a kind's members that stand out in its place; None of more than half of them."""
+        p = state.posterior
+        out = [
+            k
+            for k in kind.members
+            if np.any(p.mean[list(k)] ** 2 > self.settings.apart**2 * p.variances[list(k)])
+        ]
+        if 2 * len(out) > len(kind.members):
+            return None
+        parts = without
+        for g in self.problem.groups:
+            if g.cause == kind.cause and g.columns in out:
+                scale = parts.posterior.gain(g, self.settings.octaves)[1]
+                parts = self.formed(self.value((*parts.chosen, Chosen(g, scale)), parts.posterior))
+        return self._pruned(self.settled(parts)) if out else None
+
+    def rivals(self, without: State, own: Group) -> list[Chosen]:
+        """What may be in a cause's place: its linear gain is near that of the cause, at the noise without either."""
+        gain = without.posterior.gain(own, self.settings.octaves)[0] + own.log_prior - self.against
+        least = gain - self.settings.within_nats
+        return [c for g, c in self.offers(without) if g >= least and c.group.name != own.name]
 
     def offers(self, state: State) -> list[tuple[float, Chosen]]:
         """Every group that a set has room for by its linear gain, the likeliest first."""
@@ -305,15 +334,15 @@ class Search:
     def _pruned(self, state: State, *, fresh: bool = True) -> State:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
-            shorter = [
-                self.value([c for c in state.chosen if c is not out], state.posterior)
-                for out in state.chosen[: len(state.chosen) - fresh]
-            ]
+            loose = state.chosen[: len(state.chosen) - fresh]
+            gone = [{c} for c in loose]
+            gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
+            shorter = [self.value([c for c in state.chosen if c not in out], state.posterior) for out in gone]
             best = max(shorter, key=lambda s: s.evidence)
             if best.evidence < state.evidence:
                 return state
-            (gone,) = set(state.keys) - best.keys
-            self.say(f"- {gone[0]} at {gone[1]}: {best.evidence - state.evidence:.0f} nats")
+            names = " and ".join(c.group.name for c in state.chosen if c not in best.chosen)
+            self.say(f"- {names}: {best.evidence - state.evidence:.0f} nats")
             state = best
         return state
 

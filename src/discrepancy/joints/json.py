@@ -80,6 +80,8 @@ class _Told:
     def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
         """Cause and place, in words too."""
         title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
+        if "{pair}" in title and joint is not None and partner is None:
+            partner = joint - 1  # a drive is shared with the joint before
         where = self.where(cause, place, joint, partner)
         return {"cause": cause, "kind": titled(title), "name": titled(title, where), "family": cause, "robot": None,
                 "joint": joint, "place": where}  # fmt: skip
@@ -143,6 +145,8 @@ class _Told:
             text = cause.sentence(said)
         if cause and len(slides) > 1:
             text = f"{titled(cause.title, ALL)}: {text}"
+        if f.of:
+            text = f"{text} and goes with its {f.of}"
         trials = self.verdict.trials
         trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."
