@@ -191,8 +191,8 @@ class _Judge:
             rivals=rivals,
             told=tuple(g.key for g in o.told() if g),
         )
-        off = [m for m, k in zip(plain.members, c.members or (c.columns,), strict=False) if self._is_off(k)]
-        if not c.members or 2 * len(off) >= len(plain.members) or not off:
+        off = [m for m, k in zip(plain.members, c.members, strict=False) if self._is_off(k)]
+        if not off or 2 * len(off) >= len(plain.members):
             return [plain]
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
 
