@@ -118,13 +118,15 @@ class JointProblem:
         rubs = self.dry.copy()
         if values is not None:
             index = {name: j for j, name in enumerate(self.model.joints)}
-            named = {cause.name for cause in CAUSES if cause.rubs}
+            named = {cause.name: cause.rubs for cause in CAUSES}
             for c in chosen:
-                if c.group.cause in named:
+                dry = named.get(c.group.cause)
+                if dry is not None:
                     members = c.group.members or (c.group.columns,)
                     places = self.model.joints if c.group.members else (c.group.place,)
                     for place, member in zip(places, members, strict=True):
-                        rubs[index[place]] += values[member[0]]  # with its sign: terms share one torque
+                        j = index[place]  # with its sign: terms share one torque
+                        rubs[j] += dry(float(values[member[0]]), self.joints[j][0].span)
             for j, k in self.dry_in_all.items():
                 rubs[j] += values[k]
         for j, (columns, unit) in enumerate(self.resting):

@@ -111,8 +111,7 @@ class _Judge:
     def verdict(self, notes: Sequence[str]) -> JointVerdict:
         kept, suspected = [], []
         for o in self.odds:
-            told = sum(p for g, p in self._ranked(o) if g is not None)
-            (kept if told >= NAMED else suspected).append(o)
+            (kept if self._is_named(o) else suspected).append(o)
         findings = [f for o in kept for f in self._findings(o)]
         findings = self._with_worth(findings, kept)
         scatter = self._scatter()
@@ -151,9 +150,12 @@ class _Judge:
     # --- causes
 
     @staticmethod
-    def _ranked(o: Odds) -> list[tuple[Group | None, float]]:
-        """What a cause may be, the likeliest first; None is nothing."""
-        return [(o.chosen.group, o.probability), *((r.group, r.probability) for r in o.rivals)]
+    def _is_named(o: Odds) -> bool:
+        """Whether something is there, and the cause whose values were fitted is among what it may be."""
+        nothing = sum(r.probability for r in o.rivals if r.group is None)
+        own = o.chosen.group
+        kin = [g for g in o.told() if g and (g.key == own.key or own.family and g.family == own.family)]
+        return nothing < 1.0 - NAMED and bool(kin)
 
     def _joint(self, place: str) -> int | None:
         return self.model.joints.index(place) + 1 if place in self.model.joints else None
@@ -186,10 +188,17 @@ class _Judge:
             rivals=rivals,
             told=tuple(g.key for g in o.told() if g),
         )
-        off = [m for m in plain.members if _is_off(m)]
+        off = [m for m, k in zip(plain.members, c.members or (c.columns,), strict=False) if self._is_off(k)]
         if not c.members or 2 * len(off) >= len(plain.members) or not off:
             return [plain]
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
+
+    def _is_off(self, columns: Sequence[int]) -> bool:
+        """Whether a value is beyond its standard error and a healthy robot's tolerance."""
+        at = self.parts.columns_of(list(columns))
+        usual = np.array([self.problem.tolerance[k] for k in columns])
+        size = np.sqrt(np.diag(self.whole.covariance)[at] + usual**2)
+        return bool(np.any(np.abs(self.whole.mean[at]) > SIGNIFICANT_SE * size))
 
     def _partner(self, group: Group) -> int | None:
         joint = self._joint(group.place)
@@ -223,7 +232,7 @@ class _Judge:
     def by_the_others(self, trial: int) -> tuple[Finding, ...]:
         """The findings with values fitted to the other parts, without events."""
         posterior = self.parts.posterior(self.parts.but(trial), self.parts.prior)
-        named = [o for o in self.odds if sum(p for g, p in self._ranked(o) if g is not None) >= NAMED]
+        named = [o for o in self.odds if self._is_named(o)]
         found = [f for o in named for f in self._findings(o, posterior)]
         return tuple(f for f in found if f.event is None and f.cause != "unlisted")
 
@@ -414,10 +423,6 @@ class _Judge:
                 )
             )
         return out
-
-
-def _is_off(member: Member) -> bool:
-    return any(abs(member.values[n]) > SIGNIFICANT_SE * member.errors[n] for n in member.values)
 
 
 def _share(left: Sequence[float], k: int, rows: float) -> float:
