@@ -214,11 +214,17 @@ class JointProblem:
             size = 10.0 * compliance * float(np.sqrt(np.mean(s.inverse[:, joint] ** 2)))
             for hz in SWAY_HZ:
                 for wave in (np.sin, np.cos):
-                    x = along(s, joint, size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S))[cut]
-                    empty = [np.zeros((c.stop - c.start, x.shape[1])) for c in self.cut]
-                    empty[t] = x
-                    out.append({c: [e[:, c] for e in empty] for c in range(x.shape[1]) if x[:, c].any()})
+                    way = [np.zeros(len(p.time)) for p in self.parts]
+                    way[t] = size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S)
+                    out.append(self._displaced(joint, way))
         return out
+
+    def _displaced(self, joint: int, way: Sequence[Array]) -> Series:
+        """Torques of a joint that is where the model does not have it, a series (W,) a log."""
+        moved = [along(s, joint, x)[c] for s, x, c in zip(self.parts, way, self.cut, strict=True)]
+        return {
+            c: [m[:, c] for m in moved] for c in range(len(self.joints)) if any(m[:, c].any() for m in moved)
+        }
 
     def _push(self, group: Group, force: Array, wave: int) -> Series:
         """Torques of a force during a push, ``wave`` half sines long."""
@@ -234,10 +240,14 @@ class JointProblem:
         return by
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """Traces of a cause times smooth functions; none of what inertia and geometry do."""
+        """Traces of a cause times smooth functions; an encoder's disc may be off its axis; inertia has no forms."""
         if group.event:
             force = 3.0 * values[list(group.columns)]
             return self.rows([self._push(group, force, wave) for wave in (2, 3, 4)])
+        if group.cause == "joint_zero":
+            joint, zero = self.model.joints.index(group.place), float(values[group.columns[0]])
+            turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]
+            return self.rows([self._displaced(joint, way) for way in turns])
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -245,15 +255,18 @@ class JointProblem:
         if group.cause == "elasticity":
             out = self._swaying(group, float(values[group.columns[0]]))
         members = group.members or (group.columns,)
+        loose = named[group.cause].loose if group.cause in named else 1.0
         for member in members:
             for c in {c for k in member for c in self.series[k]}:
                 signals = self.joints[c]
                 if group.cause == "friction":
                     coulomb, viscous = (abs(float(values[k])) for k in member)
-                    out += [{c: x} for x in friction.other_forms(signals, coulomb, viscous, 1.0, 3.0)]
+                    out += [
+                        {c: x} for x in friction.other_forms(signals, coulomb, viscous, loose, 3.0 * loose)
+                    ]
                     continue
                 trace = [
-                    sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
+                    loose * sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
                     for t in range(len(signals))
                 ]
                 each = [friction.smooth(s) for s in signals]

@@ -154,7 +154,7 @@ class _Judge:
         """Whether something is there, and the cause whose values were fitted is among what it may be."""
         nothing = sum(r.probability for r in o.rivals if r.group is None)
         own = o.chosen.group
-        kin = [g for g in o.told() if g and (g.key == own.key or own.family and g.family == own.family)]
+        kin = [g for g in o.told() if g and (g.key == own.key or (own.family and g.family == own.family))]
         return nothing < 1.0 - NAMED and bool(kin)
 
     def _joint(self, place: str) -> int | None:
