@@ -370,14 +370,14 @@ class _Judge:
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
                 continue
             k, se = list(g.columns), self.state.posterior.errors_of(g.columns)
-            sizes = need * se
-            value, _ = physical(self.problem, g, sizes, np.diag(sizes**2))
-            seen = sizes < 10.0 * np.array(g.slab)
-            if not any(seen):
+            seen, sizes = need * se < 10.0 * np.array(g.slab), need * se
+            if g.cause == "payload":
+                told = {NAMES[g.cause][0]: float(sizes[0]) if seen[0] else None}
+            elif all(seen) or (any(seen) and g.cause != "gravity_direction"):
+                value, _ = physical(self.problem, g, np.where(seen, sizes, 0.0), np.diag(sizes**2))
+                told = {n: abs(x) if ok else None for (n, x), ok in zip(value.items(), seen, strict=True)}
+            else:
                 continue
-            sizes = np.where(seen, sizes, 0.0)
-            names = list(value)[: len(k)]
-            told = {n: abs(value[n]) if ok else None for n, ok in zip(names, seen, strict=True)}
             yield Limit(g.cause, g.place, self._joint(g.place), told)
 
     def _notes(self) -> Iterator[str]:
