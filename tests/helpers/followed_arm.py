@@ -21,7 +21,7 @@ ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001"/><worldbody>
 </body></body></body></worldbody></mujoco>"""
 Change = Callable[[mujoco.MjSpec], None]
 Torque = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
-"""Torques that act besides those of the drives, from positions, velocities and time."""
+"""Of positions, velocities and time."""
 RATE_HZ, SECONDS, BANDWIDTH_PER_S = 250.0, 24.0, 20.0
 TORQUE_NOISE_NM, STEP_RAD = 0.02, 2.0 * np.pi / 2**17
 
@@ -36,8 +36,8 @@ def arm_model(folder: Path, given: Change = lambda spec: None) -> SerialModel:
     return load_model(path)
 
 
-def arm_log(true: Change, seed: int, besides: Torque | None = None) -> JointLog:
-    """A log of the arm with some changes, and torques besides."""
+def arm_log(true: Change, seed: int, besides: Torque | None = None, dry: Torque | None = None) -> JointLog:
+    """A log of the arm with some changes, torques besides those of the drives, and dry friction besides MuJoCo's."""
     rng = np.random.default_rng(seed)
     spec = mujoco.MjSpec.from_string(ARM)
     true(spec)
@@ -56,7 +56,10 @@ def arm_log(true: Change, seed: int, besides: Torque | None = None) -> JointLog:
     )
     data.qpos[:], data.qvel[:] = x[0], x1[0]
     inertia, log = np.zeros((J, J)), []
+    own = model.dof_frictionloss.copy()
     for k in range(steps):
+        if dry is not None:
+            model.dof_frictionloss[:] = own + dry(data.qpos, data.qvel, data.time)
         mujoco.mj_step1(model, data)
         if k % 10 == 0:
             mujoco.mj_fullM(model, data, inertia)

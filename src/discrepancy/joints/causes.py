@@ -195,7 +195,7 @@ CAUSES = (
     ),
     JointCause(
         "asymmetric_coulomb", "Coulomb friction in {joint} that differs by direction", ("asymmetry_Nm",),
-        lambda s, h: (np.abs(s.direction),), lambda z, h: (z.torque,), rubs=lambda x, z: abs(x),
+        lambda s, h: (np.abs(s.direction),), lambda z, h: (z.torque,),
         loose=2.0,
         sentence=lambda n: (
             f"dry friction of {n.place} is {n('asymmetry_Nm', 'N m')} "

@@ -112,8 +112,7 @@ class _Judge:
         kept, suspected = [], []
         for o in self.odds:
             (kept if self._is_named(o) else suspected).append(o)
-        findings = [f for o in kept for f in self._findings(o)]
-        findings = self._with_worth(findings, kept)
+        findings = self._with_worth(kept)
         scatter = self._scatter()
         chi2 = self._chi2()
         foretold = self._foretold([o.chosen for o in kept])
@@ -151,18 +150,22 @@ class _Judge:
 
     @staticmethod
     def _is_named(o: Odds) -> bool:
-        """Whether something is there, and the cause whose values were fitted is among what it may be."""
+        """Whether something is there, and it may be the cause whose values were fitted, or is unlisted."""
         nothing = sum(r.probability for r in o.rivals if r.group is None)
         own = o.chosen.group
-        kin = [g for g in o.told() if g and (g.key == own.key or (own.family and g.family == own.family))]
-        return nothing < 1.0 - NAMED and bool(kin)
+        told = [g for g in o.told() if g]
+        kin = [g for g in told if g.key == own.key or (own.family and g.family == own.family)]
+        return nothing < 1.0 - NAMED and bool(kin or [g for g in told[:1] if g.cause == "unlisted"])
 
     def _joint(self, place: str) -> int | None:
         return self.model.joints.index(place) + 1 if place in self.model.joints else None
 
     def _findings(self, o: Odds, values: Posterior | None = None) -> list[Finding]:
         """One finding; members of a kind of which less than half are off are findings of their own."""
-        c = o.chosen.group
+        c, probability = o.chosen.group, o.probability
+        first = next((r for r in o.rivals if r.probability > o.probability), None)
+        if first and first.group and first.group.cause == "unlisted":  # what stands for it is not what it is
+            c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
         kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
@@ -177,7 +180,7 @@ class _Judge:
             place=c.place,
             joint=self._joint(c.place),
             members=() if unlisted else self._members(c, values or self.whole),
-            probability=o.probability + kin,
+            probability=probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,
             unlisted=open_,
@@ -188,8 +191,8 @@ class _Judge:
             rivals=rivals,
             told=tuple(g.key for g in o.told() if g),
         )
-        off = [m for m, k in zip(plain.members, c.members or (c.columns,), strict=False) if self._is_off(k)]
-        if not c.members or 2 * len(off) >= len(plain.members) or not off:
+        off = [m for m, k in zip(plain.members, c.members, strict=False) if self._is_off(k)]
+        if not off or 2 * len(off) >= len(plain.members):
             return [plain]
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
 
@@ -253,7 +256,7 @@ class _Judge:
                 prior[self.parts.columns_of([k])] = nominal[k] if k < len(nominal) else 0.0
         return prior
 
-    def _with_worth(self, findings: list[Finding], kept: Sequence[Odds]) -> list[Finding]:
+    def _with_worth(self, kept: Sequence[Odds]) -> list[Finding]:
         """Findings with the shares of the misfit that they remove one after another, and nats by part."""
         steps = [self._prior([o.chosen for o in kept[:k]], tolerated=False) for k in range(len(kept) + 1)]
         whole = self.parts.but(None)
@@ -267,20 +270,13 @@ class _Judge:
             [[float(np.sum(s)) for _, s in self.parts.foretold(prior)] for prior in steps] if several else []
         )
         held = [sum(parts) for parts in each]
-        worth = {}
+        done = []
         for k, o in enumerate(kept):
             share = _share(left, k, float(np.sum(whole.rows)))
             lasts = several and not o.chosen.group.event
             out = _share(held, k, float(np.sum(whole.rows))) if lasts else None
             folds = tuple(0.5 * (a - b) for a, b in zip(each[k], each[k + 1], strict=True)) if lasts else ()
-            worth[o.chosen.group.key] = {"in_sample": share, "held_out": out, "folds": folds}
-        done = []
-        for f in findings:
-            key = next(
-                o.chosen.group.key for o in kept
-                if o.over_nothing == f.over_nothing and (o.chosen.group.place == f.place or o.chosen.group.members)
-            )  # fmt: skip
-            done.append(replace(f, **worth[key]))
+            done += [replace(f, in_sample=share, held_out=out, folds=folds) for f in self._findings(o)]
         return done
 
     def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
