@@ -36,6 +36,8 @@ EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
 """Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
 TOP_SHARE = 0.15
 """Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
+MOTOR_SHARE = 0.35
+"""The same over that where a torque per unit is fitted: above some 3.5 Hz a servo's gear sticks and slips."""
 FADE_S = 0.25
 """Rows fade in and out: a cut leaks the noise of accelerations far above the bands into all of them."""
 SWAY_HZ, SWAY_S = (1.0, 2.0, 3.0, 4.5, 6.5), 0.5
@@ -332,6 +334,7 @@ class _Builder:
         residual = [self._residual(s, c) for s, c in zip(self.parts, self.cut, strict=True)]
         rates = [s.rate_hz for s in self.parts]
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
+        top *= MOTOR_SHARE if more.motors else 1.0
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
         self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S)
         self.residual = residual
@@ -396,6 +399,7 @@ class _Builder:
         asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
         load = s.inverse - self.given.armature * s.ddq
+        load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # noise has no sign
         for j in range(self.J):
             here = (c, j)
             one = JointSignals(
@@ -460,9 +464,7 @@ class _Builder:
                 for s, c in zip(self.parts, self.cut, strict=True)
             ]
         )
-        for i, label in enumerate(
-            out.labels
-        ):  # values count from the model, not from where columns are linear
+        for i, label in enumerate(out.labels):  # from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
                     for t, own in enumerate(x):

@@ -81,7 +81,7 @@ def judged(
     say("smoothing the logs")
     trials = trials_of(model, logs, reference)
     volts = driven_by_voltage(trials.motors, len(model.joints))
-    switched = all(s.enabled is not None and not s.enabled.all() for s in trials.runs)
+    switched = any(s.enabled is not None and not s.enabled.all() for s in trials.runs)
     given = Given(
         trials.changed if reference else None,
         tuple(map(int, trials.joints)),
@@ -233,11 +233,14 @@ class _Judge:
         return tuple(out)
 
     def by_the_others(self, trial: int) -> tuple[Finding, ...]:
-        """The findings with values fitted to the other parts, without events."""
-        posterior = self.parts.posterior(self.parts.but(trial), self.parts.prior)
-        named = [o for o in self.odds if self._is_named(o)]
-        found = [f for o in named for f in self._findings(o, posterior)]
-        return tuple(f for f in found if f.event is None and f.cause != "unlisted")
+        """The findings that a simulation can have, with values fitted to the other parts.
+
+        They are alone, as in a simulation: tolerances and laws' errors do not take a share of what they do.
+        """
+        named = [o for o in self.odds if self._is_named(o) and not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
+        prior = self._prior([o.chosen for o in named], tolerated=False)
+        posterior = self.parts.posterior(self.parts.but(trial), prior)
+        return tuple(f for o in named for f in self._findings(o, posterior))
 
     # --- what they are worth
 
