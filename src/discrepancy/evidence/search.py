@@ -252,15 +252,24 @@ class Search:
     def _grown(self, state: State) -> State | None:
         """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
         count = self.problem.cells.count
-        tried = [self.value((*state.chosen, c), state.posterior) for c in self._events(state)]
+        events = self._events(state)
+        tried = [self.value((*state.chosen, c), state.posterior) for c, _ in events]
         for gain, chosen in self.offers(state)[: self.settings.tried]:
-            if gain < -5.0:
+            if gain < -self.settings.within_nats:
                 break
             kept = [
                 c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
             ]
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
+            for c, series in events:
+                if (
+                    c is best.chosen[-1] and self.problem.cells.count == count
+                ):  # they went with the first one tried
+                    own = replace(c, group=replace(c.group, columns=tuple(self.problem.cells.add(series))))
+                    best = self.value((*state.chosen, own), state.posterior)
+            if best.evidence - state.evidence < self.settings.need_nats:
+                best = self.settled(best)
             if best.evidence - state.evidence < self.settings.need_nats:
                 break
             if not best.chosen[-1].group.event:
@@ -273,17 +282,19 @@ class Search:
         self.problem.cells.truncate(count)
         return None
 
-    def _events(self, state: State) -> list[Chosen]:
-        """The likeliest events, with their columns added."""
+    def _events(self, state: State) -> list[tuple[Chosen, list[Series]]]:
+        """The likeliest events, with their columns, which are added."""
         cells = self.problem.cells
         found = [
-            replace(group, columns=tuple(cells.add(series)))
+            (replace(group, columns=tuple(cells.add(series))), series)
             for group, series in self.problem.events(state.posterior)
             if group.key not in state.keys
         ]
         p = state.posterior
         wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
-        return [Chosen(group, wider.gain(group, self.settings.octaves)[1]) for group in found]
+        return [
+            (Chosen(group, wider.gain(group, self.settings.octaves)[1]), series) for group, series in found
+        ]
 
     def formed(self, state: State) -> State:
         """The set with the law's errors of its last cause."""
