@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
@@ -173,14 +173,16 @@ class Search:
             state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
         return self._pruned(self.settled(state), fresh=False)
 
-    def run(self, state: State) -> State:
-        """The likeliest set from another on."""
+    def run(self, state: State, until: Collection[str] = ()) -> State:
+        """The likeliest set from another on; it ends early with a cause from which on the problem is not linear."""
         state = self._pruned(self.settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes:
             grown = self._grown(state) or self._exchanged(state)
             if grown is None:
                 break
-            state = self.settled(grown)
+            state, before = self.settled(grown), state
+            if any(cause in until for cause, _ in state.keys - before.keys):
+                break
         return self._pruned(state, fresh=False)
 
     def settled(self, state: State) -> State:

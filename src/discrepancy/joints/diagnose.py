@@ -21,6 +21,8 @@ PLAIN = 3.0
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Columns around whose values the problem is made linear again."""
+CURVED = ("gravity_direction", "joint_zero", "link_length", "torque_delay")
+"""Causes that change torques as a curve: what else there is shows only around their values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ def diagnose(
     smooth = smoothed(model, logs)
     problem = joint_problem(model, smooth)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say)
-    first = Outcome(problem, search, search.run(search.fixed(())))
+    first = Outcome(problem, search, search.run(search.fixed(()), CURVED))
     around = _around(first, model, smooth, settings, say, None)
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, around.search.run(around.state))
