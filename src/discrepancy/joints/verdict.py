@@ -237,7 +237,8 @@ class _Judge:
 
         They are alone, as in a simulation: tolerances and laws' errors do not take a share of what they do.
         """
-        named = [o for o in self.odds if self._is_named(o) and not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
+        lasting = [o for o in self.odds if not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
+        named = [o for o in lasting if self._is_named(o)]
         prior = self._prior([o.chosen for o in named], tolerated=False)
         posterior = self.parts.posterior(self.parts.but(trial), prior)
         return tuple(f for o in named for f in self._findings(o, posterior))
