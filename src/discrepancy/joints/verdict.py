@@ -369,7 +369,7 @@ class _Judge:
             known = g.key in taken or (g.cause, "all joints") in taken
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
                 continue
-            k, se = list(g.columns), self.state.posterior.errors_of(g.columns)
+            se = self.state.posterior.errors_of(g.columns)
             seen, sizes = need * se < 10.0 * np.array(g.slab), need * se
             if g.cause == "payload":
                 told = {NAMES[g.cause][0]: float(sizes[0]) if seen[0] else None}
