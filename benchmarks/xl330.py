@@ -17,23 +17,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from discrepancy.serial.diagnosis import diagnose_rig
-from discrepancy.serial.laws.rig import LawfulSerialRig
-from discrepancy.serial.rig import SerialRig
-from discrepancy.serial.rolled.closed import LoopDrive
-from discrepancy.serial.rolled.fitted import Fitted, extended, steps_per
-from discrepancy.serial.rolled.free import compared
-from discrepancy.serial.rolled.readings import Readings
 
-from discrepancy.engine.explanation import Found
-from discrepancy.joints.model import load_model, load_spec
+from discrepancy.joints.findings import Finding, JointVerdict, Member
+from discrepancy.joints.model import load_model
+from discrepancy.joints.rolled.closed import LoopDrive
+from discrepancy.joints.rolled.robot import Robot
 from discrepancy.joints.servo.commanded import Servo, servo_of
 from discrepancy.joints.servo.loop import LoopLaw, loop_laws
+from discrepancy.joints.verdict import judged
 from mocobot.serial import read_logs
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_sim.serial.built import build
-from mocobot_sim.serial.effects import RobotEffect
-from mocobot_sim.serial.rollout import Start
+from mocobot_sim.serial.rollout import Start, rollout
 
 VARIABLE = "MOCOBOT_XL330_DATA"
 TOP = Path(__file__).resolve().parents[1]
@@ -41,34 +35,38 @@ FOLDER = TOP / "data" / "xl330"
 GAINS = (100, 200, 400)
 
 
-def named(rig: SerialRig) -> tuple[list[Found], list[str]]:
-    """What a diagnosis names, and its words."""
-    found = list(diagnose_rig(rig, laws="never").causes)
-    return found, [item.candidate.cause for item in found]
-
-
-def plain(rig: SerialRig) -> list[RobotEffect]:
+def plain(verdict: JointVerdict) -> Finding:
     """Coulomb and viscous friction by least squares over samples that move."""
     left, right = [], []
-    for part in rig.parts:
-        s = part.signals
+    for s in verdict.parts:
         at = s.usable[:, 0] & (np.abs(s.dq[:, 0]) > s.slow[0])
         left.append(np.column_stack([np.sign(s.dq[at, 0]), s.dq[at, 0]]))
         right.append((s.torque - s.inverse)[at, 0])
     coulomb, viscous = np.linalg.lstsq(np.concatenate(left), np.concatenate(right), rcond=None)[0]
     numbers = {"coulomb_Nm": max(float(coulomb), 0.0), "viscous_Nms_per_rad": max(float(viscous), 0.0)}
-    return [RobotEffect("friction", 1, None, numbers)]
+    name = verdict.model.joints[0]
+    return Finding("friction", name, 1, (Member(name, 1, numbers, numbers),), 1.0, 0.0, 0.0, 0.0)
 
 
-def share_left(robot: Fitted, rig: SerialRig, laws: Sequence[LoopLaw], log: JointLog) -> float:
+def share_left(
+    found: Sequence[Finding], verdict: JointVerdict, laws: Sequence[LoopLaw], log: JointLog
+) -> float:
     """Position error (rms) of the simulated loop under a log's commands, over the motion's standard deviation [%]."""
-    servo = servo_of(log, 0, rig.motors, laws, rig.model.joints[0])
+    robot = Robot.of(verdict.model, found, log.rate_hz)
+    servo = servo_of(log, 0, verdict.motors, laws, verdict.model.joints[0])
     assert isinstance(servo, Servo), servo
     drive = LoopDrive.of(log, [servo], robot.readings)
-    every = steps_per(log.period_s)
     start = Start(0.0, log.q[0], np.zeros(1), np.zeros(1))
-    error = compared(start, robot, drive, log.q, every, np.full(1, np.inf))
+    error = rollout(robot.built, start, drive, len(log.q) - 1, robot.every) - log.q
     return 100.0 * float(np.sqrt(np.mean(error**2)) / np.std(log.q[:, 0]))
+
+
+def told(verdict: JointVerdict, seconds: float) -> None:
+    """Print what is named, with its numbers."""
+    print(f"  {verdict.verdict}, {seconds:.1f} s of CPU; {verdict.motors[0].torque_per_unit:.4f} N m/V")
+    for f in verdict.findings:
+        numbers = [f"{n} {m.values[n]:.4g} +- {m.errors[n]:.2g}" for m in f.members for n in m.values]
+        print(f"  {f.cause}: {', '.join(numbers) or f.of} ({100.0 * f.probability:.0f} %)")
 
 
 def main() -> None:
@@ -82,40 +80,26 @@ def main() -> None:
     for law in loop_laws(logs):
         print(f"gain {law.gain:g}: {law.per_rad / law.gain:.6f} +- {law.se / law.gain:.6f} of full duty per rad "
               f"and unit; leaves {law.left:.4f}; cut off at {law.limit:.3g}")  # fmt: skip
-    whole = LawfulSerialRig.of(model, logs)
-    for wanted in ("never", "auto"):
-        began = time.process_time()
-        found = diagnose_rig(whole, laws=wanted)
-        print(
-            f"all runs, laws {wanted}: {found.verdict}, {time.process_time() - began:.1f} s of CPU; "
-            f"{whole.motors[0].torque_per_unit:.4f} N m/V"
-        )
-        print(f"  foretold torques, share of the excess error removed: {found.gain and found.gain.removed()}")
-        for item in found.causes:
-            values, se = whole.effect_parameters(item.candidate, item.values, item.covariance)
-            held = "" if item.held_out is None else f"; {100.0 * item.held_out:.1f} % held out"
-            print(
-                f"  {item.candidate.label}: "
-                + ", ".join(f"{n} {v:.4g} +- {se[n]:.2g}" for n, v in values.items())
-                + held
-            )
+    print("all runs:")
+    begun = time.process_time()
+    verdict = judged(model, logs)
+    told(verdict, time.process_time() - begun)
     print(
         "\nPosition foretold from the commands, rms error over the motion's rms [%]: named, Coulomb and viscous alone"
     )
+    every = []
     for gain in GAINS:
         others = [log for log in logs if log.drive.position_gain[0] != gain]
         laws = loop_laws(others)
-        rig = LawfulSerialRig.of(model, others)
-        found, labels = named(rig)
-        print(f"gain {gain} from the others: {', '.join(labels)}")
+        begun = time.process_time()
+        verdict = judged(model, others)
+        print(f"gain {gain} from the others:")
+        told(verdict, time.process_time() - begun)
+        found = verdict.by_the_others(len(verdict.trials))  # none of these is left out
         for log in (log for log in logs if log.drive.position_gain[0] == gain):
-            step_s = log.period_s / steps_per(log.period_s)
-            robots = [
-                extended(rig, found, step_s),
-                Fitted(build(load_spec(model.path), plain(rig), step_s), Readings.of([], 1)),
-            ]
-            shares = [share_left(robot, rig, laws, log) for robot in robots]
-            print(f"  {Path(log.name).stem:<28}" + "".join(f"{share:8.1f}" for share in shares))
+            every.append([share_left(own, verdict, laws, log) for own in (found, [plain(verdict)])])
+            print(f"  {Path(log.name).stem:<28}" + "".join(f"{share:8.1f}" for share in every[-1]))
+    print(f"\n  {'mean':<28}" + "".join(f"{share:8.1f}" for share in np.mean(every, axis=0)))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
@@ -177,8 +177,8 @@ class Search:
             state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
         return self._pruned(self.settled(state), fresh=False)
 
-    def run(self, state: State) -> State:
-        """The likeliest set from another on."""
+    def run(self, state: State, early: Collection[str] = ()) -> State:
+        """The likeliest set from another on; it ends early with a cause from which on the problem is not linear."""
         state = self._pruned(self.settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
@@ -187,7 +187,9 @@ class Search:
             settled = None if grown is None else self.settled(grown)
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
                 break  # one objective that rises, or a search would go round in circles
-            state = settled
+            state, before = settled, state
+            if any(cause in early for cause, _ in state.keys - before.keys):
+                break
         return self._pruned(state, fresh=False)
 
     def settled(self, state: State) -> State:
@@ -259,14 +261,22 @@ class Search:
     def _grown(self, state: State, *, late: bool = False) -> State | None:
         """A set with one cause more that is likelier, its law's errors included; None if none is."""
         count = self.problem.cells.count
-        events = () if late else self._events(state)
-        tried = [self.value((*state.chosen, c), state.posterior) for c in events]
+        events = [] if late else self._events(state)
+        tried = [self.value((*state.chosen, c), state.posterior) for c, _ in events]
         for chosen in self._likely(state, late=late):
             kept = [
                 c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
             ]
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
+            for c, series in events:
+                if (
+                    c is best.chosen[-1] and self.problem.cells.count == count
+                ):  # they went with the first one tried
+                    own = replace(c, group=replace(c.group, columns=tuple(self.problem.cells.add(series))))
+                    best = self.value((*state.chosen, own), state.posterior)
+            if best.evidence - state.evidence < self.settings.need_nats:
+                best = self.settled(best)
             if best.evidence - state.evidence < self.settings.need_nats:
                 break
             if not best.chosen[-1].group.event:
@@ -287,23 +297,25 @@ class Search:
         p, s = state.posterior, self.settings
         quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
         out: list[Chosen] = []
-        for where, most, least in ((state, s.tried, -5.0), (quiet, s.tried_quiet, s.need_nats)):
+        for where, most, least in ((state, s.tried, -s.within_nats), (quiet, s.tried_quiet, s.need_nats)):
             offers = [(gain, c) for gain, c in self.offers(where) if c.group.late == late and gain > least]
             known = {c.group.name for c in out}
             out += [c for _, c in offers[:most] if c.group.name not in known]
         return out
 
-    def _events(self, state: State) -> list[Chosen]:
-        """The likeliest events, with their columns added."""
+    def _events(self, state: State) -> list[tuple[Chosen, list[Series]]]:
+        """The likeliest events, with their columns, which are added."""
         cells = self.problem.cells
         found = [
-            replace(group, columns=tuple(cells.add(series)))
+            (replace(group, columns=tuple(cells.add(series))), series)
             for group, series in self.problem.events(state.posterior)
             if group.key not in state.keys
         ]
         p = state.posterior
         wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
-        return [Chosen(group, wider.gain(group, self.settings.octaves)[1]) for group in found]
+        return [
+            (Chosen(group, wider.gain(group, self.settings.octaves)[1]), series) for group, series in found
+        ]
 
     def formed(self, state: State) -> State:
         """The set with the law's errors of its last cause."""

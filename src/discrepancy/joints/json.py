@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from discrepancy import rules
 from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.causes import WORDS
@@ -59,7 +58,7 @@ def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = 
     kinds, remains = ", ".join(entry["kind"] for entry in values["scatter"]), []
     if kinds and v.verdict != "miscalibrated":
         remains = [f"Besides, all places alike are off by more than their tolerances: {kinds}."]
-    if left > rules.CLEAN_CHI2_PER_N:
+    if left > SETTINGS.clean_chi2:
         where = values["residual"]["signature"]["sentence"].replace("The torque", "the torque").rstrip(".")
         more = f"A misfit of chi2/n {three_digits(left)} of {three_digits(modelled)} remains; {where}."
         remains = [more, *remains]

@@ -16,6 +16,7 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
+from discrepancy.joints.given import Given, horizontal, with_load
 from discrepancy.joints.mechanics.along import along
 from discrepancy.joints.mechanics.regressor import (
     body_regressor,
@@ -36,6 +37,8 @@ EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
 """Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
 TOP_SHARE = 0.15
 """Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
+MOTOR_SHARE = 0.35
+"""The same over that where a torque per unit is fitted: above some 3.5 Hz a servo's gear sticks and slips."""
 FADE_S = 0.25
 """Rows fade in and out: a cut leaks the noise of accelerations far above the bands into all of them."""
 SWAY_HZ, SWAY_S = (1.0, 2.0, 3.0, 4.5, 6.5), 0.5
@@ -288,30 +291,6 @@ def joint_problem(
     return _Builder(model, list(smooth), values or {}, given or Given()).built()
 
 
-@dataclass(frozen=True)
-class Given:
-    """What a problem takes besides logs and values.
-
-    Attributes:
-        changed: signals in which causes act; those after them are a reference, in which the model may be wrong, too.
-            None: all.
-        joints: which have torques, from 0; None: all.
-        motors: joints whose torque per unit is fitted to the model.
-        back_emf: joints whose drives lose torque to the speed while they are on.
-        excluded: causes that are left out.
-        tolerances: standard deviations by cause and parameter in place of the usual ones.
-        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
-    """
-
-    changed: int | None = None
-    joints: tuple[int, ...] | None = None
-    motors: frozenset[int] = frozenset()
-    back_emf: frozenset[int] = frozenset()
-    excluded: frozenset[str] = frozenset()
-    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    noise: Sequence[Array] | None = None
-
-
 class _Builder:
     def __init__(self, model: SerialModel, smooth: list[Signals], values: Values, more: Given) -> None:
         self.model, self.values, self.names, self.more = model, values, model.joints, more
@@ -333,6 +312,7 @@ class _Builder:
         residual = [self._residual(s, c) for s, c in zip(self.parts, self.cut, strict=True)]
         rates = [s.rate_hz for s in self.parts]
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
+        top *= MOTOR_SHARE if more.motors else 1.0
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
         self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S)
         self.residual = residual
@@ -357,7 +337,7 @@ class _Builder:
             inertia[b] *= max(1.0 + v.get(f"{n} inertia share", 0.0), 0.05)
             load = [v.get(f"payload {n} {x}", 0.0) for x in MOMENTS]
             if any(load):
-                mass[b], com[b], inertia[b] = _with_load(float(mass[b]), com[b], inertia[b], np.array(load))
+                mass[b], com[b], inertia[b] = with_load(float(mass[b]), com[b], inertia[b], np.array(load))
         for j, n in enumerate(self.names):
             position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
         gravity = t.gravity.copy()
@@ -397,6 +377,7 @@ class _Builder:
         asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
         load = s.inverse - self.given.armature * s.ddq
+        load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # noise has no sign
         for j in range(self.J):
             here = (c, j)
             one = JointSignals(
@@ -461,9 +442,7 @@ class _Builder:
                 for s, c in zip(self.parts, self.cut, strict=True)
             ]
         )
-        for i, label in enumerate(
-            out.labels
-        ):  # values count from the model, not from where columns are linear
+        for i, label in enumerate(out.labels):  # from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
                     for t, own in enumerate(x):
@@ -698,21 +677,3 @@ class _Builder:
             columns.append(self.add(f"{self.names[j]} turning {k}", 0.0, {j: common[k]}))
             unit.append(0.5)
         self.out.resting.append((columns, np.array(unit)))
-
-
-def horizontal(gravity: Array) -> Array:
-    """Two horizontal axes, shape (2, 3)."""
-    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
-
-
-def _with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
-    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
-    total = max(mass + float(load[0]), 0.05 * mass)
-    centre = (mass * com + load[1:4]) / total
-    xx, yy, zz, xy, xz, yz = load[4:]
-    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-    def about(c: Array) -> Array:
-        return c @ c * np.eye(3) - np.outer(c, c)
-
-    return total, centre, inertia + mass * about(com) + more - total * about(centre)

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from discrepancy import rules
 from discrepancy.causes.numbers import number
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.digits import three_digits
+from discrepancy.evidence.settings import SETTINGS
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import VERDICTS
 from discrepancy.result.remains import remedy
@@ -318,4 +318,4 @@ def _misfit(values: Values) -> str:
     text += f"{three_digits(residual['chi2_per_n_tolerated'])} with all a little off, within its tolerance"
     if values["causes"]:
         text += f", {three_digits(residual['chi2_per_n'])} with what is found"
-    return f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."
+    return f"{text} (up to {SETTINGS.clean_chi2:g} counts as clean)."

@@ -13,7 +13,7 @@ from discrepancy.causes.excluded import excluded_from
 from discrepancy.evidence.odds import Odds, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
-from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.diagnose import Outcome, Until, diagnose
 from discrepancy.joints.findings import (
     Event,
@@ -27,9 +27,9 @@ from discrepancy.joints.findings import (
     Scatter,
     Verdict,
 )
+from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.parts import Parts
-from discrepancy.joints.problem import Given
 from discrepancy.joints.servo.loop import loop_laws, sentences
 from discrepancy.joints.servo.motor import driven_by_voltage
 from discrepancy.joints.trials import Trials, notes_of, resting, trials_of
@@ -58,7 +58,6 @@ def judged(
     reference: Sequence[JointLog] = (),
     excluded: Sequence[str] = (),
     tolerances: Mapping[str, Mapping[str, float]] | None = None,
-    settings: Settings = SETTINGS,
     seconds: float | None = None,
     say: Say = lambda _: None,
 ) -> JointVerdict:
@@ -70,7 +69,6 @@ def judged(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         excluded: causes left out of the tables.
         tolerances: standard deviations by cause and parameter of a healthy robot in place of the usual ones.
-        settings: numbers of the engine.
         seconds: after which the search ends with what it has.
         say: takes a line about each step.
 
@@ -81,7 +79,7 @@ def judged(
     say("smoothing the logs")
     trials = trials_of(model, logs, reference)
     volts = driven_by_voltage(trials.motors, len(model.joints))
-    switched = all(s.enabled is not None and not s.enabled.all() for s in trials.runs)
+    switched = any(s.enabled is not None and not s.enabled.all() for s in trials.runs)
     given = Given(
         trials.changed if reference else None,
         tuple(map(int, trials.joints)),
@@ -90,7 +88,7 @@ def judged(
         excluded_from(NAMES, excluded),
         tolerances or {},
     )
-    outcome = diagnose(model, trials, settings, say, given, until)
+    outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)
@@ -233,11 +231,15 @@ class _Judge:
         return tuple(out)
 
     def by_the_others(self, trial: int) -> tuple[Finding, ...]:
-        """The findings with values fitted to the other parts, without events."""
-        posterior = self.parts.posterior(self.parts.but(trial), self.parts.prior)
-        named = [o for o in self.odds if self._is_named(o)]
-        found = [f for o in named for f in self._findings(o, posterior)]
-        return tuple(f for f in found if f.event is None and f.cause != "unlisted")
+        """The findings that a simulation can have, with values fitted to the other parts.
+
+        They are alone, as in a simulation: tolerances and laws' errors do not take a share of what they do.
+        """
+        lasting = [o for o in self.odds if not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
+        named = [o for o in lasting if self._is_named(o)]
+        prior = self._prior([o.chosen for o in named], tolerated=False)
+        posterior = self.parts.posterior(self.parts.but(trial), prior)
+        return tuple(f for o in named for f in self._findings(o, posterior))
 
     # --- what they are worth
 
@@ -365,15 +367,15 @@ class _Judge:
             known = g.key in taken or (g.cause, "all joints") in taken
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
                 continue
-            k, se = list(g.columns), self.state.posterior.errors_of(g.columns)
-            sizes = need * se
-            value, _ = physical(self.problem, g, sizes, np.diag(sizes**2))
-            seen = sizes < 10.0 * np.array(g.slab)
-            if not any(seen):
+            se = self.state.posterior.errors_of(g.columns)
+            seen, sizes = need * se < 10.0 * np.array(g.slab), need * se
+            if g.cause == "payload":
+                told = {NAMES[g.cause][0]: float(sizes[0]) if seen[0] else None}
+            elif all(seen) or (any(seen) and g.cause != "gravity_direction"):
+                value, _ = physical(self.problem, g, np.where(seen, sizes, 0.0), np.diag(sizes**2))
+                told = {n: abs(x) if ok else None for (n, x), ok in zip(value.items(), seen, strict=True)}
+            else:
                 continue
-            sizes = np.where(seen, sizes, 0.0)
-            names = list(value)[: len(k)]
-            told = {n: abs(value[n]) if ok else None for n, ok in zip(names, seen, strict=True)}
             yield Limit(g.cause, g.place, self._joint(g.place), told)
 
     def _notes(self) -> Iterator[str]:
