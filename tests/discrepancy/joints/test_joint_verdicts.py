@@ -11,8 +11,9 @@ import pytest
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from discrepancy.joints.diagnose import Outcome, Until, labels_of
 from discrepancy.joints.findings import JointVerdict
+from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import Given, joint_problem
+from discrepancy.joints.problem import joint_problem
 from discrepancy.joints.trials import trials_of
 from discrepancy.joints.verdict import judged
 from estimator.errors import InputError
