@@ -406,8 +406,12 @@ class _Builder:
     def group(
         self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float] | Array, **more: Any
     ) -> None:
-        if cause in self.more.excluded or not any(
-            j in self.channel for k in columns for j in self.out.series[k]
+        # Between two days a link carries more or less, and is what it was.
+        same = self.more.changed is not None and more.get("family") and cause != "payload"
+        if (
+            same
+            or cause in self.more.excluded
+            or not any(j in self.channel for k in columns for j in self.out.series[k])
         ):
             return
         sizes = tuple(float(x) for x in slab)
@@ -654,7 +658,8 @@ class _Builder:
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))
                      for i, x in enumerate(MOMENTS)]  # fmt: skip
             slab = PAYLOAD_KG * np.array([1.0, r, r, r] + [0.5 * r * r] * 6)
-            self.group("payload", n, index, slab, least=(0.0,) + (-np.inf,) * 9, family=family)
+            least = 0.0 if self.more.changed is None else -np.inf
+            self.group("payload", n, index, slab, least=(least,) + (-np.inf,) * 9, family=family)
 
     def _rests(self, j: int) -> None:
         columns, unit, turns = [], [], []
