@@ -106,6 +106,8 @@ def test_friction_at_rest_is_that_of_all_terms_together(folder: Path) -> None:
 
     np.testing.assert_allclose(rests(friction=2.0, stribeck=-1.5), rests(friction=0.5))
     np.testing.assert_allclose(rests(friction=2.0, sublinear_friction=-1.5), rests(friction=2.0))
+    load = linear.joints[linear.model.joints.index("elbow")][0].span.torque
+    np.testing.assert_allclose(rests(load_friction=0.2), rests(friction=0.2 * load))
 
 
 def test_a_push_has_its_instant(folder: Path) -> None:
