@@ -82,8 +82,8 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     merged: dict[tuple[str, str] | bool, Rival] = {}
     for (_, group, is_open), p in zip(weighed, share[1:], strict=True):
         key = is_open if group is None else group.key
-        if key == own.group.key:
-            share[0] += p  # another shape of the same cause
+        if key == own.group.key or (group and own.group.columns in group.members):
+            share[0] += p  # another shape of the same cause, or all joints and this one among them
         elif key not in merged or merged[key].probability < p:
             merged[key] = Rival(group, is_open, float(p))
     rivals = sorted(merged.values(), key=lambda r: -r.probability)
