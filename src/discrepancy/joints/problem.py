@@ -121,12 +121,13 @@ class JointProblem:
         rubs = self.dry.copy()
         if values is not None:
             index = {name: j for j, name in enumerate(self.model.joints)}
+            known = [self.model.joints[j] for j in self.channel]
             named = {cause.name: cause.rubs for cause in CAUSES}
             for c in chosen:
                 dry = named.get(c.group.cause)
                 if dry is not None:
                     members = c.group.members or (c.group.columns,)
-                    places = self.model.joints if c.group.members else (c.group.place,)
+                    places = known if c.group.members else (c.group.place,)
                     for place, member in zip(places, members, strict=True):
                         j = index[place]  # with its sign: terms share one torque
                         rubs[j] += dry(float(values[member[0]]), self.joints[j][0].span)
