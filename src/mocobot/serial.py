@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -217,8 +218,12 @@ def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:
     """
     if path is None:
         return None
-    given = read_tolerances(path, {name: dict.fromkeys(names, 0.0) for name, names in NAMES.items()})
-    return {name: values for name, values in given.items() if any(values.values())}
+    none = {name: dict.fromkeys(names, math.nan) for name, names in NAMES.items()}
+    given = {
+        name: {key: x for key, x in values.items() if not math.isnan(x)}
+        for name, values in read_tolerances(path, none).items()
+    }
+    return {name: values for name, values in given.items() if values}
 
 
 def _model(given: GivenModel) -> SerialModel:

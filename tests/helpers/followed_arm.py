@@ -20,6 +20,8 @@ ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001"/><worldbody>
   <inertial pos="0.12 0.01 0" mass="1.2" diaginertia="0.003 0.012 0.012"/>
 </body></body></body></worldbody></mujoco>"""
 Change = Callable[[mujoco.MjSpec], None]
+Torque = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+"""Of positions, velocities and time."""
 RATE_HZ, SECONDS, BANDWIDTH_PER_S = 250.0, 24.0, 20.0
 TORQUE_NOISE_NM, STEP_RAD = 0.02, 2.0 * np.pi / 2**17
 
@@ -34,10 +36,8 @@ def arm_model(folder: Path, given: Change = lambda spec: None) -> SerialModel:
     return load_model(path)
 
 
-def arm_log(
-    true: Change, seed: int, besides: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
-) -> JointLog:
-    """A log of the arm with some changes; ``besides``: further torques from positions and velocities."""
+def arm_log(true: Change, seed: int, besides: Torque | None = None, dry: Torque | None = None) -> JointLog:
+    """A log of the arm with some changes, torques besides those of the drives, and dry friction besides MuJoCo's."""
     rng = np.random.default_rng(seed)
     spec = mujoco.MjSpec.from_string(ARM)
     true(spec)
@@ -56,13 +56,16 @@ def arm_log(
     )
     data.qpos[:], data.qvel[:] = x[0], x1[0]
     inertia, log = np.zeros((J, J)), []
+    own = model.dof_frictionloss.copy()
     for k in range(steps):
+        if dry is not None:
+            model.dof_frictionloss[:] = own + dry(data.qpos, data.qvel, data.time)
         mujoco.mj_step1(model, data)
         if k % 10 == 0:
             mujoco.mj_fullM(model, data, inertia)
         e, e1 = x[k] - data.qpos, x1[k] - data.qvel
         torque = inertia @ (x2[k] + 2 * BANDWIDTH_PER_S * e1 + BANDWIDTH_PER_S**2 * e) + data.qfrc_bias
-        data.qfrc_applied[:] = torque + (0.0 if besides is None else besides(data.qpos, data.qvel))
+        data.qfrc_applied[:] = torque + (0.0 if besides is None else besides(data.qpos, data.qvel, data.time))
         if k % every == 0:
             log.append((data.qpos.copy(), torque.copy()))
         mujoco.mj_step2(model, data)
@@ -77,6 +80,16 @@ def arm_log(
         f"log {seed}", np.arange(len(q)) / RATE_HZ, RATE_HZ, q, torque, None, None, names, drive, np.full(J, STEP_RAD),
         np.ones(len(q), dtype=bool), RATE_HZ,
     )  # fmt: skip
+
+
+def both(*changes: Change) -> Change:
+    """One after another."""
+
+    def change(spec: mujoco.MjSpec) -> None:
+        for one in changes:
+            one(spec)
+
+    return change
 
 
 def rubs(level: float, viscous: float = 0.0, joint: str | None = None) -> Change:

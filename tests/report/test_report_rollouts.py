@@ -58,10 +58,10 @@ def test_text_has_every_joint_and_counts_what_diverged() -> None:
     text = "\n".join(rollout_lines({"rollouts": rolled()}))
     assert re.search(r"hip \[mrad\] +50 -> 10 \(80 %\) +diverged -> 80\n", text)
     assert re.search(r"lift \[mm\] +4 -> 1 \(75 %\) +20 -> 5 \(75 %\)\n", text)
-    assert "Of the given model diverged (in the worst joint) 30 of 40 at 0.5 s" in text
+    assert "Rollouts of the given model that diverged in the worst joint: 30 of 40 at 0.5 s;" in text
     assert "Not in the rollouts: elasticity of joint 1 (hip)." in text
     assert re.search(r"hip \[mrad\] +30 -> 20 \(33 %\)\n", text)
-    assert "Of the given model 1 of 2 blocks diverged" in text
+    assert "1 of 2 blocks of the given model diverged" in text
     assert max(map(len, text.splitlines())) <= 100
 
 

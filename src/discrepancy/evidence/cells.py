@@ -157,7 +157,7 @@ class Cells:
             n = len(self.bands.of_trial(t))
             wide = np.zeros((length, len(spectra)))
             wide[:n] = np.column_stack([rows[first : first + n] for rows in spectra])
-            out.append(self.bands.faded(idct(wide, axis=0, norm="ortho"), t))
+            out.append(self.bands.faded(np.asarray(idct(wide, axis=0, norm="ortho")), t))
             first += n
         return out
 

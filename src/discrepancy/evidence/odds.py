@@ -60,16 +60,12 @@ def odds_of(search: Search, state: State) -> list[Odds]:
 def _odds(search: Search, state: State, own: Chosen) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
-    without = search.value(rest, state.posterior)
+    without = search.settled(search.value(rest, state.posterior))
     weighed: list[tuple[float, Group | None]] = [(without.evidence, None)]
-    offers = [o for o in search.offers(without) if o[1].group.name != own.group.name]
-    best = state.evidence
-    for gain, chosen in offers[: search.settings.most_rivals]:
-        if without.evidence + gain < best - search.settings.within_nats:
-            break
+    for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
         kept = [c for c in rest if not (chosen.group.members and c.group.cause == chosen.group.cause)]
-        rival = search.formed(search.value((*kept, chosen), without.posterior))
+        rival = search.settled(search.formed(search.value((*kept, chosen), without.posterior)))
         weighed.append((rival.evidence, chosen.group))
         cells.truncate(count)
     logs = np.array([state.evidence, *(w[0] for w in weighed)])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -174,22 +175,24 @@ class Search:
         state = self.value((), None)
         for one in chosen:
             state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
-        return self._pruned(self._settled(state), fresh=False)
+        return self._pruned(self.settled(state), fresh=False)
 
-    def run(self, state: State) -> State:
-        """The likeliest set from another on."""
-        state = self._pruned(self._settled(state), fresh=False)
+    def run(self, state: State, early: Collection[str] = ()) -> State:
+        """The likeliest set from another on; it ends early with a cause from which on the problem is not linear."""
+        state = self._pruned(self.settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
             self.say(f"{len(state.chosen)} found, looking for more")
             grown = self._grown(state) or self._exchanged(state) or self._grown(state, late=True)
-            settled = None if grown is None else self._settled(grown)
+            settled = None if grown is None else self.settled(grown)
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
                 break  # one objective that rises, or a search would go round in circles
-            state = settled
+            state, before = settled, state
+            if any(cause in early for cause, _ in state.keys - before.keys):
+                break
         return self._pruned(state, fresh=False)
 
-    def _settled(self, state: State) -> State:
+    def settled(self, state: State) -> State:
         """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
         for _ in range(self.settings.settle_steps):
             before, state = state.evidence, self.value(state.chosen, state.posterior)
@@ -203,18 +206,46 @@ class Search:
         for out in state.chosen:
             rest = [c for c in state.chosen if c is not out]
             without = self.value(rest, state.posterior)
-            for gain, chosen in self.offers(without)[: self.settings.tried]:
-                if chosen.group.name == out.group.name or without.evidence + gain < state.evidence - 5.0:
-                    continue
+            count, parts = cells.count, self._dissolved(state, without, out.group)
+            if parts is not None and parts.evidence - state.evidence >= self.settings.need_nats:
+                self.say(f"{out.group.name} -> members: {parts.evidence - state.evidence:.0f} nats")
+                return parts
+            cells.truncate(count)
+            for chosen in self.rivals(without, out.group)[: self.settings.tried]:
                 count, kind = cells.count, chosen.group.cause if chosen.group.members else None
                 kept = [c for c in rest if c.group.cause != kind]
                 other = self.formed(self.value((*kept, chosen), without.posterior))
+                if other.evidence > state.evidence - self.settings.within_nats:
+                    other = self._pruned(self.settled(other))
                 if other.evidence - state.evidence >= self.settings.need_nats:
                     gap = other.evidence - state.evidence
                     self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
                     return other
                 cells.truncate(count)
         return None
+
+    def _dissolved(self, state: State, without: State, kind: Group) -> State | None:
+        """The set with a kind's members that stand out in its place; None of more than half of them."""
+        p = state.posterior
+        out = [
+            k
+            for k in kind.members
+            if np.any(p.mean[list(k)] ** 2 > self.settings.apart**2 * p.variances[list(k)])
+        ]
+        if 2 * len(out) > len(kind.members):
+            return None
+        parts = without
+        for g in self.problem.groups:
+            if g.cause == kind.cause and g.columns in out:
+                scale = parts.posterior.gain(g, self.settings.octaves)[1]
+                parts = self.formed(self.value((*parts.chosen, Chosen(g, scale)), parts.posterior))
+        return self._pruned(self.settled(parts)) if out else None
+
+    def rivals(self, without: State, own: Group) -> list[Chosen]:
+        """What may be in a cause's place: its linear gain is near that of the cause, at the noise without either."""
+        gain = without.posterior.gain(own, self.settings.octaves)[0] + own.log_prior - self.against
+        least = gain - self.settings.within_nats
+        return [c for g, c in self.offers(without) if g >= least and c.group.name != own.name]
 
     def offers(self, state: State) -> list[tuple[float, Chosen]]:
         """Every group that a set has room for by its linear gain, the likeliest first."""
@@ -230,14 +261,22 @@ class Search:
     def _grown(self, state: State, *, late: bool = False) -> State | None:
         """A set with one cause more that is likelier, its law's errors included; None if none is."""
         count = self.problem.cells.count
-        events = () if late else self._events(state)
-        tried = [self.value((*state.chosen, c), state.posterior) for c in events]
+        events = [] if late else self._events(state)
+        tried = [self.value((*state.chosen, c), state.posterior) for c, _ in events]
         for chosen in self._likely(state, late=late):
             kept = [
                 c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
             ]
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
+            for c, series in events:
+                if (
+                    c is best.chosen[-1] and self.problem.cells.count == count
+                ):  # they went with the first one tried
+                    own = replace(c, group=replace(c.group, columns=tuple(self.problem.cells.add(series))))
+                    best = self.value((*state.chosen, own), state.posterior)
+            if best.evidence - state.evidence < self.settings.need_nats:
+                best = self.settled(best)
             if best.evidence - state.evidence < self.settings.need_nats:
                 break
             if not best.chosen[-1].group.event:
@@ -258,23 +297,25 @@ class Search:
         p, s = state.posterior, self.settings
         quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
         out: list[Chosen] = []
-        for where, most, least in ((state, s.tried, -5.0), (quiet, s.tried_quiet, s.need_nats)):
+        for where, most, least in ((state, s.tried, -s.within_nats), (quiet, s.tried_quiet, s.need_nats)):
             offers = [(gain, c) for gain, c in self.offers(where) if c.group.late == late and gain > least]
             known = {c.group.name for c in out}
             out += [c for _, c in offers[:most] if c.group.name not in known]
         return out
 
-    def _events(self, state: State) -> list[Chosen]:
-        """The likeliest events, with their columns added."""
+    def _events(self, state: State) -> list[tuple[Chosen, list[Series]]]:
+        """The likeliest events, with their columns, which are added."""
         cells = self.problem.cells
         found = [
-            replace(group, columns=tuple(cells.add(series)))
+            (replace(group, columns=tuple(cells.add(series))), series)
             for group, series in self.problem.events(state.posterior)
             if group.key not in state.keys
         ]
         p = state.posterior
         wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
-        return [Chosen(group, wider.gain(group, self.settings.octaves)[1]) for group in found]
+        return [
+            (Chosen(group, wider.gain(group, self.settings.octaves)[1]), series) for group, series in found
+        ]
 
     def formed(self, state: State) -> State:
         """The set with the law's errors of its last cause."""
@@ -305,15 +346,15 @@ class Search:
     def _pruned(self, state: State, *, fresh: bool = True) -> State:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
-            shorter = [
-                self.value([c for c in state.chosen if c is not out], state.posterior)
-                for out in state.chosen[: len(state.chosen) - fresh]
-            ]
+            loose = state.chosen[: len(state.chosen) - fresh]
+            gone = [{c} for c in loose]
+            gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
+            shorter = [self.value([c for c in state.chosen if c not in out], state.posterior) for out in gone]
             best = max(shorter, key=lambda s: s.evidence)
             if best.evidence < state.evidence:
                 return state
-            (gone,) = set(state.keys) - best.keys
-            self.say(f"- {gone[0]} at {gone[1]}: {best.evidence - state.evidence:.0f} nats")
+            names = " and ".join(c.group.name for c in state.chosen if c not in best.chosen)
+            self.say(f"- {names}: {best.evidence - state.evidence:.0f} nats")
             state = best
         return state
 

@@ -13,7 +13,7 @@ class Settings:
         floor_rows: observations that the noise's floor counts (20: a band of 0.25 Hz in 40 s).
         spread_rows: observations that the nominal spread of a family of random effects counts.
         least_spread: least learnt variance of random effects over their nominal one.
-        most_spread: most of a law's errors (4: a fifth of its trace).
+        most_spread: most of a law's errors (1: a tenth of its trace).
         form_share: standard deviation of a law's error, of the law's own trace, in each of its forms.
         need_nats: log odds by which a set must be likelier to replace another (1: a factor of e).
         cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
@@ -28,7 +28,8 @@ class Settings:
         floor_change: relative change of its variances below which that has settled.
         rounds: times the problem is made linear again.
         event_steps: times the instants of an event are moved.
-        within_nats: linear gain below the best beyond which a rival is not weighed (15: 3e-7 of its odds).
+        apart: standard errors from which a member of a kind stands out.
+        within_nats: linear gain below that of a cause beyond which a rival is not weighed (15: 3e-7 of its odds).
         most_rivals: rivals that are weighed exactly.
         clean_chi2: squares left over the floor's variance, per row, up to which nothing is left to explain.
         least_floor: least noise variance over the power of the quietest band, where the sensors' noise is not known.
@@ -37,7 +38,7 @@ class Settings:
     floor_rows: float = 20.0
     spread_rows: float = 5.0
     least_spread: float = 1e-6
-    most_spread: float = 4.0
+    most_spread: float = 1.0
     form_share: float = 0.1
     need_nats: float = 1.0
     cause_nats: float = 3.0
@@ -52,6 +53,7 @@ class Settings:
     floor_change: float = 0.05
     rounds: int = 3
     event_steps: int = 4
+    apart: float = 3.0
     within_nats: float = 15.0
     most_rivals: int = 8
     clean_chi2: float = 1.5

@@ -74,7 +74,8 @@ class JointCause:
         shapes: numbers inside the columns that are tried.
         positive: parameters that, with the model's own, cannot be negative.
         kind: whether all joints may have it alike: a cause of the robot.
-        rubs: whether friction at rest has the first parameter in it.
+        loose: how far its law may be off, over what is usual; friction has no exact law.
+        rubs: of (first parameter, span), how much dry friction that is at rest; None: none.
         sentence: what it does, with its numbers and place; None for a list of the numbers.
         separate: the experiment that parts it from what looks like it.
     """
@@ -87,7 +88,8 @@ class JointCause:
     shapes: tuple[Shape, ...] = ({},)
     positive: tuple[str, ...] = ()
     kind: bool = False
-    rubs: bool = False
+    rubs: Callable[[float, Span], float] | None = None
+    loose: float = 1.0
     sentence: Callable[[Said], str] | None = None
     separate: str = ""
 
@@ -138,7 +140,8 @@ CAUSES = (
     JointCause(
         "friction", "friction in {joint}", ("coulomb_Nm", "viscous_Nms_per_rad"),
         lambda s, h: (s.direction, s.v), lambda z, h: (z.torque, z.torque / z.speed),
-        positive=("coulomb_Nm", "viscous_Nms_per_rad"), kind=True, rubs=True,
+        positive=("coulomb_Nm", "viscous_Nms_per_rad"), kind=True, rubs=lambda x, z: x,
+        loose=2.0,
         sentence=lambda n: (
             f"{n.place} rubs with {n('coulomb_Nm', 'N m')} {n.either('coulomb_Nm', 'more', 'less')} {n.than} (Coulomb) "
             f"and {n(VISCOUS, 'N m s/rad')} {n.either(VISCOUS, 'more', 'less')} (viscous)"
@@ -182,7 +185,8 @@ CAUSES = (
     JointCause(
         "stribeck", "Stribeck friction in {joint}", ("excess_Nm",),
         lambda s, h: (s.direction * np.exp(-np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
-        SPEEDS, rubs=True,
+        SPEEDS, rubs=lambda x, z: x,
+        loose=2.0,
         sentence=lambda n: (
             f"near standstill {n.place} rubs with {n('excess_Nm', 'N m')} {n.either('excess_Nm', 'more', 'less')} "
             f"than in fast motion{n.also(', fading over {}', 'fade_rad_per_s', 'rad/s')}"
@@ -192,6 +196,7 @@ CAUSES = (
     JointCause(
         "asymmetric_coulomb", "Coulomb friction in {joint} that differs by direction", ("asymmetry_Nm",),
         lambda s, h: (np.abs(s.direction),), lambda z, h: (z.torque,),
+        loose=2.0,
         sentence=lambda n: (
             f"dry friction of {n.place} is {n('asymmetry_Nm', 'N m')} "
             f"{n.either('asymmetry_Nm', 'larger', 'smaller')} forwards and as much "
@@ -202,6 +207,7 @@ CAUSES = (
     JointCause(
         "asymmetric_viscous", "viscous friction in {joint} that differs by direction", ("asymmetry_Nms_per_rad",),
         lambda s, h: (np.abs(s.v),), lambda z, h: (z.torque / z.speed,),
+        loose=2.0,
         sentence=lambda n: (
             f"viscous friction of {n.place} is {n(ASYMMETRY, 'N m s/rad')} {n.either(ASYMMETRY, 'larger', 'smaller')} "
             f"forwards and as much {n.either(ASYMMETRY, 'smaller', 'larger')} backwards"
@@ -212,6 +218,7 @@ CAUSES = (
         "sublinear_friction", "sublinear friction in {joint}", ("bend_Nm",),
         lambda s, h: (s.direction * np.log1p(np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
         SHARES,
+        loose=2.0,
         sentence=lambda n: (
             f"friction of {n.place} {n.either('bend_Nm', 'grows', 'falls')} by {n('bend_Nm', 'N m')} times the "
             f"logarithm of 1 + speed{n.also(' over {}', 'thins_rad_per_s', 'rad/s')}"
@@ -220,7 +227,8 @@ CAUSES = (
     ),
     JointCause(
         "load_friction", "friction by load in {joint}", ("share",),
-        lambda s, h: (s.direction * np.abs(s.load),), lambda z, h: (0.3,),
+        lambda s, h: (s.direction * np.abs(s.load),), lambda z, h: (0.3,), rubs=lambda x, z: x * z.torque,
+        loose=2.0,
         sentence=lambda n: (
             f"friction of {n.place} {n.either('share', 'grows', 'falls')} by {n('share', '%', 100.0)} of its load"
         ),
@@ -229,7 +237,8 @@ CAUSES = (
     JointCause(
         "warming", "fading friction in {joint}", ("more_Nm", "more_Nms_per_rad"),
         lambda s, h: (s.direction * _faded(s, h), s.v * _faded(s, h)), lambda z, h: (z.torque, z.torque / z.speed),
-        SHARES, rubs=True,
+        SHARES, rubs=lambda x, z: x,
+        loose=2.0,
         sentence=lambda n: (
             f"when a log begins {n.place} rubs with {n('more_Nm', 'N m')} {n.either('more_Nm', 'more', 'less')} "
             f"(Coulomb) and {n(WARM, 'N m s/rad')} {n.either(WARM, 'more', 'less')} (viscous) than later"

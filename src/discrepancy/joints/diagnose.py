@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -25,6 +25,8 @@ PLAIN = 3.0
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Columns around whose values the problem is made linear again."""
+CURVED = ("gravity_direction", "joint_zero", "link_length", "torque_delay")
+"""Causes that change torques as a curve: what else there is shows only around their values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +65,10 @@ class Until:
         self.broken = self.broken or time.monotonic() > self.end_s
         return self.broken
 
-    def run(self, search: Search, state: State) -> State:
+    def run(self, search: Search, state: State, early: Collection[str] = ()) -> State:
         """The likeliest set; the best so far where it is broken off."""
         try:
-            return search.run(state)
+            return search.run(state, early)
         except KeyboardInterrupt:
             self.broken = True
             return search.best or state
@@ -94,7 +96,8 @@ def diagnose(
     smooth, given = trials.runs, replace(given or Given(), noise=trials.noise)
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
-    first = Outcome(problem, search, until.run(search, search.fixed(())), finished=not until.broken)
+    early = CURVED if given.changed is None else ()
+    first = Outcome(problem, search, until.run(search, search.fixed(()), early), finished=not until.broken)
     if given.changed is not None or until():
         return first  # what is wrong in all logs has no values of its own to be linear around
     again = partial(_around, model=model, smooth=smooth, settings=settings, say=say, given=given, until=until)

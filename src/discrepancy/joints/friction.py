@@ -85,11 +85,12 @@ def bent(q: Array, bristle: float) -> Array:
 
 
 def smooth(s: JointSignals) -> list[Array]:
-    """Smooth functions of position, speed, direction and time, of about unit size, shape (W,) each."""
+    """Smooth functions of position, speed, load, time and direction, of about unit size, shape (W,) each."""
     q = 2.0 * (s.q - s.span.middle) / s.span.travel
     w = np.clip(np.log(np.abs(s.v) / s.span.speed + 1e-2), -4.0, 2.0) / 1.5 + 0.3
     t = 2.0 * s.t / s.span.until_s - 1.0
-    return [q, 1.5 * q**2 - 0.5, w, w**2 - 1.0, t, 1.5 * t**2 - 0.5, s.direction]
+    load = 0.5 * np.clip(s.asked / (np.sqrt(np.mean(s.asked**2)) + 1e-9), -3.0, 3.0)
+    return [q, 1.5 * q**2 - 0.5, w, w**2 - 1.0, t, 1.5 * t**2 - 0.5, load, 2.0 * load**2 - 0.5, s.direction]
 
 
 def other_forms(
@@ -110,7 +111,7 @@ def other_forms(
     for speed in (0.02, 0.06):  # reversals that are rounded
         yield [slow * coulomb * (np.tanh(s.v / (speed * s.span.speed)) - s.direction) for s in signals]
     yield [1e-3 * coulomb * np.gradient(s.direction, s.step_s) for s in signals]  # a millisecond
-    each = [smooth(s)[:-1] for s in signals]  # what differs by direction is a cause of its own
+    each = [smooth(s)[:-3] for s in signals]  # friction by load and by direction are causes of their own
     for i in range(len(each[0])):
         yield [
             0.5 * share * (coulomb * s.direction + viscous * s.v) * f[i]

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from discrepancy import rules
 from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.causes import WORDS
@@ -59,7 +58,7 @@ def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = 
     kinds, remains = ", ".join(entry["kind"] for entry in values["scatter"]), []
     if kinds and v.verdict != "miscalibrated":
         remains = [f"Besides, all places alike are off by more than their tolerances: {kinds}."]
-    if left > rules.CLEAN_CHI2_PER_N:
+    if left > SETTINGS.clean_chi2:
         where = values["residual"]["signature"]["sentence"].replace("The torque", "the torque").rstrip(".")
         more = f"A misfit of chi2/n {three_digits(left)} of {three_digits(modelled)} remains; {where}."
         remains = [more, *remains]
@@ -80,6 +79,8 @@ class _Told:
     def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
         """Cause and place, in words too."""
         title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
+        if "{pair}" in title and joint is not None and partner is None:
+            partner = joint - 1  # a drive is shared with the joint before
         where = self.where(cause, place, joint, partner)
         return {"cause": cause, "kind": titled(title), "name": titled(title, where), "family": cause, "robot": None,
                 "joint": joint, "place": where}  # fmt: skip
@@ -143,6 +144,8 @@ class _Told:
             text = cause.sentence(said)
         if cause and len(slides) > 1:
             text = f"{titled(cause.title, ALL)}: {text}"
+        if f.of:
+            text = f"{text} and goes with its {f.of}"
         trials = self.verdict.trials
         trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."

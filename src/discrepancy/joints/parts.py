@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -72,10 +72,12 @@ class Parts:
     @cached_property
     def prior(self) -> Array:
         """Variances of the columns, of causes so wide that they shrink nothing, shape (K,)."""
-        search, state = self.outcome.search, self.outcome.state
-        plain = [replace(c, scale=PLAIN) for c in state.chosen]
-        wide = search.prior(plain, state.posterior.mean)[: len(state.posterior.prior)]
-        return self._of(np.maximum(wide, state.posterior.prior))
+        state = self.outcome.state
+        wide = state.posterior.prior.copy()
+        for c in state.chosen:
+            k = list(c.group.columns)
+            wide[k] = np.maximum(wide[k], (PLAIN * np.array(c.group.slab)) ** 2)
+        return self._of(wide)
 
     def _of(self, x: Array) -> Array:
         return x[self.active]

@@ -120,13 +120,15 @@ class JointProblem:
         rubs = self.dry.copy()
         if values is not None:
             index = {name: j for j, name in enumerate(self.model.joints)}
-            named = {cause.name for cause in CAUSES if cause.rubs}
+            named = {cause.name: cause.rubs for cause in CAUSES}
             for c in chosen:
-                if c.group.cause in named:
+                dry = named.get(c.group.cause)
+                if dry is not None:
                     members = c.group.members or (c.group.columns,)
                     places = self.model.joints if c.group.members else (c.group.place,)
                     for place, member in zip(places, members, strict=True):
-                        rubs[index[place]] += values[member[0]]  # with its sign: terms share one torque
+                        j = index[place]  # with its sign: terms share one torque
+                        rubs[j] += dry(float(values[member[0]]), self.joints[j][0].span)
             for j, k in self.dry_in_all.items():
                 rubs[j] += values[k]
         for j, (columns, unit) in enumerate(self.resting):
@@ -214,11 +216,17 @@ class JointProblem:
             size = 10.0 * compliance * float(np.sqrt(np.mean(s.inverse[:, joint] ** 2)))
             for hz in SWAY_HZ:
                 for wave in (np.sin, np.cos):
-                    x = along(s, joint, size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S))[cut]
-                    empty = [np.zeros((c.stop - c.start, x.shape[1])) for c in self.cut]
-                    empty[t] = x
-                    out.append({c: [e[:, c] for e in empty] for c in range(x.shape[1]) if x[:, c].any()})
+                    way = [np.zeros(len(p.time)) for p in self.parts]
+                    way[t] = size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S)
+                    out.append(self._displaced(joint, way))
         return out
+
+    def _displaced(self, joint: int, way: Sequence[Array]) -> Series:
+        """Torques of a joint that is where the model does not have it, a series (W,) a log."""
+        moved = [along(s, joint, x)[c] for s, x, c in zip(self.parts, way, self.cut, strict=True)]
+        return {
+            c: [m[:, c] for m in moved] for c in range(len(self.joints)) if any(m[:, c].any() for m in moved)
+        }
 
     def _push(self, group: Group, force: Array, wave: int) -> Series:
         """Torques of a force during a push, ``wave`` half sines long."""
@@ -234,10 +242,14 @@ class JointProblem:
         return by
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """Traces of a cause times smooth functions; none of what inertia and geometry do."""
+        """Traces of a cause times smooth functions; an encoder's disc may be off its axis; inertia has no forms."""
         if group.event:
             force = 3.0 * values[list(group.columns)]
             return self.rows([self._push(group, force, wave) for wave in (2, 3, 4)])
+        if group.cause == "joint_zero":
+            joint, zero = self.model.joints.index(group.place), float(values[group.columns[0]])
+            turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]
+            return self.rows([self._displaced(joint, way) for way in turns])
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -245,15 +257,18 @@ class JointProblem:
         if group.cause == "elasticity":
             out = self._swaying(group, float(values[group.columns[0]]))
         members = group.members or (group.columns,)
+        loose = named[group.cause].loose if group.cause in named else 1.0
         for member in members:
             for c in {c for k in member for c in self.series[k]}:
                 signals = self.joints[c]
                 if group.cause == "friction":
                     coulomb, viscous = (abs(float(values[k])) for k in member)
-                    out += [{c: x} for x in friction.other_forms(signals, coulomb, viscous, 1.0, 3.0)]
+                    out += [
+                        {c: x} for x in friction.other_forms(signals, coulomb, viscous, loose, 3.0 * loose)
+                    ]
                     continue
                 trace = [
-                    sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
+                    loose * sum(values[k] * self.series[k][c][t] for k in member if c in self.series[k])
                     for t in range(len(signals))
                 ]
                 each = [friction.smooth(s) for s in signals]
@@ -622,9 +637,10 @@ class _Builder:
         self.group("gravity_compensation", "robot", [share], [0.5])
 
     def _link(self, body: int) -> None:
-        n, t, zero = self.model.model.body(body).name, self.tree, np.zeros((3, 3))
+        # Torques are linear in a link's inertial numbers: columns around the model's own are exact for its load.
+        n, t, zero = self.model.model.body(body).name, self.given, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
-        m, c = self.given.mass[body], t.com[body]
+        m, c = t.mass[body], t.com[body]
         loaded = body == self.tree.joint_body[self.tree.last_link] or body == self.tree.links[-1]
         family = f"load of {n}" if loaded else ""
 
@@ -633,25 +649,28 @@ class _Builder:
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
         mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
-        self.group("link_mass", n, [mass], [1.0], family=family)
+        half = -math.log(2.0)
+        self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):
             e = 1e-4 * np.eye(3)[k]
-            change = inertial_parameters(t.mass[body], c + e, zero) - inertial_parameters(
-                t.mass[body], c - e, zero
-            )
-            tolerance = INERTIA * max(abs(self.given.com[body][k]), LEAST_COM_M)
-            tolerance = self.sd("link_com", f"{'xyz'[k]}_m", tolerance)
+            change = inertial_parameters(m, c + e, zero) - inertial_parameters(m, c - e, zero)
+            tolerance = self.sd("link_com", f"{'xyz'[k]}_m", INERTIA * max(abs(c[k]), LEAST_COM_M))
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
-        inertia = column(
-            f"{n} inertia share",
-            self.sd("link_inertia", "share", INERTIA),
-            inertial_parameters(0.0, np.zeros(3), self.given.inertia[body]),
-        )
+        spread = self.sd("link_inertia", "share", INERTIA)
+        inertia = column(f"{n} inertia share", spread, inertial_parameters(0.0, np.zeros(3), t.inertia[body]))
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         whole = [mass, *coms, inertia]
-        self.group("link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], family=family, shape=(("whole", 1.0),))
+        self.group(
+            "link_mass",
+            n,
+            whole,
+            [1.0, 0.1, 0.1, 0.1, 2.0],
+            log_prior=half,
+            family=family,
+            shape=(("whole", 1.0),),
+        )
         if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from discrepancy import rules
 from discrepancy.causes.numbers import number
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.digits import three_digits
@@ -275,7 +274,8 @@ def _number(
 
 
 def _word(name: str) -> str:
-    return parameter(name)[0].replace("coulomb", "Coulomb")
+    word = parameter(name)[0].replace("coulomb", "Coulomb")
+    return word if word != "more" else "viscous" if "_per_" in name else "Coulomb"
 
 
 # --- the rest
@@ -284,52 +284,37 @@ def _word(name: str) -> str:
 def _rest(values: Values) -> Iterable[str]:
     for k, cause in enumerate(values["causes"], start=1):
         yield from ("", f"[[{cause['name'][:1].upper()}{cause['name'][1:]} ({cause['cause']})]]")
-        yield from wrapped(cause["sentence"])
-        yield from cause_lines(cause, further=k > 1)
-    if values["suspected"]:
-        yield from ("", "[[Suspected: too improbable to be named]]")
-        for entry in values["suspected"]:
-            chance = probability_words(entry["probability"])
-            yield from wrapped(
-                f"{label(entry)} ({entry['cause']}), probability {chance}: {entry['sentence']}"
-            )
-    yield from gain_lines(values)
-    yield from rollout_lines(values)
-    for title, entries in (
-        ("nothing found", values["evidence"]["before"]),
-        ("that", values["evidence"]["after"]),
-    ):
-        if entries := [entry for entry in entries or () if entry["nats"] >= LEAST_NATS]:
-            yield from ("", f"[[What one more cause would gain, with {title} in the model]]")
-            yield from wrapped(
-                ", ".join(f"{label(entry)} {entry['nats']:.0f} nats" for entry in entries) + "."
-            )
-    yield from ("", "[[Misfit]]", *wrapped(_misfit(values)))
-    for sentence in values["remains"]:
-        yield from wrapped(sentence)
+        yield from (*wrapped(cause["sentence"]), *cause_lines(cause, further=k > 1))
+    yield from _section("Suspected: too improbable to be named", map(_suspicion, values["suspected"]))
+    yield from (*gain_lines(values), *rollout_lines(values))
+    for which, what in (("before", "nothing found"), ("after", "that")):
+        offers = [entry for entry in values["evidence"][which] or () if entry["nats"] >= LEAST_NATS]
+        listed = ", ".join(f"{label(entry)} {entry['nats']:.0f} nats" for entry in offers)
+        title = f"What one more cause would gain, with {what} in the model"
+        yield from _section(title, [f"{listed}."] if listed else [])
+    yield from _section("Misfit", [_misfit(values), *values["remains"]])
     if values["detection_limits"]:
-        title = (
-            "would have been noticed"
-            if values["verdict"] in NOTHING_WRONG_HERE
-            else "would be noticed besides"
-        )
-        yield from ("", f"[[What {title}, nine times in ten]]", *limit_lines(values["detection_limits"]))
-    if values["undecidable"]:
-        yield from ("", "[[What such logs cannot decide]]")
-        for entry in values["undecidable"]:
-            yield from wrapped(f"{entry['what']}: {entry['why']}; needs {entry['remedy']}.")
-    if values["notes"]:
-        yield from ("", "[[Notes]]")
-        for note in values["notes"]:
-            yield from wrapped(note)
+        when = "have been noticed" if values["verdict"] in NOTHING_WRONG_HERE else "be noticed besides"
+        yield from ("", f"[[What would {when}, nine times in ten]]", *limit_lines(values["detection_limits"]))
+    open_ = (f"{entry['what']}: {entry['why']}; needs {entry['remedy']}." for entry in values["undecidable"])
+    yield from _section("What such logs cannot decide", open_)
+    yield from _section("Notes", values["notes"])
+
+
+def _section(title: str, texts: Iterable[str]) -> Iterable[str]:
+    lines = [line for text in texts for line in wrapped(text)]
+    return ["", f"[[{title}]]", *lines] if lines else []
+
+
+def _suspicion(entry: Values) -> str:
+    chance = probability_words(entry["probability"])
+    return f"{label(entry)} ({entry['cause']}), probability {chance}: {entry['sentence']}"
 
 
 def _misfit(values: Values) -> str:
     residual = values["residual"]
     text = f"chi2/n is {three_digits(residual['nominal']['chi2_per_n'])} as modelled, "
-    text += (
-        f"{three_digits(residual['chi2_per_n_tolerated'])} with everything a little off, within its tolerance"
-    )
+    text += f"{three_digits(residual['chi2_per_n_tolerated'])} with all a little off, within its tolerance"
     if values["causes"]:
         text += f", {three_digits(residual['chi2_per_n'])} with what is found"
-    return f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."
+    return f"{text} (up to {SETTINGS.clean_chi2:g} counts as clean)."

@@ -111,10 +111,8 @@ class _Judge:
     def verdict(self, notes: Sequence[str]) -> JointVerdict:
         kept, suspected = [], []
         for o in self.odds:
-            told = sum(p for g, p in self._ranked(o) if g is not None)
-            (kept if told >= NAMED else suspected).append(o)
-        findings = [f for o in kept for f in self._findings(o)]
-        findings = self._with_worth(findings, kept)
+            (kept if self._is_named(o) else suspected).append(o)
+        findings = self._with_worth(kept)
         scatter = self._scatter()
         chi2 = self._chi2()
         foretold = self._foretold([o.chosen for o in kept])
@@ -151,16 +149,23 @@ class _Judge:
     # --- causes
 
     @staticmethod
-    def _ranked(o: Odds) -> list[tuple[Group | None, float]]:
-        """What a cause may be, the likeliest first; None is nothing."""
-        return [(o.chosen.group, o.probability), *((r.group, r.probability) for r in o.rivals)]
+    def _is_named(o: Odds) -> bool:
+        """Whether something is there, and it may be the cause whose values were fitted, or is unlisted."""
+        nothing = sum(r.probability for r in o.rivals if r.group is None)
+        own = o.chosen.group
+        told = [g for g in o.told() if g]
+        kin = [g for g in told if g.key == own.key or (own.family and g.family == own.family)]
+        return nothing < 1.0 - NAMED and bool(kin or [g for g in told[:1] if g.cause == "unlisted"])
 
     def _joint(self, place: str) -> int | None:
         return self.model.joints.index(place) + 1 if place in self.model.joints else None
 
     def _findings(self, o: Odds, values: Posterior | None = None) -> list[Finding]:
         """One finding; members of a kind of which less than half are off are findings of their own."""
-        c = o.chosen.group
+        c, probability = o.chosen.group, o.probability
+        first = next((r for r in o.rivals if r.probability > o.probability), None)
+        if first and first.group and first.group.cause == "unlisted":  # what stands for it is not what it is
+            c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
         kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
@@ -175,7 +180,7 @@ class _Judge:
             place=c.place,
             joint=self._joint(c.place),
             members=() if unlisted else self._members(c, values or self.whole),
-            probability=o.probability + kin,
+            probability=probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,
             unlisted=open_,
@@ -186,10 +191,17 @@ class _Judge:
             rivals=rivals,
             told=tuple(g.key for g in o.told() if g),
         )
-        off = [m for m in plain.members if _is_off(m)]
-        if not c.members or 2 * len(off) >= len(plain.members) or not off:
+        off = [m for m, k in zip(plain.members, c.members, strict=False) if self._is_off(k)]
+        if not off or 2 * len(off) >= len(plain.members):
             return [plain]
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
+
+    def _is_off(self, columns: Sequence[int]) -> bool:
+        """Whether a value is beyond its standard error and a healthy robot's tolerance."""
+        at = self.parts.columns_of(list(columns))
+        usual = np.array([self.problem.tolerance[k] for k in columns])
+        size = np.sqrt(np.diag(self.whole.covariance)[at] + usual**2)
+        return bool(np.any(np.abs(self.whole.mean[at]) > SIGNIFICANT_SE * size))
 
     def _partner(self, group: Group) -> int | None:
         joint = self._joint(group.place)
@@ -225,8 +237,8 @@ class _Judge:
 
         They are alone, as in a simulation: tolerances and laws' errors do not take a share of what they do.
         """
-        named = [o for o in self.odds if sum(p for g, p in self._ranked(o) if g is not None) >= NAMED]
-        named = [o for o in named if not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
+        lasting = [o for o in self.odds if not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
+        named = [o for o in lasting if self._is_named(o)]
         prior = self._prior([o.chosen for o in named], tolerated=False)
         posterior = self.parts.posterior(self.parts.but(trial), prior)
         return tuple(f for o in named for f in self._findings(o, posterior))
@@ -248,7 +260,7 @@ class _Judge:
                 prior[self.parts.columns_of([k])] = nominal[k] if k < len(nominal) else 0.0
         return prior
 
-    def _with_worth(self, findings: list[Finding], kept: Sequence[Odds]) -> list[Finding]:
+    def _with_worth(self, kept: Sequence[Odds]) -> list[Finding]:
         """Findings with the shares of the misfit that they remove one after another, and nats by part."""
         steps = [self._prior([o.chosen for o in kept[:k]], tolerated=False) for k in range(len(kept) + 1)]
         whole = self.parts.but(None)
@@ -262,20 +274,13 @@ class _Judge:
             [[float(np.sum(s)) for _, s in self.parts.foretold(prior)] for prior in steps] if several else []
         )
         held = [sum(parts) for parts in each]
-        worth = {}
+        done = []
         for k, o in enumerate(kept):
             share = _share(left, k, float(np.sum(whole.rows)))
             lasts = several and not o.chosen.group.event
             out = _share(held, k, float(np.sum(whole.rows))) if lasts else None
             folds = tuple(0.5 * (a - b) for a, b in zip(each[k], each[k + 1], strict=True)) if lasts else ()
-            worth[o.chosen.group.key] = {"in_sample": share, "held_out": out, "folds": folds}
-        done = []
-        for f in findings:
-            key = next(
-                o.chosen.group.key for o in kept
-                if o.over_nothing == f.over_nothing and (o.chosen.group.place == f.place or o.chosen.group.members)
-            )  # fmt: skip
-            done.append(replace(f, **worth[key]))
+            done += [replace(f, in_sample=share, held_out=out, folds=folds) for f in self._findings(o)]
         return done
 
     def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
@@ -364,15 +369,15 @@ class _Judge:
             known = g.key in taken or (g.cause, "all joints") in taken
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
                 continue
-            k, se = list(g.columns), self.state.posterior.errors_of(g.columns)
-            sizes = need * se
-            value, _ = physical(self.problem, g, sizes, np.diag(sizes**2))
-            seen = sizes < 10.0 * np.array(g.slab)
-            if not any(seen):
+            se = self.state.posterior.errors_of(g.columns)
+            seen, sizes = need * se < 10.0 * np.array(g.slab), need * se
+            if g.cause == "payload":
+                told = {NAMES[g.cause][0]: float(sizes[0]) if seen[0] else None}
+            elif all(seen) or (any(seen) and g.cause != "gravity_direction"):
+                value, _ = physical(self.problem, g, np.where(seen, sizes, 0.0), np.diag(sizes**2))
+                told = {n: abs(x) if ok else None for (n, x), ok in zip(value.items(), seen, strict=True)}
+            else:
                 continue
-            sizes = np.where(seen, sizes, 0.0)
-            names = list(value)[: len(k)]
-            told = {n: abs(value[n]) if ok else None for n, ok in zip(names, seen, strict=True)}
             yield Limit(g.cause, g.place, self._joint(g.place), told)
 
     def _notes(self) -> Iterator[str]:
@@ -418,10 +423,6 @@ class _Judge:
                 )
             )
         return out
-
-
-def _is_off(member: Member) -> bool:
-    return any(abs(member.values[n]) > SIGNIFICANT_SE * member.errors[n] for n in member.values)
 
 
 def _share(left: Sequence[float], k: int, rows: float) -> float:

@@ -96,7 +96,8 @@ def diverged_sentences(rolled: Values) -> Iterable[str]:
             if h[which] is not None and max(h[which]["diverged"])
         ]
         if counts:
-            yield f"Of {words} diverged (in the worst joint) {', '.join(counts)}; they are not in its errors."
+            listed = ", ".join(counts)
+            yield f"Rollouts of {words} that diverged in the worst joint: {listed}; they are not in its errors."
 
 
 def shown_units(rolled: Values) -> dict[str, Shown]:
@@ -133,7 +134,7 @@ def _errors(rolled: Values, loop: Values) -> Iterable[str]:
     for which, words in (("before", "the given model"), ("after", "the extended model")):
         count = lost(loop["blocks"], which)
         if count:
-            yield f"Of {words} {count} of {len(loop['blocks'])} blocks diverged; they are in no error."
+            yield f"{count} of {len(loop['blocks'])} blocks of {words} diverged; they are in no error."
 
 
 def lost(runs: Sequence[Values], which: str) -> int:

@@ -46,5 +46,5 @@ def tidy(sentence: str, *, inside: bool = False) -> str:
     text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("+-(", f"{PLUS_MINUS}(")
     text = text.replace("chi2/n", "chi²/n")
     text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
-    text = re.sub(r"(?<=\d )u(?=m\b)", "µ", text).replace("rad^3", "rad³")
+    text = re.sub(r"(?<=\d )u(?=m\b)", "µ", text).replace("rad^3", "rad³").replace("m^2", "m²")
     return text if inside else text[:1].upper() + text[1:]

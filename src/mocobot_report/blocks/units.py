@@ -8,7 +8,9 @@ QUANTITIES = {
     "speed": "m/s", "velocity": "m/s", "position": "m", "acceleration": "m/s²", "load": "N m", "force": "N",
     "temperature": "°C",
 }  # fmt: skip
-"""Units of what a misfit may depend on, as the rigs document them."""
+"""Units of what a misfit of a team may depend on."""
+OF_JOINTS = {"speed": "typical speeds"}
+"""Those that differ for a robot of joints."""
 
 
 def short_names(names: list[str]) -> list[str]:

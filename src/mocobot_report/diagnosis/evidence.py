@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from discrepancy.causes.units import Shown
 from discrepancy.result.evidence_list import drawn, label, relation
 from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
+from discrepancy.result.read import is_of_joints
 from discrepancy.result.text_rollouts import blocks, diverged_sentences, lost, shown_units
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
@@ -21,7 +22,7 @@ from mocobot_report.blocks.numbers import NONE, percent, plain, spelled
 from mocobot_report.blocks.prose import paragraph, tidy, verdict
 from mocobot_report.blocks.series import Line, Panel, runs, stacked_chart, thinned, with_breaks
 from mocobot_report.blocks.tables import Entry, Num, table, value
-from mocobot_report.blocks.units import QUANTITIES, spelled_text
+from mocobot_report.blocks.units import OF_JOINTS, QUANTITIES, spelled_text
 from mocobot_report.diagnosis.keys import CLEAN, misfits
 from mocobot_report.folder import Diagnosed
 
@@ -53,7 +54,8 @@ def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
         tabs(book, "Trial", trials),
         _rms(traces, grouped, units, named=named),
     ]
-    against = _against(book, traces, grouped, misfits(named=named, lines=True))
+    units = QUANTITIES | (OF_JOINTS if is_of_joints(diagnosed.values) else {})
+    against = _against(book, traces, grouped, misfits(named=named, lines=True), units)
     return [
         section(book, "Residuals over time", over_time),
         section(book, "What the residual depends on", against),
@@ -169,12 +171,16 @@ def _roots(traces: Sequence[Trace], column: int) -> list[float]:
 
 
 def _against(
-    book: Book, traces: Sequence[Trace], grouped: Sequence[Group], keys: Sequence[Key]
+    book: Book,
+    traces: Sequence[Trace],
+    grouped: Sequence[Group],
+    keys: Sequence[Key],
+    units: Mapping[str, str],
 ) -> list[Node]:
     book.say("dependence of the residual")
     panels = []
     for quantity in [*traces[0].quantities, None]:
-        unit = QUANTITIES.get(quantity or "", "")
+        unit = units.get(quantity or "", "")
         label = "frequency [Hz]" if quantity is None else f"{quantity} [{unit}]" if unit else quantity
         charts = [_dependence(book, traces, group, quantity, label, keys) for group in grouped]
         shown = [shared_legend([*keys, CLEAN]), el("div", *charts, class_="trio")]

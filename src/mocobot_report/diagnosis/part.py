@@ -311,7 +311,7 @@ MEANING = {
     "consistent": "The simulation explains the recordings within noise and tolerances; nothing is named.",
     "miscalibrated": "All places of a kind are off by more than their tolerances, so none is named.",
     "explained": "The named causes explain what the simulation got wrong.",
-    "partly_explained": "The named causes are there, but more than noise is left.",
+    "partly_explained": "The named causes are there, but do not explain all.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
 

@@ -14,15 +14,7 @@ from discrepancy.evidence.search import Chosen
 from discrepancy.joints import causes, problem
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
 from discrepancy.joints.trials import trials_of
-from followed_arm import Change, arm_log, arm_model, rubs
-
-
-def both(*changes: Change) -> Change:
-    def change(spec: mujoco.MjSpec) -> None:
-        for one in changes:
-            one(spec)
-
-    return change
+from followed_arm import arm_log, arm_model, both, rubs
 
 
 def names(outcome: Outcome) -> set[tuple[str, str]]:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from discrepancy.serial.words import SerialWords
 
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import load_model
@@ -157,17 +156,6 @@ def test_no_file_and_no_model(tmp_path) -> None:
 def test_shipped_omnid_is_refused_for_its_closed_chains() -> None:
     with pytest.raises(InputError, match="3 equality constraints; a diagnosis of joint logs needs"):
         load_model(MODELS / "omnid" / "omnid.xml")
-
-
-def test_a_joint_that_slides_has_torques_in_newtons(tmp_path: Path) -> None:
-    path = tmp_path / "lift.xml"
-    path.write_text(
-        """<mujoco><worldbody><body><joint name="lift" type="slide"/><geom size="0.1"/>
-        <body pos="0.2 0 0"><joint name="turn"/><geom size="0.1"/></body></body></worldbody></mujoco>"""
-    )
-    words = SerialWords(load_model(path))
-    assert [words.unit(f"{name} torque") for name in ("lift", "turn")] == ["N", "N m"]
-    assert [words.unit(f"position of joint {j}") for j in (1, 2)] == ["m", "rad"]
 
 
 def test_a_fixed_link_of_a_urdf_without_an_inertial_has_no_mass(tmp_path: Path) -> None:

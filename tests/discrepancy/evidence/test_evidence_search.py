@@ -92,7 +92,7 @@ def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) ->
     machine = Machine(cells, [Group("cause", "joint", (0,), (3.0,))], others=forms)
     search = Search(machine, np.full((1, 3), 0.05**2))
     plain = search.value([Chosen(machine.groups[0], 1.0)], None)
-    state = search._settled(search.formed(plain))
+    state = search.settled(search.formed(plain))
     share = np.sqrt(state.posterior.prior[list(state.chosen[0].forms)])
     if other:
         assert share == pytest.approx(0.1, rel=0.6)

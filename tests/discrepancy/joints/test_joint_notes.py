@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from discrepancy.serial.diagnosis import notes_of, resting
+from discrepancy.joints.trials import notes_of, resting
 
 
 def log(name: str, *notes: str) -> SimpleNamespace:

@@ -119,6 +119,17 @@ def test_sentences(cause: str, slide: bool, numbers: dict[str, float], said: str
     assert sentence(Said(numbers, errors, "joint 4", slide)) == said
 
 
+def test_a_cause_without_a_sentence_lists_its_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = replace(
+        CAUSES[0], name="magnet", title="magnet at {joint}", parameters=("pull_Nm",), sentence=None
+    )
+    monkeypatch.setitem(WORDS, "magnet", bare)
+    (cause,) = values(tmp_path, [finding("magnet", member("turn", 1, pull_Nm=0.25))])["causes"]
+    assert cause["sentence"] == "Magnet at joint 1 (turn): pull_Nm 0.25."
+
+
 # --- JSON
 
 
@@ -193,6 +204,10 @@ def test_coupled_joints_and_places_of_links(tmp_path: Path) -> None:
     first, second = values(tmp_path, [pair, link])["causes"]
     assert first["place"] == "joints 1 and 2"
     assert "difference of joints 1 and 2" in first["sentence"]
+    offers = (Offer("coupled_drive", "joint2", 2, 20.0),)
+    assert (
+        values(tmp_path, before=offers)["evidence"]["before"][0]["name"] == "coupled drive of joints 1 and 2"
+    )
     assert (second["name"], second["joint"]) == ("mass of link base_link", None)
 
 
@@ -286,6 +301,8 @@ def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
     text = format_verdict(values(tmp_path, [some]))
     assert "by something unlisted at joint 1 (turn) by its position and direction." in first_part(text)
     assert "something unlisted by its" in table(text)[2]
+    (cause,) = values(tmp_path, [some])["causes"]
+    assert cause["sentence"].endswith("acts at joint 1 (turn) and goes with its position and direction.")
     assert " or " not in text.replace("or repair", "")
 
 
@@ -294,6 +311,13 @@ def test_units_of_a_kind_stand_once(tmp_path: Path) -> None:
     rows = table(format_verdict(values(tmp_path, [kind])))
     assert "delay [ms]" in rows[2]
     assert rows[3].split("  ")[-1].strip() == "8.00 +- 0.16"
+
+
+def test_two_kinds_of_fading_friction_are_told_apart(tmp_path: Path) -> None:
+    fading = finding("warming", member("lift", 3, more_N=2.0, more_Ns_per_m=0.5))
+    rows = table(format_verdict(values(tmp_path, [fading])))
+    assert "Coulomb 2.000 +- 0.040 N" in rows[2]
+    assert "viscous 0.500 +- 0.010 N s/m" in rows[3]
 
 
 def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
@@ -363,6 +387,7 @@ def test_the_folder_is_whole_and_read_by_all(
     assert run(capsys, "report", out)[0] == 0
     page = re.sub("<[^>]+>", "", (out / "report.html").read_text())
     assert "of a robot&#39;s joints" in page or "of a robot's joints" in page
+    assert "speed [typical\\u00a0speeds]" in page
     for cause in diagnosis.causes:
         assert cause.sentence.split(" +- ")[0].split(": ")[-1] in page
     code, said, _ = run(capsys, "compare", out, out)
