@@ -16,7 +16,7 @@ LOWER = {
     "mocobot_inspect": {"estimator", "mocobot_logs"},
     "mocobot_sim": {"estimator"},
     "discrepancy": {"estimator", "mocobot_logs", "mocobot_sim"},
-    "mocobot_view": {"estimator", "mocobot_sim", "discrepancy"},
+    "mocobot_view": {"estimator", "mocobot_logs", "mocobot_sim", "discrepancy"},
     "mocobot_report": {"estimator", "mocobot_sim", "discrepancy", "mocobot_view"},
     "mocobot": {
         "estimator", "mocobot_logs", "mocobot_inspect", "mocobot_sim", "discrepancy", "mocobot_view", "mocobot_report"

@@ -12,13 +12,13 @@ from source_tree import SRC, module_files
 
 CEILINGS = {
     "estimator": 7_060,
-    "mocobot_logs": 6_630,
+    "mocobot_logs": 6_830,
     "mocobot_inspect": 3_410,
-    "mocobot_sim": 6_640,
-    "discrepancy": 18_440,  # two engines until the small one (evidence, joints) takes the other's place
+    "mocobot_sim": 6_280,
+    "discrepancy": 16_000,  # two engines until the team is on the small one
     "mocobot_view": 2_200,
-    "mocobot_report": 3_530,
-    "mocobot": 4_860,
+    "mocobot_report": 3_570,
+    "mocobot": 4_800,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700
@@ -28,7 +28,6 @@ MOST_ARGUMENTS = 7
 LONG_CALLS = {
     "discrepancy.engine.diagnose.diagnose": 9,
     "discrepancy.inference.offer.propose.proposals": 8,
-    "discrepancy.serial.diagnosis.diagnose_serial": 10,
     "discrepancy.team.diagnosis.diagnose_team": 10,
     "discrepancy.team.laws.places._joint": 9,
     "discrepancy.team.rows._at": 9,
@@ -46,8 +45,8 @@ LONG_CALLS = {
     "mocobot.api.simulation._simulated": 14,
     "mocobot.api.simulation.simulate": 14,
     "mocobot.api.simulation.simulate_trials": 13,
-    "mocobot.serial.diagnose": 11,
-    "mocobot.serial.diagnosed": 10,
+    "mocobot.serial.diagnose": 9,
+    "mocobot.serial.diagnosed": 8,
     "mocobot_logs.convert.convert": 8,
     "mocobot_logs.convert.convert_parts": 8,
     "mocobot_logs.joints.drives._per_joint": 8,

@@ -13,8 +13,9 @@ import numpy as np
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import Given, JointProblem, joint_problem
+from discrepancy.joints.problem import JointProblem, joint_problem
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, trials_of
 from estimator.arrays import Array
@@ -100,7 +101,7 @@ def diagnose(
     first = Outcome(problem, search, until.run(search, search.fixed(()), early), finished=not until.broken)
     if given.changed is not None or until():
         return first  # what is wrong in all logs has no values of its own to be linear around
-    again = partial(_around, model=model, smooth=smooth, settings=settings, say=say, given=given, until=until)
+    again = partial(_around, smooth=smooth, given=given)
     around = again(first, floor=None)
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, until.run(around.search, around.state))
@@ -114,10 +115,7 @@ def diagnose(
     return replace(around, nothing=search, finished=not until.broken)
 
 
-def _around(
-    found: Outcome, *, model: SerialModel, smooth: Sequence[Signals], settings: Settings,
-    say: Callable[[str], object], given: Given | None, floor: Array | None, until: Until,
-) -> Outcome:  # fmt: skip
+def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: Array | None) -> Outcome:
     """The same set, linear around its own values; noise about a floor, or about one of its own."""
     x = found.state.posterior.mean
     values = {
@@ -125,10 +123,10 @@ def _around(
         for i, label in enumerate(found.problem.labels)
         if x[i] and any(word in f" {label}" for word in MOVED) and "{" not in label
     }
-    problem = joint_problem(model, smooth, values, given)
+    problem, before = joint_problem(found.problem.model, smooth, values, given), found.search
     if floor is None:
-        floor = floor_of(problem, problem.slabs(), settings)
-    search = Search(problem, floor, settings, say, until)
+        floor = floor_of(problem, problem.slabs(), before.settings)
+    search = replace(before, problem=problem, floor=floor, best=None)
     chosen = []
     for c in found.state.chosen:
         if c.group.event:

@@ -16,6 +16,7 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
+from discrepancy.joints.given import Given, horizontal, with_load
 from discrepancy.joints.mechanics.along import along
 from discrepancy.joints.mechanics.regressor import (
     body_regressor,
@@ -289,30 +290,6 @@ def joint_problem(
     return _Builder(model, list(smooth), values or {}, given or Given()).built()
 
 
-@dataclass(frozen=True)
-class Given:
-    """What a problem takes besides logs and values.
-
-    Attributes:
-        changed: signals in which causes act; those after them are a reference, in which the model may be wrong, too.
-            None: all.
-        joints: which have torques, from 0; None: all.
-        motors: joints whose torque per unit is fitted to the model.
-        back_emf: joints whose drives lose torque to the speed while they are on.
-        excluded: causes that are left out.
-        tolerances: standard deviations by cause and parameter in place of the usual ones.
-        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
-    """
-
-    changed: int | None = None
-    joints: tuple[int, ...] | None = None
-    motors: frozenset[int] = frozenset()
-    back_emf: frozenset[int] = frozenset()
-    excluded: frozenset[str] = frozenset()
-    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    noise: Sequence[Array] | None = None
-
-
 class _Builder:
     def __init__(self, model: SerialModel, smooth: list[Signals], values: Values, more: Given) -> None:
         self.model, self.values, self.names, self.more = model, values, model.joints, more
@@ -359,7 +336,7 @@ class _Builder:
             inertia[b] *= max(1.0 + v.get(f"{n} inertia share", 0.0), 0.05)
             load = [v.get(f"payload {n} {x}", 0.0) for x in MOMENTS]
             if any(load):
-                mass[b], com[b], inertia[b] = _with_load(float(mass[b]), com[b], inertia[b], np.array(load))
+                mass[b], com[b], inertia[b] = with_load(float(mass[b]), com[b], inertia[b], np.array(load))
         for j, n in enumerate(self.names):
             position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
         gravity = t.gravity.copy()
@@ -699,21 +676,3 @@ class _Builder:
             columns.append(self.add(f"{self.names[j]} turning {k}", 0.0, {j: common[k]}))
             unit.append(0.5)
         self.out.resting.append((columns, np.array(unit)))
-
-
-def horizontal(gravity: Array) -> Array:
-    """Two horizontal axes, shape (2, 3)."""
-    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
-
-
-def _with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
-    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
-    total = max(mass + float(load[0]), 0.05 * mass)
-    centre = (mass * com + load[1:4]) / total
-    xx, yy, zz, xy, xz, yz = load[4:]
-    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-    def about(c: Array) -> Array:
-        return c @ c * np.eye(3) - np.outer(c, c)
-
-    return total, centre, inertia + mass * about(com) + more - total * about(centre)

@@ -11,6 +11,7 @@ from typing import Any
 from discrepancy.causes.numbers import number
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.digits import three_digits
+from discrepancy.evidence.settings import SETTINGS
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import VERDICTS
 from discrepancy.result.remains import remedy

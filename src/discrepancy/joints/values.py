@@ -9,8 +9,9 @@ import numpy as np
 
 from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS
+from discrepancy.joints.given import horizontal
 from discrepancy.joints.mechanics.tree import Tree
-from discrepancy.joints.problem import JointProblem, horizontal
+from discrepancy.joints.problem import JointProblem
 from discrepancy.joints.said import parameter_name
 from estimator.arrays import Array
 

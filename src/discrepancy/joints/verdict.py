@@ -13,7 +13,7 @@ from discrepancy.causes.excluded import excluded_from
 from discrepancy.evidence.odds import Odds, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
-from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.diagnose import Outcome, Until, diagnose
 from discrepancy.joints.findings import (
     Event,
@@ -27,9 +27,9 @@ from discrepancy.joints.findings import (
     Scatter,
     Verdict,
 )
+from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.parts import Parts
-from discrepancy.joints.problem import Given
 from discrepancy.joints.servo.loop import loop_laws, sentences
 from discrepancy.joints.servo.motor import driven_by_voltage
 from discrepancy.joints.trials import Trials, notes_of, resting, trials_of
@@ -58,7 +58,6 @@ def judged(
     reference: Sequence[JointLog] = (),
     excluded: Sequence[str] = (),
     tolerances: Mapping[str, Mapping[str, float]] | None = None,
-    settings: Settings = SETTINGS,
     seconds: float | None = None,
     say: Say = lambda _: None,
 ) -> JointVerdict:
@@ -70,7 +69,6 @@ def judged(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         excluded: causes left out of the tables.
         tolerances: standard deviations by cause and parameter of a healthy robot in place of the usual ones.
-        settings: numbers of the engine.
         seconds: after which the search ends with what it has.
         say: takes a line about each step.
 
@@ -90,7 +88,7 @@ def judged(
         excluded_from(NAMES, excluded),
         tolerances or {},
     )
-    outcome = diagnose(model, trials, settings, say, given, until)
+    outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)

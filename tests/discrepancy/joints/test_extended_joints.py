@@ -21,10 +21,11 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.joints.effects import effects_of, write_extended
 from discrepancy.joints.findings import Event, Finding, Member
+from discrepancy.joints.given import Given
 from discrepancy.joints.mechanics.nominal import inverse_torque
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel, load_model
-from discrepancy.joints.problem import Given, JointProblem, joint_problem
+from discrepancy.joints.problem import JointProblem, joint_problem
 from discrepancy.joints.rolled.robot import LoggedTorques, Robot
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.values import absolute, physical
