@@ -21,6 +21,7 @@ from discrepancy.evidence.posterior import Posterior
 from discrepancy.joints import problem
 from discrepancy.joints.causes import Span
 from discrepancy.joints.diagnose import MOVED, PLAIN, Outcome, diagnose
+from discrepancy.joints.given import Given
 from discrepancy.joints.mechanics.regressor import body_regressor
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.signals import Signals
@@ -148,7 +149,7 @@ def left(outcome: Outcome, model: SerialModel, last: Signals) -> np.ndarray:
     values = {n: v for n, v in found.items() if any(word in f" {n}" for word in MOVED) and "{" not in n}
     Elsewhere.given_spans = [own[0].span for own in solved.joints]
     s = replace(last, typical=solved.parts[0].typical)
-    here = Elsewhere(model, [s], values, problem.Given()).built()
+    here = Elsewhere(model, [s], values, Given()).built()
     out = here.residual[0].copy()
     for label, by in zip(here.labels, here.series, strict=True):
         for j, own in by.items():

@@ -16,15 +16,14 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
-from discrepancy.serial.logs import parts_of
-from discrepancy.serial.rig import SerialRig
 from mujoco import sysid
 
-from discrepancy.joints.model import load_spec
+from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.signals import Signals
 from estimator.filtering import differentiate, low_pass
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.mjcf import SOLIMP, SOLREF
-from tx40 import TOP, read, shown
+from tx40 import TOP, pair, parts, read, shares, shown
 
 RATE_HZ, SERVO_HZ, SMOOTH_HZ = 2500.0, 40.0, 60.0
 """Of the simulation, its servo, and the low-pass of the log. An explicit integrator is stable at this rate; an implicit
@@ -151,28 +150,27 @@ def fitted(log: JointLog, *, masses: bool) -> tuple[dict[str, float], float, int
     )
 
 
-def left(whole: SerialRig, log: JointLog, value: dict[str, float]) -> np.ndarray:
-    """Rows of the last block that a fitted model leaves, by inverse dynamics as those of the diagnosis."""
+def left(model: SerialModel, log: JointLog, value: dict[str, float]) -> tuple[np.ndarray, Signals]:
+    """What a fitted model leaves of the last third, by inverse dynamics as those of the diagnosis, and that third."""
     spec = load_spec(TOP / "models" / "tx40" / "tx40.xml")
     put(spec, value)
-    parts, joints = parts_of(replace(whole.model, model=spec.compile()), [log])
-    rows = parts[0].reduction(parts[0].signals.residual)[-1][:, joints]
-    (coupled,) = (c for c in whole.candidates() if c.cause == "coupled_drive" and c.joint == 6)
-    numbers = [value[f"coupled_{name}"] for name in ("coulomb", "viscous", "armature")]
-    return whole.in_motion(rows - whole.physical(coupled)[-1] @ np.array(numbers), len(whole.trials) - 1)
+    _, s = parts(replace(model, model=spec.compile()), log)
+    joints = ([value[f"{name}_{j}"] for j in range(6)] for name in ("coulomb", "viscous"))
+    coulomb, viscous = map(np.array, joints)
+    rubs = coulomb * np.clip(s.dq / s.slow, -1.0, 1.0) + viscous * s.dq
+    numbers = np.array([value[f"coupled_{name}"] for name in ("coulomb", "viscous", "armature")])
+    return s.torque - s.inverse - rubs - pair(s, 5) @ numbers, s
 
 
 def main() -> None:
     """Print errors per joint, and times."""
     model, log = read()
-    whole = SerialRig.of(model, [log])
-    last, part = len(whole.trials) - 1, whole.parts[0]
-    torque = whole.in_motion(part.reduction(part.signals.torque)[last], last)
     print("Torque left unforetold in the last third, rms over that of the torque [%]")
     for masses in (False, True):
         value, spent, calls = fitted(log, masses=masses)
         named = f"mujoco.sysid, {len(value)} numbers"
-        print(f"  {named:<44}{shown(left(whole, log, value), torque)}  ({spent:.1f} s, {calls} simulations)")
+        share = shares(*left(model, log, value))
+        print(f"  {named:<44}{shown(share)}  ({spent:.1f} s, {calls} simulations)")
         print("    " + ", ".join(f"{name} {x:.3g}" for name, x in value.items()))
 
 

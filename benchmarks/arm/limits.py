@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from discrepancy.serial.logs import parts_of
-from discrepancy.serial.rig import SerialRig
 
 from arm import machine
 from arm.forms import Form
-from discrepancy.candidate import Candidate
-from discrepancy.rules import inference
+from discrepancy.evidence.cells import Cells
+from discrepancy.evidence.posterior import Posterior
+from discrepancy.evidence.search import Search, floor_of
+from discrepancy.joints.given import Given
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import JointProblem, joint_problem
+from discrepancy.joints.trials import trials_of
+from discrepancy.joints.verdict import NOTICED
 from mocobot_logs.joints.joint_log import JointLog
-
-GAIN = 38.0
-"""Of chi-square over noise and tolerances, at the detection limit: found nine times in ten (``mocobot.campaign``)."""
 
 
 def read(
@@ -80,66 +81,44 @@ class Shown:
     Attributes:
         rng: of the set, for a purpose.
         arm, motion: without errors, along the same reference.
-        rig: its log without noise, whitened as the healthy one's.
+        search: on the healthy arm's log.
+        ideal: the log without noise as a problem.
     """
 
     rng: Callable[[str], np.random.Generator]
     arm: machine.Healthy
     motion: machine.Motion
-    rig: SerialRig
+    search: Search
+    ideal: JointProblem
 
     @classmethod
-    def of(cls, rng: Callable[[str], np.random.Generator], healthy: SerialRig) -> Shown:
-        """From the rig of the healthy arm's log."""
+    def of(cls, rng: Callable[[str], np.random.Generator], model: SerialModel, healthy: JointLog) -> Shown:
+        """From the healthy arm's log."""
+        trials = trials_of(model, [healthy])
+        problem = joint_problem(model, trials.runs, None, Given(noise=trials.noise))
         arm = machine.healthy(rng("arm"), 0.0)
         motion = machine.moved(arm.spec, rng("motion"))
         ideal = machine.logged("ideal", motion.time, *read(arm, (), motion), None)
-        rig = SerialRig.of(healthy.model, [ideal])
-        return cls(
-            rng, arm, motion, replace(rig, whitening=healthy.whitening, spoilt=healthy.spoilt, _seen={})
-        )
+        search = Search(problem, floor_of(problem, problem.slabs()))
+        return cls(rng, arm, motion, search, joint_problem(model, trials_of(model, [ideal]).runs))
 
     def limit(self, form: Form) -> float:
-        """Size from which a form is found: what is not so far out of its tolerance is no fault."""
-        gain, tolerances = self.by(form)
-        return float(form.size * max(np.sqrt(GAIN / gain), inference.LEAST_SLAB / max(tolerances, 1e-9)))
+        """Size from which a form is noticed nine times in ten, as the diagnosis says it of its causes."""
+        need = np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats)) + NOTICED
+        return float(form.size * need / np.sqrt(self.by(form)))
 
-    def by(self, form: Form) -> tuple[float, float]:
-        """What a form leaves of chi-square beside everything within its tolerance, and its size in tolerances.
-
-        The latter is that of its cause's nearest values, in the nearest shape; infinite where that has no tolerance.
-        """
-        rig = self.rig
+    def by(self, form: Form) -> float:
+        """What a form leaves of chi-square beside everything within its tolerance."""
         changed = _with(form, self.arm, self.motion, self.rng("motion"))
-        parts, _ = parts_of(rig.model, [changed], rig.motors)
-        after = replace(rig, parts=parts, _seen={}, traces={}).physical_residual([])
-        change = [b - a for a, b in zip(rig.physical_residual([]), after, strict=True)]
-        d = self._white([rows[..., None] for rows in change])[:, 0]
-        within = [c for c in rig.candidates() if all(p.tolerance > 0 for p in c.parameters)]
-        X = np.concatenate([self._columns(c) for c in within], axis=1)
-        x = np.linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ d)
-        own = [c for c in within if (c.cause, c.joint) == (form.cause, form.joint)]
-        near = [self._nearest(shape, d) for c in own for shape in (c, *rig.refinements(c))]
-        return float(d @ d - d @ (X @ x)), min(near)[1] if near else np.inf
-
-    def _nearest(self, candidate: Candidate, d: np.ndarray) -> tuple[float, float]:
-        """What a cause leaves of an effect's rows, and its largest value in tolerances."""
-        X = self._columns(candidate)
-        x = np.linalg.lstsq(X, d, rcond=None)[0]
-        return float(np.sum((d - X @ x) ** 2)), float(np.abs(x).max())
-
-    def _columns(self, candidate: Candidate) -> np.ndarray:
-        """Of a cause, a tolerance each, shape (rows, k)."""
-        return self._white(self.rig.physical(candidate)) * [p.tolerance for p in candidate.parameters]
-
-    def _white(self, physical: Sequence[np.ndarray]) -> np.ndarray:
-        """Rows (n, C, k) of every block without what rest may hide, shape (rows, k)."""
-        out = []
-        for t, (white, rows) in enumerate(zip(self.rig.whitening, physical, strict=True)):
-            x = white(rows).reshape(-1, rows.shape[2])
-            own = self.rig.local_columns(t)
-            if own.size:
-                Q, _ = np.linalg.qr(own.reshape(len(x), -1))
-                x = x - Q @ (Q.T @ x)
-            out.append(x)
-        return np.concatenate(out)
+        runs, problem = trials_of(self.ideal.model, [changed]).runs, self.ideal
+        after = joint_problem(problem.model, runs).residual
+        change = [b - a for a, b in zip(problem.residual, after, strict=True)]
+        cells = Cells.of(problem.cells.bands, change)
+        cells.add(problem.rows(problem.series))
+        noise = self.search.fixed(()).posterior.variance
+        posterior = Posterior(cells, problem.prior((), None), noise)
+        out = 0.0
+        for channel, variance in zip(cells.channels, noise, strict=True):
+            fitted = channel.products @ posterior.mean[channel.columns]
+            out += float(np.sum((channel.squares - fitted) / variance))
+        return out

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from discrepancy.serial.rig import SerialRig
 
 from arm import machine
 from arm.forms import CAUSE_OF, MOST, NOT_FIRST, NOWHERE, TYPICAL, Form
@@ -93,8 +92,7 @@ def make(request: ArmSet, folder: Path) -> Made:
     motion = machine.moved(arm.spec, request.rng("motion"))
     q, torque = read(arm, (), motion)
     clean = machine.logged("clean", motion.time, q, torque, request.rng("noise"))
-    rig = SerialRig.of(machine.nominal(folder), [clean])
-    shown = Shown.of(request.rng, rig) if request.forms else None
+    shown = Shown.of(request.rng, machine.nominal(folder), clean) if request.forms else None
     sized, told = [], []
     sizes = request.rng("sizes")
     for k, form in enumerate(request.forms):

@@ -23,17 +23,16 @@ import numpy as np
 import tyro
 
 from arm import machine
-from arm.sets import ArmSet
+from arm.sets import ArmSet, Kind
 from arm.sets import make as make_arm
 from discrepancy.evidence.odds import odds_of
 from discrepancy.joints.diagnose import diagnose, labels_of
+from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
 from joints.foreign import make, thinned
 from mocobot_logs.joints.joint_log import JointLog
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
-KINDS = ("clean", "single", "clean", "single", "pairs")
-"""Kinds of successive sets of the panda."""
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
         "load_friction")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
@@ -49,6 +48,7 @@ class Options:
     Attributes:
         part: of the campaign.
         kind: of all sets of the panda; in turn where it is not given.
+        factor: size of the panda's effects over their limits.
         first: seed of the first set.
         draws: how many sets.
         out: where results go.
@@ -56,7 +56,8 @@ class Options:
     """
 
     part: Literal["panda", "bare", "shapes", "clean-shapes"] = "panda"
-    kind: Literal["clean", "single", "pairs", "triples"] | None = None
+    kind: Kind | None = None
+    factor: float = 4.0
     first: int = 0
     draws: int = 10
     out: Path = Path("out/joints")
@@ -91,17 +92,21 @@ def main(options: Options) -> None:
 
 
 def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
-    request = ArmSet.of(seed, options.kind or KINDS[seed % len(KINDS)], 4.0)  # type: ignore[arg-type]
+    request = ArmSet.of(seed, options.kind, options.factor)
     made, model = make_arm(request, options.out), machine.nominal(options.out)
     places = {"payload": model.bodies[-1], "push": "last link", "gravity_direction": "base"}
     faults = [e | {"place": places.get(e["cause"], f"joint{e['joint']}")} for e in made.truth["effects"]]
-    return model, [made.log], {"kind": request.kind, "faults": faults, "values": {}}
+    if request.kind in ("unlisted", "left-out"):
+        faults = [f | {"cause": "unlisted"} for f in faults]
+    truth = {"kind": request.kind, "faults": faults, "values": {}, "excluded": list(request.excluded)}
+    return model, [made.log], truth
 
 
 def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
     """Causes with all that is told of them, values, the search's steps, and what further causes would gain."""
     steps: list[str] = []
-    outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)))
+    given = Given(excluded=frozenset(truth.get("excluded", ())))
+    outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)), given=given)
     causes = []
     for o in odds_of(outcome.search, outcome.state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]

@@ -74,8 +74,8 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     merged: dict[tuple[str, str] | None, Rival] = {}
     for (_, group), p in zip(weighed, share[1:], strict=True):
         key = None if group is None else group.key
-        if key == own.group.key:
-            share[0] += p  # another shape of the same cause
+        if key == own.group.key or (group and own.group.columns in group.members):
+            share[0] += p  # another shape of the same cause, or all joints and this one among them
         elif key not in merged or merged[key].probability < p:
             merged[key] = Rival(group, float(p))
     rivals = sorted(merged.values(), key=lambda r: -r.probability)

@@ -190,7 +190,7 @@ class Search:
             state, before = settled, state
             if any(cause in early for cause, _ in state.keys - before.keys):
                 break
-        return self._pruned(state, fresh=False)
+        return self._pruned(self._named(state), fresh=False)
 
     def settled(self, state: State) -> State:
         """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
@@ -224,14 +224,23 @@ class Search:
                 cells.truncate(count)
         return None
 
+    def _named(self, state: State) -> State:
+        """The set with kinds of which few members stand out named by these, where it is not far less likely."""
+        for kind in [c for c in state.chosen if c.group.members]:
+            count = self.problem.cells.count
+            without = self.value([c for c in state.chosen if c is not kind], state.posterior)
+            parts = self._dissolved(state, without, kind.group)
+            if parts is not None and parts.evidence > state.evidence - self.settings.within_nats:
+                state = parts
+            else:
+                self.problem.cells.truncate(count)
+        return state
+
     def _dissolved(self, state: State, without: State, kind: Group) -> State | None:
-        """The set with a kind's members that stand out in its place; None of more than half of them."""
-        p = state.posterior
-        out = [
-            k
-            for k in kind.members
-            if np.any(p.mean[list(k)] ** 2 > self.settings.apart**2 * p.variances[list(k)])
-        ]
+        """The set with a kind's members beyond their tolerances in its place; None of more than half of them."""
+        p, healthy, far = state.posterior, self.problem.prior((), None), self.settings.apart**2
+        at = [np.array(k) for k in kind.members]
+        out = [tuple(k.tolist()) for k in at if np.any(p.mean[k] ** 2 > far * (p.variances[k] + healthy[k]))]
         if 2 * len(out) > len(kind.members):
             return None
         parts = without

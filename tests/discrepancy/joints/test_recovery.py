@@ -1,0 +1,132 @@
+"""Numbers that were changed in a simulation are named, with their values to a hundredth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from discrepancy.joints.findings import JointVerdict
+from discrepancy.joints.model import load_model
+from discrepancy.joints.verdict import judged
+from mocobot_logs.joints.joint_log import Drive, JointLog
+
+RATE_HZ, STEP_S, SECONDS, NOISE, STEP = 250.0, 1e-3, 16.0, 1e-3, 1e-7
+"""Of the logs: their rate, the simulation's step, noise of the torque over its size, and the encoder's step."""
+SPRING = """<mujoco><option timestep="0.001" gravity="0 0 0"/><worldbody><body name="weight">
+  <joint name="way" type="slide" axis="1 0 0" stiffness="10" damping="1"/>
+  <geom type="box" size="0.1 0.1 0.1" mass="0.5"/></body></worldbody></mujoco>"""
+CART = """<mujoco><option timestep="0.001"/><worldbody><body name="cart">
+  <joint name="rail" type="slide" axis="1 0 0" damping="2"/><geom type="box" size="0.2 0.1 0.1" mass="5"/>
+  <body name="pole" pos="0 0 0.1"><joint name="pin" axis="0 1 0" damping="0.05"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.6" size="0.02" mass="0.8"/></body></body></worldbody></mujoco>"""
+ARM = """<mujoco><compiler angle="radian"/><option timestep="0.001"/><worldbody>
+<body name="one" pos="0 0 0.1"><joint name="j1" axis="0 0 1" armature="0.05" damping="0.2"/>
+  <inertial pos="0.03 0 0.05" mass="2" diaginertia="0.01 0.01 0.005"/>
+<body name="two" pos="0 0 0.1"><joint name="j2" axis="0 1 0" armature="0.05" damping="0.2"/>
+  <inertial pos="0.1 0 0.02" mass="1.5" diaginertia="0.004 0.01 0.01"/>
+<body name="three" pos="0.25 0 0"><joint name="j3" axis="0 1 0" armature="0.02" damping="0.1"/>
+  <inertial pos="0.1 0 0" mass="0.8" diaginertia="0.002 0.006 0.006"/>
+</body></body></body></worldbody></mujoco>"""
+
+
+def log_of(spec: mujoco.MjSpec, seed: int, size: float = 0.8) -> JointLog:
+    """The joints of a model under computed torques along sums of sines, by the model itself."""
+    model, rng = spec.compile(), np.random.default_rng(seed)
+    data, J, t = mujoco.MjData(model), model.nv, STEP_S * np.arange(round(SECONDS / STEP_S))
+    w = 2.0 * np.pi * rng.uniform(0.1, 1.2, (4, J))
+    a, phase = rng.uniform(0.5, 1.0, (4, J)) / w, rng.uniform(0.0, 2.0 * np.pi, (4, J))
+    turn = np.exp(1j * (w * t[:, None, None] + phase)) * a * size / a.sum(axis=0)
+    x, x1, x2 = ((turn * (1j * w) ** n).imag.sum(axis=1) for n in range(3))
+    data.qpos[:], data.qvel[:] = x[0], x1[0] - 0.5 * STEP_S * x2[0]
+    inertia, log = np.zeros((J, J)), []
+    for k in range(len(t)):
+        mujoco.mj_step1(model, data)
+        mujoco.mj_fullM(model, data, inertia)
+        wanted = x2[k] + 40.0 * (x1[k] - data.qvel) + 400.0 * (x[k] - data.qpos)
+        data.qfrc_applied[:] = inertia @ wanted + data.qfrc_bias - data.qfrc_passive
+        log.append((data.qpos.copy(), data.qfrc_applied.copy()))
+        mujoco.mj_step2(model, data)
+    every = round(1.0 / RATE_HZ / STEP_S)
+    q, torque = (np.array(part)[::every] for part in zip(*log, strict=True))
+    q = np.round(q / STEP) * STEP
+    torque += NOISE * np.std(torque, axis=0) * rng.standard_normal(torque.shape)
+    none, one = np.full(J, np.nan), np.ones(J)
+    drive = Drive(
+        one, np.eye(J), one, np.zeros(J, dtype=bool), "none", none, none, "torque", np.full(J, np.inf)
+    )
+    names = tuple(model.joint(j).name for j in range(J))
+    return JointLog(
+        f"log {seed}", np.arange(len(q)) / RATE_HZ, RATE_HZ, q, torque, None, None, names, drive, np.full(J, STEP),
+        np.ones(len(q), dtype=bool), RATE_HZ,
+    )  # fmt: skip
+
+
+def verdict_on(folder: Path, xml: str, change: Callable[[mujoco.MjSpec], None]) -> JointVerdict:
+    """What two logs of a changed model say of the model as it is written."""
+    path = folder / "robot.xml"
+    path.write_text(xml, encoding="utf-8")
+    spec = mujoco.MjSpec.from_string(xml)
+    change(spec)
+    return judged(load_model(path), [log_of(spec, 1), log_of(spec, 2)])
+
+
+def numbers(verdict: JointVerdict) -> dict[tuple[str, str, str], float]:
+    """Values of all findings by cause, place and parameter."""
+    return {
+        (f.cause, m.place, n): x for f in verdict.findings for m in f.members for n, x in m.values.items()
+    }
+
+
+def geom_mass(place: int, mass: float) -> Callable[[mujoco.MjSpec], None]:
+    def change(spec: mujoco.MjSpec) -> None:
+        spec.geoms[place].mass = mass
+
+    return change
+
+
+def test_the_model_as_it_is(tmp_path: Path) -> None:
+    for xml in (SPRING, CART, ARM):
+        assert not verdict_on(tmp_path, xml, lambda spec: None).findings
+
+
+def test_mass_on_a_spring(tmp_path: Path) -> None:
+    """Twice the mass: of the link, or of a load on it, which one joint cannot tell apart."""
+    verdict = verdict_on(tmp_path, SPRING, geom_mass(0, 1.0))
+    (finding,) = verdict.findings
+    assert finding.cause in ("payload", "link_mass")
+    values = finding.members[0].values
+    assert values.get("mass_kg", values.get("excess_kg")) == pytest.approx(0.5, rel=0.01)
+    assert verdict.verdict == "explained"
+
+
+def test_spring_and_damper(tmp_path: Path) -> None:
+    def change(spec: mujoco.MjSpec) -> None:
+        spec.joints[0].stiffness, spec.joints[0].damping = [15.0, 0.0, 0.0], [2.5, 0.0, 0.0]
+
+    found = numbers(verdict_on(tmp_path, SPRING, change))
+    assert {cause for cause, _, _ in found} == {"spring", "friction"}
+    assert found["spring", "way", "stiffness_N_per_m"] == pytest.approx(5.0, rel=0.01)
+    assert found["friction", "way", "viscous_Ns_per_m"] == pytest.approx(1.5, rel=0.01)
+
+
+def test_cart_of_another_mass(tmp_path: Path) -> None:
+    found = numbers(verdict_on(tmp_path, CART, geom_mass(0, 8.0)))
+    assert set(found) == {("link_mass", "cart", "excess_kg")}
+    assert found["link_mass", "cart", "excess_kg"] == pytest.approx(3.0, rel=0.01)
+
+
+def test_rotors_of_an_arm(tmp_path: Path) -> None:
+    more = {"j1": 0.07, "j2": 0.04, "j3": 0.03}
+
+    def change(spec: mujoco.MjSpec) -> None:
+        for joint in spec.joints:
+            joint.armature += more[joint.name]
+
+    found = numbers(verdict_on(tmp_path, ARM, change))
+    assert set(found) == {("armature", name, "armature_kgm2") for name in more}
+    for name, value in more.items():
+        assert found["armature", name, "armature_kgm2"] == pytest.approx(value, rel=0.01)
