@@ -104,7 +104,7 @@ class Parts:
         for c in self.outcome.state.chosen:
             if c.group.event:
                 out[[*c.group.columns, *c.forms]] = True
-        return self._of(out)
+        return out[self.active]
 
     def foretold(self, prior: Array) -> list[tuple[Array, Array]]:
         """For each part, what the other parts leave of its torques: rows in time (n, C), and squares over the noise.
@@ -149,8 +149,8 @@ def _in_time(cells: Cells, active: NDArray[np.intp]) -> list[tuple[Array, Array]
         y[cells.order], X[cells.order] = channel.y, channel.X[:, keep]
         first = 0
         for (residual, columns), n in zip(out, counts, strict=True):
-            residual[:, c] = idct(y[first : first + n], norm="ortho")
-            columns[:, c, at] = idct(X[first : first + n], axis=0, norm="ortho")
+            residual[:, c] = np.asarray(idct(y[first : first + n], norm="ortho"))
+            columns[:, c, at] = np.asarray(idct(X[first : first + n], axis=0, norm="ortho"))
             first += n
     return out
 
@@ -159,7 +159,9 @@ def _cells(residual: Array, columns: Array, seen: Sequence[NDArray[np.intp]], ba
     """Gram matrices of one part's rows in time."""
     cells = Cells.of(bands, [residual])
     for c, channel in enumerate(cells.channels):
-        X = dct(columns[:, c, seen[c]], axis=0, norm="ortho")[: len(bands.of_trial(0))][cells.order]
+        X = np.asarray(dct(columns[:, c, seen[c]], axis=0, norm="ortho"))[: len(bands.of_trial(0))][
+            cells.order
+        ]
         channel.columns, channel.X = seen[c], X
         channel.grams = np.array([X[a:b].T @ X[a:b] for a, b in pairwise(channel.starts)])
         channel.products = np.array([X[a:b].T @ channel.y[a:b] for a, b in pairwise(channel.starts)])

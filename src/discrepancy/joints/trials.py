@@ -110,7 +110,7 @@ def _runs(s: Signals, joints: NDArray[np.intp]) -> list[slice]:
     """Stretches of usable samples without the ends that smoothing spoils, short gaps included."""
     bad = ~s.usable[:, joints].all(axis=1)
     edge = max(1, round(EDGE_S * s.rate_hz))
-    cuts = [-1, *np.flatnonzero(bad).tolist(), len(bad)]
+    cuts = [-1, *np.flatnonzero(bad).tolist(), len(s.usable)]
     runs: list[list[int]] = []
     for a, b in itertools.pairwise(cuts):
         if b - a > 1:

@@ -73,7 +73,7 @@ def axes_of_tilt(gravity: Array) -> Array:
     axis = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     first = axis - up * (axis @ up)
     first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(up, first)])
+    return np.asarray(np.stack([first, np.cross(up, first)]), dtype=float)
 
 
 def load_of(moments: Array) -> Array:
