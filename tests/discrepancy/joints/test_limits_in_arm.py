@@ -21,6 +21,5 @@ def test_a_tilt_shows_no_more_than_its_tolerance_costs(tmp_path):
     tilt = Form("tilt", CAUSE_OF["tilt"], None, TYPICAL["tilt"], 14133)
     tolerances = tilt.size / TILT_RAD
     gain = shown.by(tilt)
-    print(gain, tolerances**2)
     assert 0.8 * tolerances**2 < gain < 1.01 * tolerances**2
     assert shown.limit(tilt) > np.sqrt(2.0 * shown.search.against) * TILT_RAD
