@@ -111,6 +111,7 @@ class _Judge:
         for o in self.odds:
             (kept if self._is_named(o) else suspected).append(o)
         findings = self._with_worth(kept)
+        doubtful = [f for o in suspected for f in self._findings(o)]
         scatter = self._scatter()
         chi2 = self._chi2()
         foretold = self._foretold([o.chosen for o in kept])
@@ -123,9 +124,9 @@ class _Judge:
             trials=self.trials.names,
             motors=self.trials.motors,
             reference=self.trials.names[self._changed :],
-            verdict=self._word(findings, scatter, chi2),
+            verdict=self._word(findings, doubtful, scatter, chi2),
             findings=tuple(findings),
-            suspected=tuple(f for o in suspected for f in self._findings(o)),
+            suspected=tuple(doubtful),
             scatter=tuple(scatter),
             foretold=tuple(foretold),
             validated=len(self.parts.cells) > 1,
@@ -314,13 +315,17 @@ class _Judge:
         return out[0], out[1], out[2]
 
     def _word(
-        self, findings: Sequence[Finding], scatter: Sequence[Scatter], chi2: tuple[float, float, float]
+        self,
+        findings: Sequence[Finding],
+        doubtful: Sequence[Finding],
+        scatter: Sequence[Scatter],
+        chi2: tuple[float, float, float],
     ) -> Verdict:
         clean = chi2[2] <= self.search.settings.clean_chi2
         listed = [f for f in findings if f.cause != "unlisted"]
         if listed:
             return "explained" if clean and len(listed) == len(findings) else "partly_explained"
-        if findings or not clean:
+        if findings or not clean or any(f.nothing < 1.0 - NAMED for f in doubtful):
             return "unexplained"
         return "miscalibrated" if scatter else "consistent"
 
