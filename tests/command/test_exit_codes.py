@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,7 +11,6 @@ import pytest
 
 from command import run
 from estimator.recording.parquet import write_recording
-from mocobot.commands import diagnose
 from recordings import small_recording
 
 
@@ -49,8 +47,7 @@ def test_a_verdict(
             return "what was found"
 
     found = Found(diagnosis=SimpleNamespace(verdict=verdict), estimates=None)
-    rig = replace(diagnose.RIGS["team"], diagnose=lambda *_, **__: found)
-    monkeypatch.setitem(diagnose.RIGS, "team", rig)
+    monkeypatch.setattr("mocobot.commands.diagnose.diagnose_team", lambda *_, **__: found)
     assert run(capsys, "diagnose", brief) == (0, "what was found\n", "")
     said = f"mocobot: the verdict is {verdict.replace('_', ' ')}" if strict else ""
     assert run(capsys, "diagnose", brief, "--strict") == (strict, "what was found\n", said)

@@ -58,7 +58,7 @@ def _off(recordings, folder):
 @pytest.mark.slow
 def test_the_team_as_found_answers_as_the_recorded_one_did(recordings, tmp_path, monkeypatch):
     diagnosed = mocobot.diagnose(recordings)
-    diagnosis = diagnosed.diagnosis
+    diagnosis = diagnosed.found.diagnosis
     assert [found.candidate.cause for found in diagnosis.causes] == ["sea_bias"]
     assert diagnosis.gain.is_better_as_found
     for _ in range(2):  # it replaces what it wrote before
