@@ -80,7 +80,7 @@ def test_the_team_as_found_answers_as_the_recorded_one_did(recordings, tmp_path,
     def none(*_):
         raise InputError("no effect has such values")
 
-    monkeypatch.setattr(type(diagnosed.rig), "write_as_found", none)
+    monkeypatch.setattr(type(diagnosed.found.rig), "write_as_found", none)
     diagnosed.write(tmp_path / "other")
     assert not (tmp_path / "other" / "as_found").exists()
     assert load_extended(tmp_path / "other" / "extended").robots == 3
