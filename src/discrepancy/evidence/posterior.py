@@ -81,7 +81,7 @@ class Arrow:
         parts: list[NDArray[np.intp]],
         last: NDArray[np.intp],
     ) -> Arrow:
-        """Of the active columns of G and their scales."""
+        """Factor of I + s G s for the active columns and their scales s."""
 
         def block(i: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
             return s[i][:, None] * G[np.ix_(active[i], active[k])] * s[k]
@@ -120,7 +120,7 @@ class Arrow:
         return out
 
     def inverses(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
-        """Of each part and the last together: positions, and that block of the inverse."""
+        """Positions of each part with the last one, and that block of the inverse."""
         root = solve_triangular(self.own[-1], np.eye(len(self.last)), lower=True, check_finite=False)
         last = root.T @ root
         for p, L, B in zip(self.parts, self.own, self.beside, strict=False):

@@ -92,7 +92,7 @@ class Parts:
         return merged(others)
 
     def posterior(self, cells: Cells, prior: Array) -> Posterior:
-        """Of the columns, with the noise of the search."""
+        """Posterior of the columns, with the noise of the search."""
         return Posterior(cells, prior, self.outcome.state.posterior.variance)
 
     @cached_property

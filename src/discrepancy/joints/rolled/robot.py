@@ -19,7 +19,7 @@ from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.rollout import Drive, Start, rollout
 
 LONGEST_STEP_S = 1e-3
-"""Of MuJoCo's integration. Chosen: a twentieth of the shortest period that smoothing leaves."""
+"""Longest step of MuJoCo's integration [s]. Chosen: a twentieth of the shortest period that smoothing leaves."""
 KNOWN = ("torque_offset", "torque_scale", "torque_delay", "back_emf")
 """Causes that make a logged torque another than the joint has."""
 
@@ -46,7 +46,7 @@ class Readings:
 
     @classmethod
     def of(cls, effects: Sequence[RobotEffect], joints: int) -> Readings:
-        """Of causes in ``KNOWN``, joints counted from 1."""
+        """Readings from causes in ``KNOWN``, joints counted from 1."""
         out = cls(np.zeros(joints), np.ones(joints), *np.zeros((3, joints)))
         for effect in effects:
             assert effect.joint is not None
@@ -91,7 +91,7 @@ class LoggedTorques:
 
     @classmethod
     def of(cls, log: JointLog, readings: Readings) -> LoggedTorques:
-        """Of a log with torques."""
+        """Torques of a log that has them."""
         assert log.torque is not None
         on = np.ones(len(log.time)) if log.enabled is None else log.enabled.astype(float)
         torque = log.torque.copy()

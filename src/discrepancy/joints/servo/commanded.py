@@ -13,7 +13,7 @@ from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
 
 MOST_LOOP_SHARE = 0.1
-"""Of a duty's variance, that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
+"""Share of a duty's variance that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from estimator.statistics import measured
 from mocobot_logs.joints.joint_log import JointLog
 
 MOST_LOOP_SHARE = 0.1
-"""Of a duty's variance, that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
+"""Share of a duty's variance that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
 LATE_S = 1e-3
 """Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
 CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
-"""Of the largest duty, up to which the law of a loop is fitted; the share of the time in which that law asks for more
+"""Share of the largest duty up to which the law of a loop is fitted; the share of the time in which that law asks for more
 than the largest by as much, from which it is cut off; and samples left out around a large one. Chosen: resampling
 ripples for three samples on either side."""
 LOOP_STRETCH_S = 1.0
