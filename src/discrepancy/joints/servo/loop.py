@@ -17,9 +17,9 @@ MOST_LOOP_SHARE = 0.1
 LATE_S = 1e-3
 """Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
 CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
-"""Share of the largest duty up to which the law of a loop is fitted; the share of the time in which that law asks for more
-than the largest by as much, from which it is cut off; and samples left out around a large one. Chosen: resampling
-ripples for three samples on either side."""
+"""Share of the largest duty up to which the law of a loop is fitted; the share of the time in which that law asks for
+more than the largest by as much, from which it is cut off; and samples left out around a large one. Chosen:
+resampling ripples for three samples on either side."""
 LOOP_STRETCH_S = 1.0
 """Stretches whose scatter gives a loop's standard errors. Chosen: longer than any loop remembers."""
 LEAST_ROWS = 40
