@@ -21,8 +21,8 @@ MOTOR_SHARE, MOVES_THROUGHOUT = 0.5, 0.98
 """Cut-off of the fit of what a volt is worth, over the rows', and the share of its filter's window in which the joint
 moves. Chosen: noise of accelerations would make the torque look smaller than it is."""
 LEAST_DRIVEN_SHARE = 0.1
-"""Least share of the square of what a drive was given that the model's torque accounts for. Chosen: nobody can tell what
-a volt is worth at a joint that only rubs."""
+"""Least share of the square of what a drive was given that the model's torque accounts for. Chosen: nobody can tell
+what a volt is worth at a joint that only rubs."""
 
 
 @dataclass(frozen=True)
