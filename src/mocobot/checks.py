@@ -139,6 +139,7 @@ def check_calibrate(options: opt.Calibrate) -> None:
 
 
 TRUTH = "the truth beside a simulated recording"
+LONGEST_S = 1e6
 
 
 def check_diagnose(options: opt.Diagnose) -> None:
@@ -153,6 +154,8 @@ def check_diagnose(options: opt.Diagnose) -> None:
         return
     if options.reference:
         raise InputError("--reference goes with --model: a healthy log of the same robot")
+    if options.seconds is not None:
+        raise InputError("--seconds goes with --model; the diagnosis of a team runs to its end")
     if options.out is not None:
         inputs = [*options.rec, *_given(options.tolerances), *map_file(options.map)]
         inputs += calibration_file(options.calibration)
@@ -167,6 +170,12 @@ def check_diagnose(options: opt.Diagnose) -> None:
 def _check_joints(options: opt.Diagnose, model: Path) -> None:
     """What can be refused of logs of one robot's joints, but for maps that nobody named."""
     check_no_team(options, ("calibration", "scheduler"))
+    plain = opt.Diagnose(options.rec)
+    for name in ("laws", "odds", "whole"):
+        if getattr(options, name) != getattr(plain, name):
+            raise InputError(f"--{name} is of a team's robots; with --model there is none")
+    if options.seconds is not None and not 0.0 < options.seconds <= LONGEST_S:
+        raise InputError(f"--seconds is {options.seconds:g}; it must be above 0 and at most {LONGEST_S:g} s")
     logs = [*options.rec, *options.reference]
     check_recordings(logs)
     if options.out is not None:

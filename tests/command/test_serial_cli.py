@@ -109,6 +109,13 @@ REFUSED = {
     "calibration": (
         ["diagnose", "{log}", "--model", "{model}", "--calibration", "c.json"], "--calibration is of a team's", []
     ),
+    "laws": (["diagnose", "{log}", "--model", "{model}", "--laws", "always"], "--laws is of a team's robots", []),
+    "odds": (["diagnose", "{log}", "--model", "{model}", "--odds", "0.7"], "--odds is of a team's robots", []),
+    "whole": (["diagnose", "{log}", "--model", "{model}", "--whole"], "--whole is of a team's robots", []),
+    "no time": (
+        ["diagnose", "{log}", "--model", "{model}", "--seconds", "0"], "--seconds is 0; it must be above 0", []
+    ),
+    "time of a team": (["diagnose", "{log}", "--seconds", "5"], "--seconds goes with --model", []),
     "jobs": (["diagnose", "{log}", "--model", "{model}", "--jobs", "0"], "jobs is 0; it must be at least 1", []),
     "output over the model": (["inspect", "{log}", "--model", "{model}", "--json", "{model}"], "is an input", []),
     "design": (["inspect", "{log}", "--model", "{model}", "--design", "d.toml"], "--design is of a team's robots", []),
