@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -105,6 +105,17 @@ class Cells:
             channels.append(Channel(y, starts, none, X, grams, products, squares))
         return cls(bands, channels, 0, order)
 
+    def around(self, residual: Sequence[Array], x: Array) -> Cells:
+        """The same columns where a residual is left at values x, shape (K,): rows are what is left with all at zero."""
+        channels = []
+        for c, old in enumerate(self.channels):
+            y = self.bands.spectrum([r[:, c] for r in residual])[self.order] + old.X @ x[old.columns]
+            parts = list(pairwise(old.starts))
+            products = np.array([old.X[a:b].T @ y[a:b] for a, b in parts])
+            squares = np.array([y[a:b] @ y[a:b] for a, b in parts])
+            channels.append(replace(old, y=y, products=products, squares=squares))
+        return replace(self, channels=channels)
+
     @property
     def rows(self) -> NDArray[np.intp]:
         """Number of rows by channel and band, shape (C, bands)."""
@@ -120,6 +131,16 @@ class Cells:
         for c, found in seen.items():
             self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
         self.count += len(series)
+        return list(range(first, self.count))
+
+    def add_rows(self, X: Array) -> list[int]:
+        """Append columns given by their rows in each channel, in the order of the cells, shape (C, n, k)."""
+        first = self.count
+        for channel, own in zip(self.channels, X, strict=True):
+            seen = np.flatnonzero(own.any(axis=0))
+            if len(seen):
+                self._append(channel, (first + seen).tolist(), own[:, seen])
+        self.count += X.shape[2]
         return list(range(first, self.count))
 
     @staticmethod

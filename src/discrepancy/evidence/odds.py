@@ -64,8 +64,7 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     weighed: list[tuple[float, Group | None]] = [(without.evidence, None)]
     for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
-        kept = [c for c in rest if not (chosen.group.members and c.group.cause == chosen.group.cause)]
-        rival = search.settled(search.formed(search.value((*kept, chosen), without.posterior)))
+        rival = search.settled(search.formed(search.with_one(rest, chosen, without.posterior)))
         weighed.append((rival.evidence, chosen.group))
         cells.truncate(count)
     logs = np.array([state.evidence, *(w[0] for w in weighed)])

@@ -50,6 +50,11 @@ class Group:
         return self.cause, self.place
 
     @property
+    def identity(self) -> tuple[str, str, tuple[tuple[str, float], ...]]:
+        """Cause, place and shape."""
+        return self.cause, self.place, self.shape
+
+    @property
     def name(self) -> str:
         """Cause, place and shape in words."""
         shape = ", ".join(f"{k} {v:g}" for k, v in self.shape)

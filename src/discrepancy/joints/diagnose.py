@@ -130,8 +130,7 @@ def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: A
     chosen = []
     for c in found.state.chosen:
         if c.group.event:
-            group, series = problem.event(c.group)
-            chosen.append(Chosen(replace(group, columns=tuple(problem.cells.add(series))), c.scale))
+            chosen.append(Chosen(problem.place(c.group), c.scale))
         else:
             chosen += [
                 Chosen(g, c.scale)

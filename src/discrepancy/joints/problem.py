@@ -151,7 +151,7 @@ class JointProblem:
             )
         return S
 
-    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+    def proposals(self, posterior: Posterior) -> list[Group]:
         """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
@@ -175,7 +175,7 @@ class JointProblem:
                 best = int(np.argmax(gain))
                 found.append((float(gain[best]), t, best, n))
         return [
-            self.event(self._window(t, first, n, -math.log(windows)))
+            self._window(t, first, n, -math.log(windows))
             for _, t, first, n in sorted(found, reverse=True)[:EVENTS]
         ]
 
@@ -185,12 +185,15 @@ class JointProblem:
         place = f"last link from {first / rate:.1f} s of log {trial + 1}"
         return Group("push", place, (), (PUSH_N,) * 3, log_prior, shape, event=True)
 
-    def event(self, group: Group) -> tuple[Group, list[Series]]:
+    def place(self, group: Group) -> Group:
         """A push with its columns: force along the world's axes, half a sine long."""
-        return group, self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)])
+        columns = self.cells.add(self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)]))
+        return replace(group, columns=tuple(columns))
 
-    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
         """The same push a little earlier, later, shorter and longer."""
+        if not group.event:
+            return []
         shape = dict(group.shape)
         trial = int(shape["trial"])
         rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
@@ -207,7 +210,7 @@ class JointProblem:
             length = round(stretch * n)
             first = round(middle + shift * n - 0.5 * length)
             if length > 2 and first >= BEGIN_S * rate and first + length <= most:
-                out.append(self.event(self._window(trial, first, length, group.log_prior)))
+                out.append(self._window(trial, first, length, group.log_prior))
         return out
 
     def _swaying(self, group: Group, compliance: float) -> list[Series]:
