@@ -88,6 +88,7 @@ class Cells:
     channels: list[Channel]
     count: int = 0
     order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    _last: tuple[NDArray[np.intp], Cells] | None = None
 
     @classmethod
     def of(cls, bands: Bands, residual: Sequence[Array]) -> Cells:
@@ -112,7 +113,7 @@ class Cells:
 
     def add(self, series: Sequence[Series]) -> list[int]:
         """Append columns; their indices."""
-        first = self.count
+        first, self._last = self.count, None
         seen: dict[int, list[tuple[int, Array]]] = {}
         for k, one in enumerate(series):
             for c, x in one.items():
@@ -138,11 +139,26 @@ class Cells:
 
     def truncate(self, count: int) -> None:
         """Remove all columns from an index on."""
+        self._last = None
         for channel in self.channels:
             keep = int(np.sum(channel.columns < count))
             channel.columns, channel.X = channel.columns[:keep], channel.X[:, :keep]
             channel.grams, channel.products = channel.grams[:, :keep, :keep], channel.products[:, :keep]
         self.count = count
+
+    def only(self, at: NDArray[np.intp]) -> Cells:
+        """The rows with some columns, numbered anew: their Gram matrices only. The last ones are remembered."""
+        if self._last is None or not np.array_equal(self._last[0], at):
+            place, channels, none = np.full(self.count, -1), [], np.zeros((0, 0))
+            place[at] = np.arange(len(at))
+            for c in self.channels:
+                seen = np.flatnonzero(place[c.columns] >= 0)
+                grams, products = c.grams.take(seen, 1).take(seen, 2), c.products[:, seen]
+                channels.append(
+                    Channel(c.y, c.starts, place[c.columns[seen]], none, grams, products, c.squares)
+                )
+            self._last = at, Cells(self.bands, channels, len(at))
+        return self._last[1]
 
     def weighted_residual(self, x: Array, variance: Array) -> list[Array]:
         """Time series of W (y - X x), one array (W, C) a trial: its product with a column is that column's score."""
