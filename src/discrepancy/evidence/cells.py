@@ -25,12 +25,18 @@ class Bands:
         lengths: samples of each trial.
         edges_hz: K + 1 increasing edges of K bands.
         fade_s: series rise from zero and fall to it for so long: a cut leaks noise from above the bands.
+        kept: weight of each sample, shape (W, C) a trial; empty: all are rows.
     """
 
     rates_hz: Sequence[float]
     lengths: Sequence[int]
     edges_hz: Array
     fade_s: float = 0.0
+    kept: Sequence[Array] = ()
+
+    def share(self, channel: int) -> float:
+        """Of a channel's rows that the samples kept are worth."""
+        return float(np.mean(np.concatenate([w[:, channel] for w in self.kept]) ** 2)) if self.kept else 1.0
 
     def faded(self, x: Array, trial: int) -> Array:
         """A series of a trial that rises from zero at its first sample and falls to it at its last."""
@@ -44,11 +50,12 @@ class Bands:
         count = int(np.searchsorted(frequency, self.edges_hz[-1]))
         return np.searchsorted(self.edges_hz, frequency[:count], side="right") - 1
 
-    def spectrum(self, series: Sequence[Array]) -> Array:
-        """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n, ...)."""
+    def spectrum(self, series: Sequence[Array], channel: int) -> Array:
+        """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n,)."""
         out = []
         for t, x in enumerate(series):
-            out.append(dct(self.faded(x, t), axis=0, norm="ortho")[: len(self.of_trial(t))])
+            own = x * self.kept[t][:, channel] if self.kept else x
+            out.append(dct(self.faded(own, t), norm="ortho")[: len(self.of_trial(t))])
         return np.concatenate(out)
 
 
@@ -100,16 +107,16 @@ class Cells:
         none = np.zeros(0, dtype=np.intp)
         channels = []
         for c in range(residual[0].shape[1]):
-            y = bands.spectrum([r[:, c] for r in residual])[order]
+            y = bands.spectrum([r[:, c] for r in residual], c)[order]
             squares = np.array([y[a:b] @ y[a:b] for a, b in pairwise(starts)])
             X, grams, products = np.zeros((len(y), 0)), np.zeros((number, 0, 0)), np.zeros((number, 0))
             channels.append(Channel(y, starts, none, X, grams, products, squares))
         return cls(bands, channels, 0, order)
 
     @property
-    def rows(self) -> NDArray[np.intp]:
-        """Number of rows by channel and band, shape (C, bands)."""
-        return np.array([np.diff(c.starts) for c in self.channels])
+    def rows(self) -> Array:
+        """Number of rows by channel and band, shape (C, bands); less where samples are left out."""
+        return np.array([np.diff(c.starts) * self.bands.share(i) for i, c in enumerate(self.channels)])
 
     def add(self, series: Sequence[Series]) -> list[int]:
         """Append columns; their indices."""
@@ -117,7 +124,7 @@ class Cells:
         seen: dict[int, list[tuple[int, Array]]] = {}
         for k, one in enumerate(series):
             for c, x in one.items():
-                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x)[self.order]))
+                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x, c)[self.order]))
         for c, found in seen.items():
             self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
         self.count += len(series)
@@ -173,7 +180,8 @@ class Cells:
             n = len(self.bands.of_trial(t))
             wide = np.zeros((length, len(spectra)))
             wide[:n] = np.column_stack([rows[first : first + n] for rows in spectra])
-            out.append(self.bands.faded(np.asarray(idct(wide, axis=0, norm="ortho")), t))
+            own = self.bands.faded(np.asarray(idct(wide, axis=0, norm="ortho")), t)
+            out.append(own * self.bands.kept[t] if self.bands.kept else own)
             first += n
         return out
 

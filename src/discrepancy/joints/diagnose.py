@@ -94,7 +94,7 @@ def diagnose(
     """
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
-    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise)
+    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
     early = CURVED if given.changed is None else ()

@@ -314,9 +314,10 @@ class _Builder:
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
         top *= MOTOR_SHARE if more.motors else 1.0
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
-        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S)
         self.residual = residual
         known = range(self.J) if more.joints is None else more.joints
+        kept = [w[:, list(known)] for w in more.kept]
+        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S, kept)
         self.channel = {j: c for c, j in enumerate(known)}
         self.out = JointProblem(
             model, self.parts, self.cut, self._cells(residual), joints=self.joints, channel=self.channel
@@ -465,8 +466,9 @@ class _Builder:
         band = np.concatenate([self.bands.of_trial(t) for t in range(len(noise))])
         rows = np.bincount(band, minlength=len(self.bands.edges_hz) - 1)
         power = [
-            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise]) ** 2, len(rows))
-            for j in self.channel
+            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise], c) ** 2, len(rows))
+            / self.bands.share(c)
+            for j, c in self.channel.items()
         ]
         return np.array(power) / np.maximum(rows, 1)
 

@@ -32,7 +32,7 @@ from discrepancy.joints.model import SerialModel
 from discrepancy.joints.parts import Parts
 from discrepancy.joints.servo.loop import loop_laws, sentences
 from discrepancy.joints.servo.motor import driven_by_voltage
-from discrepancy.joints.trials import Trials, notes_of, resting, trials_of
+from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
 from discrepancy.joints.unlisted import SIGNALS
 from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
@@ -134,7 +134,7 @@ class _Judge:
             before=tuple(self._offers(plain, nothing)),
             after=tuple(self._offers(self.search, self.state)),
             limits=tuple(self._limits()),
-            notes=(*notes, *resting(logs), *self._notes()),
+            notes=(*notes, *at_limits(self.model, self.trials.limited), *resting(logs), *self._notes()),
             finished=self.outcome.finished,
             by_the_others=self.by_the_others,
             traces=self.traces,

@@ -130,3 +130,20 @@ def test_rotors_of_an_arm(tmp_path: Path) -> None:
     assert set(found) == {("armature", name, "armature_kgm2") for name in more}
     for name, value in more.items():
         assert found["armature", name, "armature_kgm2"] == pytest.approx(value, rel=0.01)
+
+
+def test_a_joint_at_its_limits_is_no_cause(tmp_path: Path) -> None:
+    """What pushes a joint back is left out with its time told; what else is wrong is found as before."""
+    limited = ARM.replace('name="j2"', 'name="j2" range="-0.3 0.35"').replace(
+        'name="j3"', 'name="j3" range="-0.4 0.4"'
+    )
+    verdict = verdict_on(tmp_path, limited, lambda spec: None)
+    assert verdict.verdict == "consistent"
+    assert [note for note in verdict.notes if "s of j2 at its limits" in note]
+
+    def change(spec: mujoco.MjSpec) -> None:
+        spec.joints[1].armature += 0.04
+
+    found = numbers(verdict_on(tmp_path, limited, change))
+    assert set(found) == {("armature", "j2", "armature_kgm2")}
+    assert found["armature", "j2", "armature_kgm2"] == pytest.approx(0.04, rel=0.01)
