@@ -212,9 +212,7 @@ class Search:
                 return parts
             cells.truncate(count)
             rivals = [c for c in self.rivals(without, out.group) if out.group.late or not c.group.late]
-            for chosen in rivals[
-                : self.settings.tried
-            ]:  # no table's law stands for what a listed cause may be
+            for chosen in rivals[: self.settings.tried]:
                 count, kind = cells.count, chosen.group.cause if chosen.group.members else None
                 kept = [c for c in rest if c.group.cause != kind]
                 other = self.formed(self.value((*kept, chosen), without.posterior))
@@ -359,6 +357,8 @@ class Search:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
             loose = state.chosen[: len(state.chosen) - fresh]
+            if any(c.group.late for c in state.chosen):  # a law of no table stands for no listed cause
+                loose = tuple(c for c in loose if c.group.late)
             gone = [{c} for c in loose]
             gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
             gone = [out for out in gone if self._worth(state, out) < self.settings.within_nats]

@@ -621,7 +621,7 @@ class _Builder:
         self.group("gravity_compensation", "robot", [share], [0.5])
 
     def _link(self, body: int) -> None:
-        # Torques are linear in a link's inertial numbers: columns around the model's own are exact for its load.
+        # Torques are linear in moments, which are products of mass and centre: columns around their values.
         n, t, zero = self.model.model.body(body).name, self.given, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
         m, c = t.mass[body], t.com[body]
@@ -632,13 +632,14 @@ class _Builder:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
-        mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
-        half = -math.log(2.0)
+        at = c + [self.values.get(f"{n} com {x}", 0.0) for x in "xyz"]
+        mass = column(f"{n} mass share", spread, inertial_parameters(m, at, zero))
+        half, heavy = -math.log(2.0), m * max(1.0 + self.values.get(f"{n} mass share", 0.0), 0.05)
         self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):
             e = 1e-4 * np.eye(3)[k]
-            change = inertial_parameters(m, c + e, zero) - inertial_parameters(m, c - e, zero)
+            change = inertial_parameters(heavy, at + e, zero) - inertial_parameters(heavy, at - e, zero)
             tolerance = self.sd("link_com", f"{'xyz'[k]}_m", INERTIA * max(abs(c[k]), LEAST_COM_M))
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
@@ -647,14 +648,8 @@ class _Builder:
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         whole = [mass, *coms, inertia]
         self.group(
-            "link_mass",
-            n,
-            whole,
-            [1.0, 0.1, 0.1, 0.1, 2.0],
-            log_prior=half,
-            family=family,
-            shape=(("whole", 1.0),),
-        )
+            "link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], log_prior=half, family=family, shape=(("whole", 1.0),),
+        )  # fmt: skip
         if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))

@@ -44,7 +44,9 @@ def covariance_of_rows(
     cells: Cells, X: list[np.ndarray], prior: np.ndarray, variance: np.ndarray
 ) -> np.ndarray:
     """Dense covariance of all rows, channel after channel."""
-    noise = np.concatenate([np.repeat(v, n) for v, n in zip(variance, cells.rows, strict=True)])
+    noise = np.concatenate(
+        [np.repeat(v, np.diff(c.starts)) for v, c in zip(variance, cells.channels, strict=True)]
+    )
     every = np.concatenate(X)
     return np.diag(noise) + (every * prior) @ every.T
 
