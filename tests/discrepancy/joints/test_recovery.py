@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import load_model
 from discrepancy.joints.verdict import judged
@@ -145,6 +146,17 @@ def test_link_of_another_mass_and_centre(tmp_path: Path) -> None:
     assert {key[:2] for key in found} == {("link_mass", "two")}
     values = [found["link_mass", "two", n] for n in ("excess_kg", "x_m", "y_m", "z_m")]
     assert values == pytest.approx([1.5, 0.05, 0.03, 0.0], rel=0.02, abs=1e-3)
+
+
+def test_a_link_that_is_called_as_another_links_joint(tmp_path: Path) -> None:
+    def change(spec: mujoco.MjSpec) -> None:
+        spec.body("j1").mass = 4.0
+
+    verdict = verdict_on(tmp_path, ARM.replace('body name="two"', 'body name="j1"'), change)
+    (finding,) = verdict.findings
+    assert (finding.place, finding.joint) == ("j1", None)
+    (told,) = JointDiagnosed(verdict, None).to_dict()["causes"]
+    assert (told["place"], told["joint"]) == ("link j1", None)
 
 
 def test_rotors_of_an_arm(tmp_path: Path) -> None:
