@@ -216,7 +216,8 @@ class Search:
                 self.say(f"{out.group.name} -> members: {parts.evidence - state.evidence:.0f} nats")
                 return parts
             cells.truncate(count)
-            for chosen in self.rivals(without, out.group)[: self.settings.tried]:
+            rivals = [c for c in self.rivals(without, out.group) if out.group.late or not c.group.late]
+            for chosen in rivals[: self.settings.tried]:
                 count = cells.count
                 other = self.formed(self.with_one(rest, chosen, without.posterior))
                 if other.evidence > state.evidence - self.settings.within_nats:
@@ -353,8 +354,13 @@ class Search:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
             loose = state.chosen[: len(state.chosen) - fresh]
+            if any(c.group.late for c in state.chosen):  # a law of no table stands for no listed cause
+                loose = tuple(c for c in loose if c.group.late)
             gone = [{c} for c in loose]
             gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
+            gone = [out for out in gone if self._worth(state, out) < self.settings.within_nats]
+            if not gone:
+                return state
             shorter = [self.value([c for c in state.chosen if c not in out], state.posterior) for out in gone]
             best = max(shorter, key=lambda s: s.evidence)
             if best.evidence < state.evidence:
@@ -363,6 +369,13 @@ class Search:
             self.say(f"- {names}: {best.evidence - state.evidence:.0f} nats")
             state = best
         return state
+
+    def _worth(self, state: State, out: Collection[Chosen]) -> float:
+        """Log evidence of causes beyond their odds, at the noise with them."""
+        kept = self.prior([c for c in state.chosen if c not in out], None)
+        own = sorted({k for c in out for k in (*c.group.columns, *c.forms)})
+        odds = sum(c.group.log_prior - self.against for c in out)
+        return state.posterior.worth(own, kept[own]) + odds
 
 
 def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Array:
@@ -382,7 +395,7 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
     # safe with more columns than rows.
     p = Posterior(cells, slabs, least)
     for _ in range(settings.floor_steps):
-        left, fitted = cells.left(p.mean, p.blocks)
+        left, fitted = p.left
         better = np.maximum((left + fitted) / cells.rows, least)
         settled = np.all(np.abs(np.log(better / p.variance)) < settings.floor_change)
         p = Posterior(cells, slabs, better)

@@ -317,9 +317,10 @@ class _Builder:
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
         top *= MOTOR_SHARE if more.motors else 1.0
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
-        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S)
         self.residual = residual
         known = range(self.J) if more.joints is None else more.joints
+        kept = [w[:, list(known)] for w in more.kept]
+        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S, kept)
         self.channel = {j: c for c, j in enumerate(known)}
         self.out = JointProblem(
             model, self.parts, self.cut, self._cells(residual), joints=self.joints, channel=self.channel
@@ -468,8 +469,9 @@ class _Builder:
         band = np.concatenate([self.bands.of_trial(t) for t in range(len(noise))])
         rows = np.bincount(band, minlength=len(self.bands.edges_hz) - 1)
         power = [
-            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise]) ** 2, len(rows))
-            for j in self.channel
+            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise], c) ** 2, len(rows))
+            / self.bands.share(c)
+            for j, c in self.channel.items()
         ]
         return np.array(power) / np.maximum(rows, 1)
 
@@ -622,7 +624,7 @@ class _Builder:
         self.group("gravity_compensation", "robot", [share], [0.5])
 
     def _link(self, body: int) -> None:
-        # Torques are linear in a link's inertial numbers: columns around the model's own are exact for its load.
+        # Torques are linear in moments, which are products of mass and centre: columns around their values.
         n, t, zero = self.model.model.body(body).name, self.given, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
         m, c = t.mass[body], t.com[body]
@@ -633,13 +635,14 @@ class _Builder:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
-        mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
-        half = -math.log(2.0)
+        at = c + [self.values.get(f"{n} com {x}", 0.0) for x in "xyz"]
+        mass = column(f"{n} mass share", spread, inertial_parameters(m, at, zero))
+        half, heavy = -math.log(2.0), m * max(1.0 + self.values.get(f"{n} mass share", 0.0), 0.05)
         self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):
             e = 1e-4 * np.eye(3)[k]
-            change = inertial_parameters(m, c + e, zero) - inertial_parameters(m, c - e, zero)
+            change = inertial_parameters(heavy, at + e, zero) - inertial_parameters(heavy, at - e, zero)
             tolerance = self.sd("link_com", f"{'xyz'[k]}_m", INERTIA * max(abs(c[k]), LEAST_COM_M))
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
@@ -648,14 +651,8 @@ class _Builder:
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         whole = [mass, *coms, inertia]
         self.group(
-            "link_mass",
-            n,
-            whole,
-            [1.0, 0.1, 0.1, 0.1, 2.0],
-            log_prior=half,
-            family=family,
-            shape=(("whole", 1.0),),
-        )
+            "link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], log_prior=half, family=family, shape=(("whole", 1.0),),
+        )  # fmt: skip
         if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))

@@ -100,3 +100,17 @@ def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) ->
     else:
         assert share.max() < 0.01
         assert state.evidence > plain.evidence - 6.0
+
+
+def test_what_is_unlisted_stands_only_for_what_listed_causes_leave() -> None:
+    """Its columns span the listed cause, too, so that it alone would be likelier."""
+    rng = np.random.default_rng(5)
+    x, other = wave(rng), wave(rng)
+    y = 5.0 * x + 0.3 * other + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]}, {0: [x]}, {0: [other]}])
+    listed = Group("cause", "joint", (0,), (5.0,))
+    machine = Machine(cells, [listed, Group("unlisted", "joint", (1, 2), (5.0, 1.0), late=True)])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    state = search.run(search.value([], None))
+    assert state.keys == {("cause", "joint"), ("unlisted", "joint")}
