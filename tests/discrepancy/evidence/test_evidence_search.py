@@ -100,3 +100,20 @@ def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) ->
     else:
         assert share.max() < 0.01
         assert state.evidence > plain.evidence - 6.0
+
+
+def test_a_law_that_only_brings_its_errors_is_not_found() -> None:
+    """What a tolerance has in full leaves something else, which a law's errors have, and its law has not."""
+    rng = np.random.default_rng(5)
+    x, other = wave(rng), wave(rng)
+    y = 2.0 * x + 0.4 * other + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]}, {0: [x]}])
+
+    class Tolerated(Machine):
+        def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+            return np.array([0.0, 4.0])
+
+    machine = Tolerated(cells, [Group("cause", "joint", (0,), (3.0,))], others=[other])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    assert search.fixed([Chosen(machine.groups[0], 1.0)]).chosen == ()
