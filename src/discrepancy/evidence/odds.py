@@ -15,7 +15,7 @@ class Rival:
     """What may be in a cause's place.
 
     Attributes:
-        group: a cause; None: nothing.
+        group: a cause; None: nothing, or what the other causes' laws leave.
         probability: of it.
     """
 
@@ -54,14 +54,17 @@ class Odds:
 
 def odds_of(search: Search, state: State) -> list[Odds]:
     """Probabilities of all causes of a set, which a search found."""
-    return [_odds(search, state, c) for c in state.chosen]
+    empty = search.settled(search.value((), state.posterior)).evidence
+    return [_odds(search, state, c, empty) for c in state.chosen]
 
 
-def _odds(search: Search, state: State, own: Chosen) -> Odds:
+def _odds(search: Search, state: State, own: Chosen, empty: float) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
     without = search.settled(search.value(rest, state.posterior))
-    weighed: list[tuple[float, Group | None]] = [(without.evidence, None)]
+    # What laws leave looks like a cause, but a set does not leave more than it is worth.
+    left = float(np.clip(without.evidence - empty, 0.0, search.settings.open_nats))
+    weighed: list[tuple[float, Group | None]] = [(without.evidence + left, None)]
     for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
         rival = search.settled(search.formed(search.with_one(rest, chosen, without.posterior)))

@@ -31,6 +31,13 @@ class Chosen:
     scale: float
     forms: tuple[int, ...] = ()
 
+    @property
+    def open(self) -> Chosen:
+        """The errors of the law without the law: something else that looks like it."""
+        g = self.group
+        nothing = Group("open", g.place, (), (), g.log_prior, event=g.event)
+        return replace(self, group=nothing)
+
 
 class Linear(Protocol):
     """A machine's logs as a linear problem."""
@@ -326,14 +333,19 @@ class Search:
         return out
 
     def formed(self, state: State) -> State:
-        """The set with the likeliest shape of its last cause and its law's errors."""
+        """The set with the likeliest shape of its last cause, and its law's errors if they do not stand without it."""
         state = self._moved(state)
-        last = state.chosen[-1]
+        *rest, last = state.chosen
         forms = self.problem.forms(last.group, state.posterior.mean)
         if not forms:
             return state
-        index = tuple(self.problem.cells.add(forms))
-        return self.value((*state.chosen[:-1], replace(last, forms=index)), state.posterior, 3)
+        count = self.problem.cells.count
+        own = replace(last, forms=tuple(self.problem.cells.add(forms)))
+        formed = self.value((*rest, own), state.posterior, 3)
+        if self.value((*rest, own.open), formed.posterior, 3).evidence < formed.evidence:
+            return formed
+        self.problem.cells.truncate(count)
+        return state
 
     def _moved(self, state: State) -> State:
         """The set with its last cause in the likeliest shape nearby."""

@@ -369,7 +369,9 @@ class _Judge:
     def _limits(self) -> Iterator[Limit]:
         """Sizes that would be noticed nine times in ten, with everything else as it was found."""
         taken = {c.group.key for c in self.state.chosen}
-        need = np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats)) + NOTICED
+        s = self.search.settings
+        open_ = s.open_nats if taken else 0.0
+        need = np.sqrt(2.0 * (self.search.against + s.need_nats + open_)) + NOTICED
         for g in self.problem.groups:
             known = g.key in taken or (g.cause, "all joints") in taken
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
