@@ -117,12 +117,12 @@ class Cells:
         """The same columns where a residual is left at values x, shape (K,): rows are what is left with all at zero."""
         channels = []
         for c, old in enumerate(self.channels):
-            y = self.bands.spectrum([r[:, c] for r in residual])[self.order] + old.X @ x[old.columns]
+            y = self.bands.spectrum([r[:, c] for r in residual], c)[self.order] + old.X @ x[old.columns]
             parts = list(pairwise(old.starts))
             products = np.array([old.X[a:b].T @ y[a:b] for a, b in parts])
             squares = np.array([y[a:b] @ y[a:b] for a, b in parts])
             channels.append(replace(old, y=y, products=products, squares=squares))
-        return replace(self, channels=channels)
+        return replace(self, channels=channels, _last=None)
 
     @property
     def rows(self) -> Array:
@@ -143,7 +143,7 @@ class Cells:
 
     def add_rows(self, X: Array) -> list[int]:
         """Append columns given by their rows in each channel, in the order of the cells, shape (C, n, k)."""
-        first = self.count
+        first, self._last = self.count, None
         for channel, own in zip(self.channels, X, strict=True):
             seen = np.flatnonzero(own.any(axis=0))
             if len(seen):

@@ -185,9 +185,9 @@ class Search:
     def fixed(self, chosen: Sequence[Chosen]) -> State:
         """A set with its laws' errors, without causes that it is likelier without."""
         state = self.value([replace(c, forms=()) for c in chosen], None)
-        forms = [tuple(self.problem.cells.add(self.problem.forms(c.group, state.posterior.mean))) for c in state.chosen]
-        again = [replace(c, forms=own) for c, own in zip(state.chosen, forms, strict=True)]
-        return self._pruned(self.settled(self.value(again, state.posterior)), fresh=False)
+        for one in state.chosen:
+            state = self._with_errors(state, one)
+        return self._pruned(self.settled(state), fresh=False)
 
     def run(self, state: State, early: Collection[str] = ()) -> State:
         """The likeliest set from another on; it ends early with a cause from which on the problem is not linear."""
@@ -333,16 +333,21 @@ class Search:
         return out
 
     def formed(self, state: State) -> State:
-        """The set with the likeliest shape of its last cause, and its law's errors if they do not stand without it."""
+        """The set with the likeliest shape of its last cause, and its law's errors."""
         state = self._moved(state)
-        *rest, last = state.chosen
-        forms = self.problem.forms(last.group, state.posterior.mean)
+        return self._with_errors(state, state.chosen[-1])
+
+    def _with_errors(self, state: State, one: Chosen) -> State:
+        """The set with the errors of a cause's law, unless they alone are likelier than with their law."""
+        forms = self.problem.forms(one.group, state.posterior.mean)
         if not forms:
             return state
         count = self.problem.cells.count
-        own = replace(last, forms=tuple(self.problem.cells.add(forms)))
-        formed = self.value((*rest, own), state.posterior, 3)
-        if self.value((*rest, own.open), formed.posterior, 3).evidence < formed.evidence:
+        own = replace(one, forms=tuple(self.problem.cells.add(forms)))
+        formed, without = (
+            self.value([new if c is one else c for c in state.chosen], state.posterior, 3) for new in (own, own.open)
+        )
+        if without.evidence < formed.evidence:
             return formed
         self.problem.cells.truncate(count)
         return state

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from discrepancy.evidence.cells import Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.linear.origin import origin_of
 from discrepancy.team.rows import TeamRows
 from estimator.arrays import Array
 
@@ -60,7 +62,11 @@ class RowBands:
         band = np.minimum(np.searchsorted(self.edges_hz, frequency, side="right") - 1, last - 1)
         return np.repeat(np.append(band, np.full(self.lengths[trial] - m, last)), 3)
 
-    def spectrum(self, series: Sequence[Array]) -> Array:
+    def share(self, channel: int) -> float:
+        """Of a channel's rows that are kept."""
+        return 1.0
+
+    def spectrum(self, series: Sequence[Array], channel: int = 0) -> Array:
         """Rows of all trials of one channel, (n, 3, ...) each, as coefficients, shape (sum 3 n, ...)."""
         out = []
         for t, x in enumerate(series):
@@ -447,8 +453,17 @@ def team_problem(
         catalogue = Catalogue.of(TeamProblem(rig, Cells.of(bands, plain)))
     out = TeamProblem(rig, Cells(bands, []), opened=opened, catalogue=catalogue)
     out.candidates = dict(catalogue.candidates)
-    residual = out.rows_of([r.residual for r in rows])
-    out.cells = Cells.of(bands, [x.reshape(len(x), -1, 3) for x in residual])
+    out.cells = Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows])
+    columns = out.beside(catalogue.X)
+    residual = [x.reshape(len(x), -1, 3) for x in out.rows_of([r.residual for r in rows])]
+    out.cells = Cells.of(bands, residual)
+    there = np.zeros(len(catalogue.labels))  # values count from the design, not from where all is linear
+    for k, label in enumerate(catalogue.labels):
+        at = None if label is None else origin_of(label[0], rig.origin)
+        there[k] = 0.0 if at is None else at[label[1]]
+    for channel, X in zip(out.cells.channels, columns, strict=True):
+        channel.y += X @ there
+        channel.squares = np.array([channel.y[a:b] @ channel.y[a:b] for a, b in pairwise(channel.starts)])
 
     def unknown(columns: Sequence[Array]) -> list[int]:
         columns = out.rows_of(columns)
@@ -462,7 +477,7 @@ def team_problem(
         own = [r.local if k == t else np.zeros((*o.residual.shape, r.local.shape[2])) for k, o in enumerate(rows)]
         out.local.append(unknown(own))
     first = out.cells.count
-    out.cells.add_rows(out.beside(catalogue.X))
+    out.cells.add_rows(columns)
     out.labels += catalogue.labels
     out.tolerance += catalogue.tolerance
     out.groups = [replace(g, columns=tuple(first + k for k in g.columns)) for g in catalogue.groups]
