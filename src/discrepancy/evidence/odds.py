@@ -67,7 +67,9 @@ def _odds(search: Search, state: State, own: Chosen, empty: float) -> Odds:
     weighed: list[tuple[float, Group | None]] = [(without.evidence + left, None)]
     for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
-        rival = search.settled(search.formed(search.with_one(rest, chosen, without.posterior)))
+        rival = search.with_one(rest, chosen, without.posterior)
+        if rival.evidence > state.evidence - search.settings.within_nats:
+            rival = search.settled(search.formed(rival))
         weighed.append((rival.evidence, chosen.group))
         cells.truncate(count)
     logs = np.array([state.evidence, *(w[0] for w in weighed)])

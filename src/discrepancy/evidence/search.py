@@ -226,9 +226,9 @@ class Search:
             rivals = [c for c in self.rivals(without, out.group) if out.group.late or not c.group.late]
             for chosen in rivals[: self.settings.tried]:
                 count = cells.count
-                other = self.formed(self.with_one(rest, chosen, without.posterior))
+                other = self.with_one(rest, chosen, without.posterior)
                 if other.evidence > state.evidence - self.settings.within_nats:
-                    other = self._pruned(self.settled(other))
+                    other = self._pruned(self.settled(self.formed(other)))
                 if other.evidence - state.evidence >= self.settings.need_nats:
                     gap = other.evidence - state.evidence
                     self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
@@ -299,6 +299,8 @@ class Search:
 
     def _grown(self, state: State, *, late: bool = False) -> State | None:
         """A set with one cause more that is likelier, its law's errors included; None if none is."""
+        if late and not any(g.late for g in self.problem.groups):
+            return None
         cells = self.problem.cells
         count, tried = cells.count, []
         for chosen in self._likely(state, late=late):
@@ -364,7 +366,9 @@ class Search:
             if better.evidence <= state.evidence:
                 cells.truncate(count)
                 break
-            state, last = better, better.chosen[-1]
+            gain, state, last = better.evidence - state.evidence, better, better.chosen[-1]
+            if gain < self.settings.need_nats:
+                break
         return state
 
     def _pruned(self, state: State, *, fresh: bool = True) -> State:

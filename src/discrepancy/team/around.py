@@ -143,20 +143,20 @@ def around(problem: TeamProblem, state: State) -> TeamProblem | None:
     return team_problem(moved, problem.opened, problem.catalogue if same else None)
 
 
-def exact(problem: TeamProblem, state: State) -> TeamProblem:
-    """The same problem with its residual exact where a state finds unknowns and causes."""
+def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
+    """The same problem with its residual exact where a state finds unknowns and causes, and how far off it was.
+
+    The second is the mean square of what straight columns miss, in units of the noise's variance.
+    """
     found, cells = found_in(problem, state), problem.cells
     left = problem.rows_of(problem.rig.residual(found.shared, found.local, found.active))
     moved = [*problem.shared, *(k for own in problem.local for k in own)]
+    moved += [k for c in state.chosen for k in c.group.columns]
     x = np.zeros(len(state.posterior.mean))
     x[moved] = state.posterior.mean[moved]
-    for c in state.chosen:
-        x[list(c.group.columns)] = state.posterior.mean[list(c.group.columns)]
-    return replace(problem, cells=cells.around(left_of(left), x))
-
-
-def left_of(rows: Sequence[Array]) -> list[Array]:
-    return [r.reshape(len(r), -1, 3) for r in rows]
+    new = cells.around([r.reshape(len(r), -1, 3) for r in left], x)
+    miss = sum(float(np.sum((a.y - b.y) ** 2)) for a, b in zip(new.channels, cells.channels, strict=True))
+    return replace(problem, cells=new), miss / sum(len(c.y) for c in cells.channels)
 
 
 def opened_by(problem: TeamProblem, state: State) -> list[Array] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from discrepancy import rules
 from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.team.around import around, exact, opened_by, placed
@@ -57,7 +58,9 @@ def search_team(
         if not state.chosen or stop():
             break
         before = state.keys
-        search, state = _beside(search, state)
+        search, state, same = _beside(search, state)
+        if same:
+            break
         state = search.run(state, LEAVE_OPEN)
         if state.keys == before:
             break
@@ -71,18 +74,21 @@ def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
         return None
 
 
-def _beside(search: Search, state: State) -> tuple[Search, State]:
-    """The same set in a problem that is linear around it."""
+def _beside(search: Search, state: State) -> tuple[Search, State, bool]:
+    """The same set in a problem that is linear around it, and whether that is the same problem but for little."""
     old = search.problem
     opened, moved = opened_by(old, state), _moved(old, state)
-    problem = old
+    problem, same = old, True
     if opened is not None or moved is not None or old.opened is not None:
         near = moved or old
-        problem = team_problem(near.rig, opened, near.catalogue)
+        problem, same = team_problem(near.rig, opened, near.catalogue), False
         search = replace(search, problem=problem, best=None)
         state = search.fixed(placed(problem, old, state.chosen))
-    for _ in range(2):
-        problem = exact(problem, state)
+    for _ in range(search.settings.rounds):
+        problem, miss = exact(problem, state)
         search = replace(search, problem=problem, best=None)
         state = search.settled(search.value(state.chosen, state.posterior))
-    return search, state
+        if miss < rules.STRAIGHT_CHI2_PER_N:
+            break
+        same = same and miss < rules.STRAIGHT_BESIDE_CHI2_PER_N
+    return search, state, same
