@@ -149,10 +149,10 @@ def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
     The second is the mean square of what straight columns miss, in units of the noise's variance.
     """
     found, cells = found_in(problem, state), problem.cells
-    left = problem.rows_of(problem.rig.residual(found.shared, found.local, found.active))
+    left = problem.rows_of(problem.rig.residual_there(found.shared, found.local, found.active))
     moved = [*problem.shared, *(k for own in problem.local for k in own)]
     moved += [k for c in state.chosen for k in c.group.columns]
-    x = np.zeros(len(state.posterior.mean))
+    x = np.append(problem.there, np.zeros(len(state.posterior.mean) - len(problem.there)))
     x[moved] = state.posterior.mean[moved]
     new = cells.around([r.reshape(len(r), -1, 3) for r in left], x)
     miss = sum(float(np.sum((a.y - b.y) ** 2)) for a, b in zip(new.channels, cells.channels, strict=True))

@@ -118,6 +118,7 @@ class TeamProblem:
         opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C); or None.
         candidates: by the identity of a group.
         catalogue: columns that do not change.
+        there: values where all is linear, shape (K,).
     """
 
     rig: TeamRows
@@ -133,6 +134,7 @@ class TeamProblem:
     opened: Sequence[Array] | None = None
     candidates: dict[Hashable, Candidate] = field(default_factory=dict)
     catalogue: Catalogue | None = None
+    there: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def sensors(self) -> Array:
@@ -374,57 +376,72 @@ class TeamProblem:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """Columns of a healthy team and of all shapes, where the trials were made linear first.
+    """Columns of a healthy team and of all shapes.
 
     Attributes:
+        rig: whose columns those of a healthy team are.
         groups: of causes in their first shapes, their columns counted from zero.
         labels, tolerance, kinds: of the columns; ``kinds`` their numbers by cause.
         X: their rows, shape (C, n, k).
         listed: all other shapes.
+        apart: by candidate, columns by which its other shapes differ.
         candidates: by the identity of a group.
     """
 
+    rig: TeamRows
     groups: list[Group]
     labels: list[tuple[Candidate, int] | None]
     tolerance: list[float]
     kinds: Mapping[str, list[int]]
     X: Array
     listed: Listed
+    apart: Mapping[Hashable, Array]
     candidates: Mapping[Hashable, Candidate]
 
     @classmethod
-    def of(cls, plain: TeamProblem) -> Catalogue:
-        """For the rig of a problem without columns in which nothing is left open."""
+    def of(cls, plain: TeamProblem, near: Catalogue | None = None) -> Catalogue:
+        """For the rig of a problem without columns in which nothing is left open.
+
+        Args:
+            plain: the problem.
+            near: of a rig with the same whitening nearby, whose other shapes will do: they are only proposed.
+        """
         rig = plain.rig
         groups: list[Group] = []
         labels: list[tuple[Candidate, int] | None] = []
         tolerance, kinds, rows = list[float](), dict[str, list[int]](), list[Array]()
         others: list[Listed] = []
+        apart: dict[Hashable, Array] = {}
         for candidate in rig.candidates():
             shapes = rig.refinements(candidate)
-            count = 1 + len(shapes)
+            count, first = 1 + len(shapes), len(labels)
             if not any(candidate.tolerant):
-                others.append(plain.listing([candidate, *shapes], count))
+                others += [] if near else [plain.listing([candidate, *shapes], count)]
                 continue
             X = plain.spectra(rig.columns(candidate))
             shown = np.flatnonzero(X.any(axis=(0, 1)))
-            first, sizes = len(labels), [candidate.parameters[k].tolerance for k in shown]
             g = plain.group_of(candidate, -math.log(count), range(first, first + len(shown)))
             least = tuple(g.least[k] for k in shown) if g.least else ()
             groups.append(replace(g, slab=tuple(g.slab[k] for k in shown), least=least))
             labels += [(candidate, int(k)) for k in shown]
+            tolerance += [candidate.parameters[k].tolerance for k in shown]
             rows.append(X[..., shown])
             if shapes:
-                other = plain.listing(shapes, count)
-                others.append(other)
-                firsts = [span.start for span in other.spans]
-                rows.append(_apart(X[..., 0], other.X[..., firsts].astype(float)))
-                sizes += [candidate.parameters[0].tolerance] * rows[-1].shape[2]
+                if near:
+                    apart[candidate.key] = near.apart[candidate.key]
+                else:
+                    others.append(plain.listing(shapes, count))
+                    firsts = [span.start for span in others[-1].spans]
+                    apart[candidate.key] = _apart(X[..., 0], others[-1].X[..., firsts].astype(float))
+                rows.append(apart[candidate.key])
+                tolerance += [candidate.parameters[0].tolerance] * rows[-1].shape[2]
                 labels += [None] * rows[-1].shape[2]
-            tolerance += sizes
             kinds.setdefault(candidate.cause, []).extend(range(first, len(labels)))
-        listed = Listed([g for e in others for g in e.groups], np.concatenate([e.X for e in others], axis=2))
-        return cls(groups, labels, tolerance, kinds, np.concatenate(rows, axis=2), listed, plain.candidates)
+        listed = near.listed if near else Listed(
+            [g for e in others for g in e.groups], np.concatenate([e.X for e in others], axis=2)
+        )  # fmt: skip
+        known = {**near.candidates, **plain.candidates} if near else plain.candidates
+        return cls(rig, groups, labels, tolerance, kinds, np.concatenate(rows, axis=2), listed, apart, known)
 
 
 def _apart(first: Array, others: Array, most: int = 2) -> Array:
@@ -442,18 +459,18 @@ def team_problem(
     Args:
         rig: recordings, linear.
         opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C).
-        catalogue: columns of a rig with the same whitening nearby; None makes them.
+        catalogue: columns of this rig, or of one with the same whitening nearby; None makes them.
     """
     rows = list(rig.rows([]))
     moving = [len(r.residual) if r.moving is None else r.moving for r in rows]
     bands = RowBands([s.signals.rate_hz / s.reduction.step for s in rig.linear], moving,
                      [len(r.residual) for r in rows], np.append(EDGES_HZ, [np.inf, np.inf]))  # fmt: skip
-    if catalogue is None:
-        plain = [x.residual.reshape(len(x.residual), -1, 3) for x in rows]
-        catalogue = Catalogue.of(TeamProblem(rig, Cells.of(bands, plain)))
+    plain = TeamProblem(rig, Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows]))
+    if catalogue is None or catalogue.rig is not rig:
+        catalogue = Catalogue.of(plain, catalogue)
     out = TeamProblem(rig, Cells(bands, []), opened=opened, catalogue=catalogue)
     out.candidates = dict(catalogue.candidates)
-    out.cells = Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows])
+    out.cells = plain.cells
     columns = out.beside(catalogue.X)
     residual = [x.reshape(len(x), -1, 3) for x in out.rows_of([r.residual for r in rows])]
     out.cells = Cells.of(bands, residual)
@@ -478,6 +495,7 @@ def team_problem(
         out.local.append(unknown(own))
     first = out.cells.count
     out.cells.add_rows(columns)
+    out.there = np.append(np.zeros(first), there)
     out.labels += catalogue.labels
     out.tolerance += catalogue.tolerance
     out.groups = [replace(g, columns=tuple(first + k for k in g.columns)) for g in catalogue.groups]
