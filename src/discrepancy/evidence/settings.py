@@ -38,7 +38,7 @@ class Settings:
     """
 
     floor_rows: float = 20.0
-    spread_rows: float = 5.0
+    spread_rows: float = 8.0
     least_spread: float = 1e-6
     most_spread: float = 1.0
     form_share: float = 0.1
