@@ -338,7 +338,7 @@ class _Judge:
         taken = {k for c in self.state.chosen for k in c.group.columns}
         kinds: dict[str, list[tuple[Group, float]]] = {}
         p = self.state.posterior
-        for g in self.problem.groups:
+        for g in (*self.problem.groups, *self.problem.withheld):
             if g.members or (g.shape and any(v for _, v in g.shape)) or taken & set(g.columns):
                 continue
             sizes = [self.problem.tolerance[k] for k in g.columns]
@@ -348,7 +348,7 @@ class _Judge:
         out = []
         for cause, each in kinds.items():
             factor = float(np.sqrt(np.mean([off for _, off in each])))
-            if len(each) > 1 and factor > SCATTER:
+            if factor > SCATTER:
                 far = sorted(each, key=lambda pair: -pair[1])
                 members = tuple(m for g, _ in far for m in self._members_of(g))
                 sizes = np.array([self.problem.tolerance[k] for k in far[0][0].columns])
