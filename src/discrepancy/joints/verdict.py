@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.evidence.odds import Odds, odds_of
+from discrepancy.evidence.odds import Odds, borne_out, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
 from discrepancy.evidence.settings import SETTINGS
@@ -90,6 +90,7 @@ def judged(
     )
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
+    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)
     return _Judge(model, trials, outcome, parts, odds).verdict([*notes_of([*logs, *reference])])
