@@ -125,12 +125,7 @@ class Search:
     def __post_init__(self) -> None:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
-    def value(
-        self,
-        chosen: Sequence[Chosen],
-        near: Posterior | None,
-        steps: int | None = None,
-    ) -> State:
+    def value(self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
         Args:
@@ -280,15 +275,12 @@ class Search:
         events = [] if late else self._events(state)
         tried = [self.value((*state.chosen, c), state.posterior) for c, _ in events]
         for chosen in self._likely(state, late=late):
-            kept = [
-                c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
-            ]
+            kind = chosen.group.cause if chosen.group.members else None
+            kept = [c for c in state.chosen if c.group.cause != kind]
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
             for c, series in events:
-                if (
-                    c is best.chosen[-1] and self.problem.cells.count == count
-                ):  # they went with the first one tried
+                if c is best.chosen[-1] and self.problem.cells.count == count:  # or they went with the first
                     own = replace(c, group=replace(c.group, columns=tuple(self.problem.cells.add(series))))
                     best = self.value((*state.chosen, own), state.posterior)
             if best.evidence - state.evidence < self.settings.need_nats:
