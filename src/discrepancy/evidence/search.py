@@ -31,6 +31,13 @@ class Chosen:
     scale: float
     forms: tuple[int, ...] = ()
 
+    @property
+    def open(self) -> Chosen:
+        """The errors of the law without the law: something else that looks like it."""
+        g = self.group
+        nothing = Group("open", g.place, (), (), g.log_prior, event=g.event)
+        return replace(self, group=nothing)
+
 
 class Linear(Protocol):
     """A machine's logs as a linear problem."""
@@ -118,12 +125,7 @@ class Search:
     def __post_init__(self) -> None:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
-    def value(
-        self,
-        chosen: Sequence[Chosen],
-        near: Posterior | None,
-        steps: int | None = None,
-    ) -> State:
+    def value(self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
         Args:
@@ -274,15 +276,12 @@ class Search:
         events = [] if late else self._events(state)
         tried = [self.value((*state.chosen, c), state.posterior) for c, _ in events]
         for chosen in self._likely(state, late=late):
-            kept = [
-                c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
-            ]
+            kind = chosen.group.cause if chosen.group.members else None
+            kept = [c for c in state.chosen if c.group.cause != kind]
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
             for c, series in events:
-                if (
-                    c is best.chosen[-1] and self.problem.cells.count == count
-                ):  # they went with the first one tried
+                if c is best.chosen[-1] and self.problem.cells.count == count:  # or they went with the first
                     own = replace(c, group=replace(c.group, columns=tuple(self.problem.cells.add(series))))
                     best = self.value((*state.chosen, own), state.posterior)
             if best.evidence - state.evidence < self.settings.need_nats:
@@ -328,15 +327,20 @@ class Search:
         ]
 
     def formed(self, state: State) -> State:
-        """The set with the law's errors of its last cause."""
+        """The set with the law's errors of its last cause, unless they alone are likelier than with their law."""
         if state.chosen[-1].group.event:
             state = self._moved(state)
-        last = state.chosen[-1]
+        *rest, last = state.chosen
         forms = self.problem.forms(last.group, state.posterior.mean)
         if not forms:
             return state
-        index = tuple(self.problem.cells.add(forms))
-        return self.value((*state.chosen[:-1], replace(last, forms=index)), state.posterior, 3)
+        count = self.problem.cells.count
+        own = replace(last, forms=tuple(self.problem.cells.add(forms)))
+        formed = self.value((*rest, own), state.posterior, 3)
+        if self.value((*rest, own.open), formed.posterior, 3).evidence < formed.evidence:
+            return formed
+        self.problem.cells.truncate(count)
+        return state
 
     def _moved(self, state: State) -> State:
         """The set with its last event at the likeliest instants nearby."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.evidence.odds import Odds, odds_of
+from discrepancy.evidence.odds import Odds, borne_out, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
 from discrepancy.evidence.settings import SETTINGS
@@ -91,6 +91,7 @@ def judged(
     )
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
+    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)
     return _Judge(model, trials, outcome, parts, odds).verdict([*notes_of([*logs, *reference])])
@@ -369,7 +370,9 @@ class _Judge:
     def _limits(self) -> Iterator[Limit]:
         """Sizes that would be noticed nine times in ten, with everything else as it was found."""
         taken = {c.group.key for c in self.state.chosen}
-        need = np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats)) + NOTICED
+        s = self.search.settings
+        open_ = s.open_nats if taken else 0.0
+        need = np.sqrt(2.0 * (self.search.against + s.need_nats + open_)) + NOTICED
         for g in self.problem.groups:
             known = g.key in taken or (g.cause, "all joints") in taken
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
