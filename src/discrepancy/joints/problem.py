@@ -626,9 +626,10 @@ class _Builder:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
-        at = c + [self.values.get(f"{n} com {x}", 0.0) for x in "xyz"]
+        moved = {} if loaded else self.values  # a load has columns of its own, which are exact
+        at = c + [moved.get(f"{n} com {x}", 0.0) for x in "xyz"]
         mass = column(f"{n} mass share", spread, inertial_parameters(m, at, zero))
-        half, heavy = -math.log(2.0), m * max(1.0 + self.values.get(f"{n} mass share", 0.0), 0.05)
+        half, heavy = -math.log(2.0), m * max(1.0 + moved.get(f"{n} mass share", 0.0), 0.05)
         self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):
