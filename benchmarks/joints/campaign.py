@@ -28,7 +28,7 @@ import tyro
 from arm import machine
 from arm.sets import ArmSet, Kind
 from arm.sets import make as make_arm
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import diagnose, labels_of
 from discrepancy.joints.given import Given
@@ -137,12 +137,13 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Sett
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
     outcome = diagnose(model, logs, settings, say=lambda line: steps.append(str(line)), given=given)
-    causes = []
-    for o in odds_of(outcome.search, outcome.state):
+    state, causes = borne_out(outcome.search, outcome.state), []
+    for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
         told = [None if g is None else g.key for g in o.told()]
         causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})
+    outcome = replace(outcome, state=state)
     numbers, hidden = labels_of(outcome), {f["cause"] for f in truth["faults"]}
     offers = enumerate(outcome.search.offers(outcome.state))
     listed = [[round(g, 1), c.group.name] for k, (g, c) in offers if k < 3 or c.group.cause in hidden]
