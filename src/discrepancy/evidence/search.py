@@ -129,12 +129,7 @@ class Search:
     def __post_init__(self) -> None:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
-    def value(
-        self,
-        chosen: Sequence[Chosen],
-        near: Posterior | None,
-        steps: int | None = None,
-    ) -> State:
+    def value(self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
         Args:
@@ -375,8 +370,9 @@ class Search:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
             loose = state.chosen[: len(state.chosen) - fresh]
-            if any(c.group.late for c in state.chosen):  # a law of no table stands for no listed cause
-                loose = tuple(c for c in loose if c.group.late)
+            if any(c.group.late for c in state.chosen):  # a law of no table takes nothing from a listed cause
+                small, size = self.settings.within_nats, state.posterior.size
+                loose = tuple(c for c in loose if c.group.late or size(c.group.columns) < small)
             gone = [{c} for c in loose]
             gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
             gone = [out for out in gone if self._worth(state, out) < self.settings.within_nats]
