@@ -155,8 +155,10 @@ class JointProblem:
             )
         return S
 
-    def proposals(self, posterior: Posterior) -> list[Group]:
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
+        if late:
+            return []
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]

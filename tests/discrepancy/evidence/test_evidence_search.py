@@ -32,7 +32,7 @@ class Machine:
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         return np.zeros(self.cells.count)
 
-    def proposals(self, posterior: Posterior) -> list[Group]:
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         return []
 
     def place(self, group: Group) -> Group:
