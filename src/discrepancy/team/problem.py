@@ -369,20 +369,26 @@ class TeamProblem:
             return []
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """Its trace times smooth functions of time, place, speed and load."""
+        """The trace of each number times smooth functions of time, place, speed and load; and earlier or later."""
         if group.cause in EXACT or group.event or group.late:
             return []
-        candidate = self.candidates[group.identity]
         x = self.values_of(group, values)
-        parts = []
-        for t, c in enumerate(self.columns_of(candidate)):
-            trace = c @ x
-            time = self.rig.linear[t].reduction.time
-            smooth = [np.linspace(-1.0, 1.0, len(time)) * math.sqrt(3.0)]
+        each = self.columns_of(self.candidates[group.identity])
+        return [form for k in np.flatnonzero(x) for form in self._forms([c[..., k] * x[k] for c in each])]
+
+    def _forms(self, traces: Sequence[Array]) -> list[Series]:
+        """Forms of one trace, rows (n, C) a trial."""
+        parts, moving = [], self.cells.bands.moving
+        slopes = [np.gradient(r[:m], axis=0) for r, m in zip(traces, moving, strict=True)]
+        size, steep = (math.sqrt(sum(float(np.sum(r**2)) for r in rows)) for rows in (traces, slopes))
+        for t, trace in enumerate(traces):
+            smooth = [math.sqrt(3.0) * np.linspace(-1.0, 1.0, len(trace))]
             for name, q in self.rig.quantities(t).items():
                 q = np.log(q + 0.1 * np.sqrt(np.mean(q**2)) + 1e-12) if name == "speed" else q
                 smooth.append((q - q.mean()) / (q.std() + 1e-12))
-            parts.append(np.stack([trace * f[:, None] for f in smooth], axis=2))
+            late = np.zeros_like(trace)
+            late[: moving[t]] = slopes[t] * size / max(steep, 1e-300)
+            parts.append(np.stack([*(trace * f[:, None] for f in smooth), late], axis=2))
         return [
             {c: [x[:, 3 * c : 3 * c + 3, k] for x in parts] for c in range(len(self.cells.channels))}
             for k in range(parts[0].shape[2])
