@@ -196,14 +196,22 @@ def late(time: np.ndarray, torque: np.ndarray, delay_s: np.ndarray) -> np.ndarra
     )
 
 
-def logged(
-    name: str, time: np.ndarray, q: np.ndarray, torque: np.ndarray, rng: np.random.Generator | None
-) -> JointLog:
-    """The log of what sensors read; without their errors if there is no generator."""
+def logged(name: str, time: np.ndarray, q: np.ndarray, torque: np.ndarray, rng: np.random.Generator | None,
+           noise: tuple[float, float] | None = None) -> JointLog:  # fmt: skip
+    """The log of what sensors read; without their errors if there is no generator.
+
+    Args:
+        name: of the log.
+        time: shape (n,).
+        q, torque: as they are read, shape (n, 7).
+        rng: of the errors.
+        noise: of positions [rad] and torques [N m] in place of the arm's own.
+    """
     J = q.shape[1]
     if rng is not None:
+        q = q + noise[0] * rng.standard_normal(q.shape) if noise else q
         q = np.round(q / STEP_RAD) * STEP_RAD
-        torque = torque + TORQUE_NOISE_NM * rng.standard_normal(torque.shape)
+        torque = torque + (noise[1] if noise else TORQUE_NOISE_NM) * rng.standard_normal(torque.shape)
     unknown = np.full(J, np.nan)
     drive = Drive(
         np.full(J, 100.0), np.eye(J) / 100.0, np.ones(J), np.zeros(J, dtype=bool), "none", unknown, unknown, "torque",

@@ -31,11 +31,13 @@ class ArmSet:
         seed: of everything random.
         kind: what kind of set.
         factor: size of its effects over their limits; None draws it.
+        noise: of positions [rad] and torques [N m] in place of the arm's own.
     """
 
     seed: int
     kind: Kind
     factor: float | None = None
+    noise: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, seed: int, kind: Kind | None = None, factor: float | None = None) -> ArmSet:
@@ -91,7 +93,7 @@ def make(request: ArmSet, folder: Path) -> Made:
     arm = machine.healthy(request.rng("arm"))
     motion = machine.moved(arm.spec, request.rng("motion"))
     q, torque = read(arm, (), motion)
-    clean = machine.logged("clean", motion.time, q, torque, request.rng("noise"))
+    clean = machine.logged("clean", motion.time, q, torque, request.rng("noise"), request.noise)
     shown = Shown.of(request.rng, machine.nominal(folder), clean) if request.forms else None
     sized, told = [], []
     sizes = request.rng("sizes")
@@ -117,5 +119,5 @@ def make(request: ArmSet, folder: Path) -> Made:
             (lambda t: np.sum([f.force(t) for f in pushes], axis=0)) if pushes else None,
         )
         q, torque = read(arm, sized, motion)
-    log = machine.logged("log", motion.time, q, torque, request.rng("noise"))
+    log = machine.logged("log", motion.time, q, torque, request.rng("noise"), request.noise)
     return Made(log, {"effects": told})

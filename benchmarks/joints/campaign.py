@@ -1,6 +1,9 @@
 """Hide causes in robots, diagnose their logs with the engine of evidence, score.
 
     python benchmarks/joints/campaign.py --part panda|bare|shapes|clean-shapes --first SEED --draws N --out DIR
+    python benchmarks/joints/campaign.py --part panda --kind unlisted|left-out: laws of no table, causes taken out of it
+    python benchmarks/joints/campaign.py --part panda --noise 2e-4 0.3: coarse sensors
+    python benchmarks/joints/campaign.py --first SEED --settings: ten numbers of the engine, halved and doubled
     python benchmarks/joints/campaign.py --out DIR --tables
 
 It goes on where it was stopped. Seconds are of CPU.
@@ -12,8 +15,8 @@ import json
 import sys
 import time
 import traceback
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,7 +28,8 @@ import tyro
 from arm import machine
 from arm.sets import ArmSet, Kind
 from arm.sets import make as make_arm
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import diagnose, labels_of
 from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
@@ -34,7 +38,7 @@ from mocobot_logs.joints.joint_log import JointLog
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
-        "load_friction")  # fmt: skip
+        "load_friction", "quadratic_drag")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
 """Names of one thing at one joint: no log without rests parts the first, terms of one friction are the last."""
 SURE = 0.9
@@ -49,19 +53,23 @@ class Options:
         part: of the campaign.
         kind: of all sets of the panda; in turn where it is not given.
         factor: size of the panda's effects over their limits.
+        noise: of the panda's positions [rad] and torques [N m] in place of its own.
         first: seed of the first set.
         draws: how many sets.
         out: where results go.
         tables: print the tables of the results instead.
+        settings: diagnose one set with ten settings halved, the next with them doubled, and print what changes.
     """
 
     part: Literal["panda", "bare", "shapes", "clean-shapes"] = "panda"
     kind: Kind | None = None
     factor: float = 4.0
+    noise: tuple[float, float] | None = None
     first: int = 0
     draws: int = 10
     out: Path = Path("out/joints")
     tables: bool = False
+    settings: bool = False
 
 
 def main(options: Options) -> None:
@@ -72,6 +80,9 @@ def main(options: Options) -> None:
         print(tables(results))
         return
     options.out.mkdir(parents=True, exist_ok=True)
+    if options.settings:
+        print(f"{sum(_changes(options))} verdicts change")
+        return
     done = {(r["part"], r["seed"], r["rate_hz"]) for r in results}
     for seed in range(options.first, options.first + options.draws):
         left = [r for r in RATES_HZ.get(options.part, (250.0,)) if (options.part, seed, r) not in done]
@@ -91,28 +102,48 @@ def main(options: Options) -> None:
             print("\n".join(told_of(result)), flush=True)
 
 
+def _changes(options: Options) -> Iterator[bool]:
+    """Whether each verdict changes with a setting."""
+    drawn = np.random.default_rng(options.first).permutation([f.name for f in fields(Settings)])[:10]
+    for seed, factor in ((options.first, 0.5), (options.first + 1, 2.0)):
+        made = _arm(options, seed)
+        usual = _said(_found(*made))
+        print(f"set {seed}: {sorted(usual)}", flush=True)
+        for name in drawn:
+            own = getattr(SETTINGS, name)
+            other = max(1, round(factor * own)) if isinstance(own, int) else factor * own
+            said = _said(_found(*made, replace(SETTINGS, **{str(name): other})))
+            print(f"  {name} {own:g} -> {other:g}: {sorted(said) if said != usual else 'same'}", flush=True)
+            yield said != usual
+
+
+def _said(found: Item) -> set[tuple[str, ...]]:
+    return {tuple(c["every"][0][0]) for c in found["causes"] if c["every"][0][0][1]}
+
+
 def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
-    request = ArmSet.of(seed, options.kind, options.factor)
+    request = replace(ArmSet.of(seed, options.kind, options.factor), noise=options.noise)
     made, model = make_arm(request, options.out), machine.nominal(options.out)
     places = {"payload": model.bodies[-1], "push": "last link", "gravity_direction": "base"}
     faults = [e | {"place": places.get(e["cause"], f"joint{e['joint']}")} for e in made.truth["effects"]]
     if request.kind in ("unlisted", "left-out"):
-        faults = [f | {"cause": "unlisted"} for f in faults]
+        faults = [f | {"law": f["cause"] or f["name"], "cause": "unlisted"} for f in faults]
     truth = {"kind": request.kind, "faults": faults, "values": {}, "excluded": list(request.excluded)}
     return model, [made.log], truth
 
 
-def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
+def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Settings = SETTINGS) -> Item:
     """Causes with all that is told of them, values, the search's steps, and what further causes would gain."""
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
-    outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)), given=given)
-    causes = []
-    for o in odds_of(outcome.search, outcome.state):
+    outcome = diagnose(model, logs, settings, say=lambda line: steps.append(str(line)), given=given)
+    state, causes = borne_out(outcome.search, outcome.state), []
+    for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
         told = [None if g is None else g.key for g in o.told()]
         causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})
+    outcome = replace(outcome, state=state)
     numbers, hidden = labels_of(outcome), {f["cause"] for f in truth["faults"]}
     offers = enumerate(outcome.search.offers(outcome.state))
     listed = [[round(g, 1), c.group.name] for k, (g, c) in offers if k < 3 or c.group.cause in hidden]
@@ -120,8 +151,9 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
 
 
 def _same(fault: Item, key: Sequence[str]) -> bool:
-    """Whether a cause at a place is the fault, or what no log parts from it."""
-    names = {n for family in ALIKE if fault["cause"] in family for n in family} | {fault["cause"]}
+    """Whether a cause at a place is the fault, or what no log parts from it; of a law of no table, from its law."""
+    law = fault.get("law", fault["cause"])
+    names = {n for family in ALIKE if law in family for n in family} | {fault["cause"]}
     return key[0] in names and (fault["cause"] == "push" or key[1] == fault["place"])
 
 

@@ -167,15 +167,20 @@ def check_diagnose(options: opt.Diagnose) -> None:
         read_json(path, TRUTH)  # what it says, nobody asks before the verdict
 
 
+def check_seconds(seconds: float | None, name: str = "seconds") -> None:
+    """When a search ends."""
+    if seconds is not None and not 0.0 < seconds <= LONGEST_S:
+        raise InputError(f"{name} is {seconds:g}; it must be above 0 and at most {LONGEST_S:g} s")
+
+
 def _check_joints(options: opt.Diagnose, model: Path) -> None:
     """What can be refused of logs of one robot's joints, but for maps that nobody named."""
     check_no_team(options, ("calibration", "scheduler"))
     plain = opt.Diagnose(options.rec)
-    for name in ("laws", "odds", "whole"):
+    for name in ("laws", "odds", "whole", "jobs"):
         if getattr(options, name) != getattr(plain, name):
             raise InputError(f"--{name} is of a team's robots; with --model there is none")
-    if options.seconds is not None and not 0.0 < options.seconds <= LONGEST_S:
-        raise InputError(f"--seconds is {options.seconds:g}; it must be above 0 and at most {LONGEST_S:g} s")
+    check_seconds(options.seconds, "--seconds")
     logs = [*options.rec, *options.reference]
     check_recordings(logs)
     if options.out is not None:

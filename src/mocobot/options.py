@@ -117,7 +117,7 @@ class Diagnose:
     seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
     """With --model: end after this time with the best verdict so far, as Ctrl-C does."""
     jobs: int = 2
-    """Parallel processes."""
+    """Parallel processes of a diagnosis without --model, which needs one."""
     scheduler: Scheduler = None
     calibration: Calibrated = None
     tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None

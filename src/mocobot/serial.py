@@ -22,6 +22,7 @@ from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.api.look import Look
 from mocobot.api.public import public
+from mocobot.checks import check_seconds
 from mocobot_inspect.joints import inspection
 from mocobot_inspect.joints.findings import joint_findings
 from mocobot_inspect.joints.json import joint_inspection_dict
@@ -182,8 +183,9 @@ def diagnose(
         say: takes a line about what is being done.
 
     Raises:
-        InputError: model, logs, map, tolerances or causes that cannot be used.
+        InputError: model, logs, map, tolerances, causes or seconds that cannot be used.
     """
+    check_seconds(seconds)
     robot = _model(model)
     found = diagnosed(
         robot,

@@ -12,6 +12,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from command import refused, run
+from estimator.errors import InputError
 from joint_logs import write_csv
 from made_arm import JOINTS, MAP, MODEL, made, write_log, write_map, write_model
 from mocobot import serial
@@ -112,6 +113,7 @@ REFUSED = {
     "laws": (["diagnose", "{log}", "--model", "{model}", "--laws", "always"], "--laws is of a team's robots", []),
     "odds": (["diagnose", "{log}", "--model", "{model}", "--odds", "0.7"], "--odds is of a team's robots", []),
     "whole": (["diagnose", "{log}", "--model", "{model}", "--whole"], "--whole is of a team's robots", []),
+    "processes": (["diagnose", "{log}", "--model", "{model}", "--jobs", "3"], "--jobs is of a team's robots", []),
     "no time": (
         ["diagnose", "{log}", "--model", "{model}", "--seconds", "0"], "--seconds is 0; it must be above 0", []
     ),
@@ -141,6 +143,11 @@ def test_refused_and_nothing_written(tmp_path, capsys, log, case) -> None:
     filled = [a.format(log=log, model=tmp_path / "arm.xml", folder=tmp_path) for a in arguments]
     assert said in refused(capsys, *filled)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_no_time_is_refused_in_python_as_on_the_command_line(tmp_path, log) -> None:
+    with pytest.raises(InputError, match="seconds is 0; it must be above 0"):
+        serial.diagnose(tmp_path / "arm.xml", log, seconds=0)
 
 
 def test_a_log_without_torques_or_a_model_with_other_joints(tmp_path, capsys, values) -> None:

@@ -36,11 +36,3 @@ def worst_intervals(
     return [
         Transient(trial, start, duration) for _, start, duration in sorted(best)[-rules.WORST_INTERVALS :]
     ]
-
-
-def intervals_near(when: Transient, shortest_s: float) -> list[Transient]:
-    """The same event with its ends moved, longer than ``shortest_s``."""
-    start, end = when.start_s, when.start_s + when.duration_s
-    steps = np.array(rules.PUSH_MOVES) * when.duration_s
-    ends = [(float(start + a), float(end + b - start - a)) for a in steps for b in steps if a or b]
-    return [Transient(when.trial, first, duration) for first, duration in ends if duration > shortest_s]

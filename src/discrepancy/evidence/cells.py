@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,12 +25,18 @@ class Bands:
         lengths: samples of each trial.
         edges_hz: K + 1 increasing edges of K bands.
         fade_s: series rise from zero and fall to it for so long: a cut leaks noise from above the bands.
+        kept: weight of each sample, shape (W, C) a trial; empty: all are rows.
     """
 
     rates_hz: Sequence[float]
     lengths: Sequence[int]
     edges_hz: Array
     fade_s: float = 0.0
+    kept: Sequence[Array] = ()
+
+    def share(self, channel: int) -> float:
+        """Of a channel's rows that the samples kept are worth."""
+        return float(np.mean(np.concatenate([w[:, channel] for w in self.kept]) ** 2)) if self.kept else 1.0
 
     def faded(self, x: Array, trial: int) -> Array:
         """A series of a trial that rises from zero at its first sample and falls to it at its last."""
@@ -44,11 +50,12 @@ class Bands:
         count = int(np.searchsorted(frequency, self.edges_hz[-1]))
         return np.searchsorted(self.edges_hz, frequency[:count], side="right") - 1
 
-    def spectrum(self, series: Sequence[Array]) -> Array:
-        """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n, ...)."""
+    def spectrum(self, series: Sequence[Array], channel: int) -> Array:
+        """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n,)."""
         out = []
         for t, x in enumerate(series):
-            out.append(dct(self.faded(x, t), axis=0, norm="ortho")[: len(self.of_trial(t))])
+            own = x * self.kept[t][:, channel] if self.kept else x
+            out.append(dct(self.faded(own, t), norm="ortho")[: len(self.of_trial(t))])
         return np.concatenate(out)
 
 
@@ -88,6 +95,7 @@ class Cells:
     channels: list[Channel]
     count: int = 0
     order: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    _last: tuple[NDArray[np.intp], Cells] | None = None
 
     @classmethod
     def of(cls, bands: Bands, residual: Sequence[Array]) -> Cells:
@@ -99,27 +107,48 @@ class Cells:
         none = np.zeros(0, dtype=np.intp)
         channels = []
         for c in range(residual[0].shape[1]):
-            y = bands.spectrum([r[:, c] for r in residual])[order]
+            y = bands.spectrum([r[:, c] for r in residual], c)[order]
             squares = np.array([y[a:b] @ y[a:b] for a, b in pairwise(starts)])
             X, grams, products = np.zeros((len(y), 0)), np.zeros((number, 0, 0)), np.zeros((number, 0))
             channels.append(Channel(y, starts, none, X, grams, products, squares))
         return cls(bands, channels, 0, order)
 
+    def around(self, residual: Sequence[Array], x: Array) -> Cells:
+        """The same columns where a residual is left at values x, shape (K,): rows are what is left with all at zero."""
+        channels = []
+        for c, old in enumerate(self.channels):
+            y = self.bands.spectrum([r[:, c] for r in residual], c)[self.order] + old.X @ x[old.columns]
+            parts = list(pairwise(old.starts))
+            products = np.array([old.X[a:b].T @ y[a:b] for a, b in parts])
+            squares = np.array([y[a:b] @ y[a:b] for a, b in parts])
+            channels.append(replace(old, y=y, products=products, squares=squares))
+        return replace(self, channels=channels, _last=None)
+
     @property
-    def rows(self) -> NDArray[np.intp]:
-        """Number of rows by channel and band, shape (C, bands)."""
-        return np.array([np.diff(c.starts) for c in self.channels])
+    def rows(self) -> Array:
+        """Number of rows by channel and band, shape (C, bands); less where samples are left out."""
+        return np.array([np.diff(c.starts) * self.bands.share(i) for i, c in enumerate(self.channels)])
 
     def add(self, series: Sequence[Series]) -> list[int]:
         """Append columns; their indices."""
-        first = self.count
+        first, self._last = self.count, None
         seen: dict[int, list[tuple[int, Array]]] = {}
         for k, one in enumerate(series):
             for c, x in one.items():
-                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x)[self.order]))
+                seen.setdefault(c, []).append((first + k, self.bands.spectrum(x, c)[self.order]))
         for c, found in seen.items():
             self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
         self.count += len(series)
+        return list(range(first, self.count))
+
+    def add_rows(self, X: Array) -> list[int]:
+        """Append columns given by their rows in each channel, in the order of the cells, shape (C, n, k)."""
+        first, self._last = self.count, None
+        for channel, own in zip(self.channels, X, strict=True):
+            seen = np.flatnonzero(own.any(axis=0))
+            if len(seen):
+                self._append(channel, (first + seen).tolist(), own[:, seen])
+        self.count += X.shape[2]
         return list(range(first, self.count))
 
     @staticmethod
@@ -138,11 +167,26 @@ class Cells:
 
     def truncate(self, count: int) -> None:
         """Remove all columns from an index on."""
+        self._last = None
         for channel in self.channels:
             keep = int(np.sum(channel.columns < count))
             channel.columns, channel.X = channel.columns[:keep], channel.X[:, :keep]
             channel.grams, channel.products = channel.grams[:, :keep, :keep], channel.products[:, :keep]
         self.count = count
+
+    def only(self, at: NDArray[np.intp]) -> Cells:
+        """The rows with some columns, numbered anew: their Gram matrices only. The last ones are remembered."""
+        if self._last is None or not np.array_equal(self._last[0], at):
+            place, channels, none = np.full(self.count, -1), [], np.zeros((0, 0))
+            place[at] = np.arange(len(at))
+            for c in self.channels:
+                seen = np.flatnonzero(place[c.columns] >= 0)
+                grams, products = c.grams.take(seen, 1).take(seen, 2), c.products[:, seen]
+                channels.append(
+                    Channel(c.y, c.starts, place[c.columns[seen]], none, grams, products, c.squares)
+                )
+            self._last = at, Cells(self.bands, channels, len(at))
+        return self._last[1]
 
     def weighted_residual(self, x: Array, variance: Array) -> list[Array]:
         """Time series of W (y - X x), one array (W, C) a trial: its product with a column is that column's score."""
@@ -157,7 +201,8 @@ class Cells:
             n = len(self.bands.of_trial(t))
             wide = np.zeros((length, len(spectra)))
             wide[:n] = np.column_stack([rows[first : first + n] for rows in spectra])
-            out.append(self.bands.faded(np.asarray(idct(wide, axis=0, norm="ortho")), t))
+            own = self.bands.faded(np.asarray(idct(wide, axis=0, norm="ortho")), t)
+            out.append(own * self.bands.kept[t] if self.bands.kept else own)
             first += n
         return out
 

@@ -15,7 +15,7 @@ class Rival:
     """What may be in a cause's place.
 
     Attributes:
-        group: a cause; None: nothing.
+        group: a cause; None: nothing, or what the other causes' laws leave.
         probability: of it.
     """
 
@@ -52,20 +52,42 @@ class Odds:
         return tuple(out)
 
 
+def borne_out(search: Search, state: State) -> State:
+    """The set without causes that are likelier what the other causes' laws leave, the weakest taken out first."""
+    while len(state.chosen) > 1:
+        shorter = [_without(search, state, c) for c in state.chosen]
+        best = max(shorter, key=lambda s: s.evidence)
+        if best.evidence + _left(search, best) < state.evidence:
+            break
+        state = best
+    return state
+
+
 def odds_of(search: Search, state: State) -> list[Odds]:
     """Probabilities of all causes of a set, which a search found."""
     return [_odds(search, state, c) for c in state.chosen]
 
 
+def _without(search: Search, state: State, own: Chosen) -> State:
+    return search.settled(search.value([c for c in state.chosen if c is not own], state.posterior))
+
+
+def _left(search: Search, state: State) -> float:
+    """Log odds over nothing of what a set's laws leave, which looks like a cause; not more than the set is worth."""
+    empty = search.settled(search.value((), state.posterior))
+    return float(np.clip(state.evidence - empty.evidence, 0.0, search.settings.open_nats))
+
+
 def _odds(search: Search, state: State, own: Chosen) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
-    without = search.settled(search.value(rest, state.posterior))
-    weighed: list[tuple[float, Group | None]] = [(without.evidence, None)]
+    without = _without(search, state, own)
+    weighed: list[tuple[float, Group | None]] = [(without.evidence + _left(search, without), None)]
     for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
-        kept = [c for c in rest if not (chosen.group.members and c.group.cause == chosen.group.cause)]
-        rival = search.settled(search.formed(search.value((*kept, chosen), without.posterior)))
+        rival = search.with_one(rest, chosen, without.posterior)
+        if rival.evidence > state.evidence - search.settings.within_nats:
+            rival = search.settled(search.formed(rival))
         weighed.append((rival.evidence, chosen.group))
         cells.truncate(count)
     logs = np.array([state.evidence, *(w[0] for w in weighed)])

@@ -8,11 +8,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
-from scipy.special import log_ndtr, logsumexp
+from scipy.linalg import get_lapack_funcs
+from scipy.special import log_ndtr
 
 from discrepancy.evidence.cells import Cells
 from estimator.arrays import Array
+
+_potrf, _potri, _trtrs = get_lapack_funcs(("potrf", "potri", "trtrs"), (np.zeros(1),))
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,11 @@ class Group:
         return self.cause, self.place
 
     @property
+    def identity(self) -> tuple[str, str, tuple[tuple[str, float], ...]]:
+        """Cause, place and shape."""
+        return self.cause, self.place, self.shape
+
+    @property
     def name(self) -> str:
         """Cause, place and shape in words."""
         shape = ", ".join(f"{k} {v:g}" for k, v in self.shape)
@@ -76,25 +83,22 @@ class Arrow:
     def of(
         cls,
         G: Array,
-        active: NDArray[np.intp],
         s: Array,
         parts: list[NDArray[np.intp]],
         last: NDArray[np.intp],
     ) -> Arrow:
-        """Factor of I + s G s for the active columns and their scales s."""
+        """Factor of I + s G s for the columns' scales s."""
 
         def block(i: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
-            return s[i][:, None] * G[np.ix_(active[i], active[k])] * s[k]
+            return s[i][:, None] * G[np.ix_(i, k)] * s[k]
 
-        rest = block(last, last) + np.eye(len(last))
+        rest = block(last, last)
         own, beside = [], []
         for p in parts:
-            own.append(
-                cholesky(block(p, p) + np.eye(len(p)), lower=True, overwrite_a=True, check_finite=False)
-            )
-            beside.append(solve_triangular(own[-1], block(p, last), lower=True, check_finite=False))
+            own.append(_factor(block(p, p)))
+            beside.append(_solved(own[-1], block(p, last)))
             rest -= beside[-1].T @ beside[-1]
-        own.append(cholesky(rest, lower=True, overwrite_a=True, check_finite=False))
+        own.append(_factor(rest))
         return cls(parts, last, own, beside)
 
     @property
@@ -106,28 +110,50 @@ class Arrow:
         """L^-1 x, shape (n, k)."""
         out, rest = np.empty_like(x), x[self.last].copy()
         for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
-            out[p] = solve_triangular(L, x[p], lower=True, check_finite=False)
+            out[p] = _solved(L, x[p])
             rest -= B.T @ out[p]
-        out[self.last] = solve_triangular(self.own[-1], rest, lower=True, check_finite=False)
+        out[self.last] = _solved(self.own[-1], rest)
         return out
 
     def backward(self, z: Array) -> Array:
-        """L'^-1 z, shape (n,)."""
+        """L'^-1 z, shape (n, k)."""
         out = np.empty_like(z)
-        out[self.last] = solve_triangular(self.own[-1], z[self.last], lower=True, trans=1, check_finite=False)
+        out[self.last] = _solved(self.own[-1], z[self.last], trans=1)
         for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
-            out[p] = solve_triangular(L, z[p] - B @ out[self.last], lower=True, trans=1, check_finite=False)
+            out[p] = _solved(L, z[p] - B @ out[self.last], trans=1)
         return out
 
     def inverses(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
         """Positions of each part with the last one, and that block of the inverse."""
-        root = solve_triangular(self.own[-1], np.eye(len(self.last)), lower=True, check_finite=False)
-        last = root.T @ root
+        last = _inverse(self.own[-1])
         for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
-            E = solve_triangular(L, B, lower=True, trans=1, check_finite=False)
-            root = solve_triangular(L, np.eye(len(p)), lower=True, check_finite=False)
+            E = _solved(L, B, trans=1)
             cross = E @ last
-            yield np.append(p, self.last), np.block([[root.T @ root + cross @ E.T, -cross], [-cross.T, last]])
+            yield np.append(p, self.last), np.block([[_inverse(L) + cross @ E.T, -cross], [-cross.T, last]])
+
+
+def _factor(A: Array) -> Array:
+    """Cholesky factor of I + A, lower."""
+    A[np.diag_indices(len(A))] += 1.0
+    if not len(A):
+        return A
+    L, failed = _potrf(A, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is not positive definite")
+    return L
+
+
+def _solved(L: Array, x: Array, trans: int = 0) -> Array:
+    """L^-1 x, or L'^-1 x."""
+    return _trtrs(L, x, lower=1, trans=trans)[0] if x.size else x
+
+
+def _inverse(L: Array) -> Array:
+    """(L L')^-1."""
+    if not len(L):
+        return L
+    half = np.tril(_potri(L, lower=1)[0])
+    return half + np.tril(half, -1).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,19 +176,21 @@ class Posterior:
         return np.flatnonzero(self.prior > 0)
 
     @cached_property
+    def _own(self) -> Cells:
+        return self.cells.only(self.active)
+
+    @cached_property
     def _weighted(self) -> tuple[Array, Array, float]:
-        return self.cells.weighted(self.variance)
+        return self._own.weighted(self.variance)
 
     @cached_property
     def _factor(self) -> tuple[Array, Arrow, Array]:
         """Scales s, Cholesky factor L of I + s G s, and z = L^-1 s b."""
         G, b, _ = self._weighted
-        a = self.active
-        s = np.sqrt(self.prior[a])
-        owner = self.cells.owners[a]
+        s, owner = np.sqrt(self.prior[self.active]), self._own.owners
         parts = [np.flatnonzero(owner == c) for c in range(len(self.cells.channels))]
-        L = Arrow.of(G, a, s, parts, np.flatnonzero(owner < 0))
-        return s, L, L.forward((s * b[a])[:, None])[:, 0]
+        L = Arrow.of(G, s, parts, np.flatnonzero(owner < 0))
+        return s, L, L.forward((s * b)[:, None])[:, 0]
 
     @cached_property
     def log_evidence(self) -> float:
@@ -176,7 +204,7 @@ class Posterior:
         """Values of all columns, shape (K,)."""
         s, L, z = self._factor
         x = np.zeros(len(self.prior))
-        x[self.active] = s * L.backward(z)
+        x[self.active] = s * L.backward(z[:, None])[:, 0]
         return x
 
     @cached_property
@@ -189,42 +217,57 @@ class Posterior:
         return out
 
     @cached_property
-    def blocks(self) -> list[Array]:
-        """Covariance of the values that each channel sees, in the order of its columns."""
+    def _blocks(self) -> list[Array]:
+        """Covariance of the values that each channel sees and that are in the model."""
         s, L, _ = self._factor
-        at, out = np.full(self.cells.count, -1), []  # columns may have been added since
-        at[self.active] = np.arange(len(s))
-        for own, channel in zip(L.inverses(), self.cells.channels, strict=True):
-            place = at[channel.columns]
-            seen = np.flatnonzero(place >= 0)
-            k, inverse = own
-            where = np.zeros(len(s), dtype=np.intp)
+        where, out = np.zeros(len(s), dtype=np.intp), []
+        for (k, inverse), channel in zip(L.inverses(), self._own.channels, strict=True):
             where[k] = np.arange(len(k))
-            pick = where[place[seen]]
-            block = np.zeros((len(place), len(place)))
-            block[np.ix_(seen, seen)] = s[place[seen], None] * inverse[np.ix_(pick, pick)] * s[place[seen]]
-            out.append(block)
+            pick, scale = where[channel.columns], s[channel.columns]
+            out.append(scale[:, None] * inverse[np.ix_(pick, pick)] * scale)
         return out
 
     @cached_property
     def variances(self) -> Array:
         """Variances of the values, shape (K,)."""
-        out = np.zeros(self.cells.count)
-        for block, channel in zip(self.blocks, self.cells.channels, strict=True):
-            out[channel.columns] = np.diag(block)
-        return out[: len(self.prior)]
+        own, out = np.zeros(len(self.active)), np.zeros(len(self.prior))
+        for block, channel in zip(self._blocks, self._own.channels, strict=True):
+            own[channel.columns] = np.diag(block)
+        out[self.active] = own
+        return out
+
+    @cached_property
+    def left(self) -> tuple[Array, Array]:
+        """Squares that the values leave, and those that their covariance explains besides, shape (C, bands) each."""
+        return self._own.left(self.mean[self.active], self._blocks)
+
+    def worth(self, columns: Sequence[int], less: Array) -> float:
+        """Log evidence that is lost where columns have smaller prior variances, with the same noise."""
+        s, L, z = self._factor
+        k = np.searchsorted(self.active, columns)
+        Z = L.forward(np.eye(len(s))[:, k])
+        C = np.linalg.inv(Z.T @ Z)  # I + s R s, in units of the prior
+        h, root, R = C @ (Z.T @ z), np.sqrt(less) / s[k], C - np.eye(len(k))
+        A = np.eye(len(k)) + root[:, None] * R * root
+        kept = root * h @ np.linalg.solve(A, root * h) - np.linalg.slogdet(A)[1]
+        return float(0.5 * (h @ (Z.T @ z) - np.linalg.slogdet(C)[1] - kept))
+
+    def size(self, columns: Sequence[int]) -> float:
+        """Half the squares over the noise of what columns add with their values."""
+        k = np.searchsorted(self.active, columns)
+        x = self.mean[list(columns)]
+        return float(0.5 * x @ self._weighted[0][np.ix_(k, k)] @ x)
 
     def possible(self, group: Group, scale: float) -> float:
         """Log evidence that the bounds of a group's values add, where the group is in the model."""
         if not group.least:
             return 0.0
-        return _possible(
-            group, self.mean[list(group.columns)], np.sqrt(self.variances[list(group.columns)]), scale
-        )
+        k = list(group.columns)
+        return float(_possible(group, self.mean[k], np.sqrt(self.variances[k]), scale))
 
     def better_noise(self, floor: Array, weight: Array | float) -> Array:
         """Variances by MacKay's step: squares left over rows that are not fitted, about a floor."""
-        left, fitted = self.cells.left(self.mean, self.blocks)
+        left, fitted = self.left
         free = np.maximum(self.cells.rows - fitted / self.variance, 0.05 * self.cells.rows)
         return (weight * floor + left) / (weight + free)
 
@@ -232,7 +275,7 @@ class Posterior:
     def _conditional(self) -> tuple[Array, Array]:
         """Information matrix R and score Q of all columns beside the active ones' priors, shapes (K, K) and (K,)."""
         s, L, z = self._factor
-        G, b, _ = self._weighted
+        G, b, _ = self.cells.weighted(self.variance)
         U = L.forward(s[:, None] * G[self.active])
         return G - U.T @ U, b - U.T @ z
 
@@ -248,20 +291,16 @@ class Posterior:
         """
         R, Q = self._conditional
         k = list(group.columns)
-        Rg, Qg = R[np.ix_(k, k)], Q[k]
-        root = prior_root(group)
-        each = []
-        for scale in 0.5 ** np.arange(octaves):
-            B = root * scale
-            A = np.eye(B.shape[1]) + B.T @ Rg @ B
-            chol = np.linalg.cholesky(A)
-            u = solve_triangular(chol, B.T @ Qg, lower=True, check_finite=False)
-            value = 0.5 * u @ u - np.sum(np.log(np.diag(chol)))
-            if group.least:
-                covariance = B @ np.linalg.solve(A, B.T)
-                value += _possible(group, covariance @ Qg, np.sqrt(np.diag(covariance)), scale)
-            each.append(float(value))
-        return float(logsumexp(each) - np.log(octaves)), float(0.5 ** int(np.argmax(each)))
+        root, scales = prior_root(group), np.array([0.5**k for k in range(octaves)])
+        size, turn = np.linalg.eigh(root.T @ R[np.ix_(k, k)] @ root)
+        turn = root @ turn
+        u, more = turn.T @ Q[k], scales[:, None] ** 2
+        gained = more / (1.0 + more * np.maximum(size, 0.0))
+        each = 0.5 * gained @ u**2 + 0.5 * np.sum(np.log(gained / more), axis=1)
+        if group.least:
+            each += _possible(group, gained * u @ turn.T, np.sqrt(gained @ turn.T**2), scales[:, None])
+        most = each.max()
+        return float(most + np.log(np.mean(np.exp(each - most)))), float(scales[np.argmax(each)])
 
 
 def prior_root(group: Group) -> Array:
@@ -277,10 +316,9 @@ def prior_root(group: Group) -> Array:
     return np.sqrt(0.5) * np.column_stack([np.diag(slab), common])
 
 
-def _possible(group: Group, mean: Array, se: Array, scale: float) -> float:
+def _possible(group: Group, mean: Array, se: Array, scale: Array | float) -> Array:
     """Log of the share of the posterior that is possible over that of the prior, one value at a time."""
-    total = 0.0
-    for value, error, least, size in zip(mean, se, group.least, group.slab, strict=True):
-        if np.isfinite(least) and error > 0.0:
-            total += float(log_ndtr((value - least) / error) - log_ndtr(-least / (size * scale)))
-    return total
+    least, slab = np.array(group.least), np.array(group.slab)
+    k = np.isfinite(least) & np.all(se > 0.0, axis=tuple(range(se.ndim - 1)))
+    share = log_ndtr((mean[..., k] - least[k]) / se[..., k]) - log_ndtr(-least[k] / (slab[k] * scale))
+    return np.sum(share, axis=-1)

@@ -31,6 +31,13 @@ class Chosen:
     scale: float
     forms: tuple[int, ...] = ()
 
+    @property
+    def open(self) -> Chosen:
+        """The errors of the law without the law: something else that looks like it."""
+        g = self.group
+        nothing = Group("open", g.place, (), (), g.log_prior, event=g.event)
+        return replace(self, group=nothing)
+
 
 class Linear(Protocol):
     """A machine's logs as a linear problem."""
@@ -61,12 +68,16 @@ class Linear(Protocol):
         """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
         ...
 
-    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
-        """What may have acted for a while, the likeliest first: groups whose columns are yet to be added."""
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> Sequence[Group]:
+        """Events and shapes whose columns are not in the problem, the likeliest first; or those that are late."""
         ...
 
-    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
-        """The same event a little earlier, later, shorter and longer, with columns yet to be added."""
+    def place(self, group: Group) -> Group:
+        """Such a group with its columns, which are added to the problem."""
+        ...
+
+    def nearby(self, group: Group, posterior: Posterior) -> Sequence[Group]:
+        """The same cause in neighbouring shapes: an event a little earlier, later, shorter and longer."""
         ...
 
     def forms(self, group: Group, values: Array) -> list[Series]:
@@ -118,12 +129,7 @@ class Search:
     def __post_init__(self) -> None:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
-    def value(
-        self,
-        chosen: Sequence[Chosen],
-        near: Posterior | None,
-        steps: int | None = None,
-    ) -> State:
+    def value(self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
         Args:
@@ -135,9 +141,10 @@ class Search:
         nominal = self.prior(chosen, None if near is None else near.mean)
         weight = s.floor_rows
         loose = (*self.problem.laws, *(c.forms for c in chosen if c.forms))
-        kin = [(np.asarray(k), s.spread_rows, np.inf) for k in self.problem.families]
+        free = [k for c in chosen for k in c.group.columns]  # the spread of the healthy ones is theirs alone
+        kin = [(np.setdiff1d(k, free), s.spread_rows, np.inf) for k in self.problem.families]
         kin += [(np.asarray(k), 0.0, s.most_spread) for k in loose]
-        kin = [k for k in kin if nominal[k[0][0]] > 0]
+        kin = [k for k in kin if len(k[0]) and nominal[k[0][0]] > 0]
         S, spread = nominal.copy(), np.ones(len(kin))
         for k, _, _ in kin:
             if near is not None and k[-1] < len(near.prior) and near.prior[k[0]] > 0:
@@ -170,11 +177,11 @@ class Search:
             S[list(c.forms)] += self.settings.form_share**2
         return S
 
-    def fixed(self, chosen: Iterable[Chosen]) -> State:
+    def fixed(self, chosen: Sequence[Chosen]) -> State:
         """A set with its laws' errors, without causes that it is likelier without."""
-        state = self.value((), None)
-        for one in chosen:
-            state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
+        state = self.value([replace(c, forms=()) for c in chosen], None)
+        for one in state.chosen:
+            state = self._with_errors(state, one)
         return self._pruned(self.settled(state), fresh=False)
 
     def run(self, state: State, early: Collection[str] = ()) -> State:
@@ -211,12 +218,12 @@ class Search:
                 self.say(f"{out.group.name} -> members: {parts.evidence - state.evidence:.0f} nats")
                 return parts
             cells.truncate(count)
-            for chosen in self.rivals(without, out.group)[: self.settings.tried]:
-                count, kind = cells.count, chosen.group.cause if chosen.group.members else None
-                kept = [c for c in rest if c.group.cause != kind]
-                other = self.formed(self.value((*kept, chosen), without.posterior))
+            rivals = [c for c in self.rivals(without, out.group) if out.group.late or not c.group.late]
+            for chosen in rivals[: self.settings.tried]:
+                count = cells.count
+                other = self.with_one(rest, chosen, without.posterior)
                 if other.evidence > state.evidence - self.settings.within_nats:
-                    other = self._pruned(self.settled(other))
+                    other = self._pruned(self.settled(self.formed(other)))
                 if other.evidence - state.evidence >= self.settings.need_nats:
                     gap = other.evidence - state.evidence
                     self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
@@ -254,48 +261,56 @@ class Search:
         """What may be in a cause's place: its linear gain is near that of the cause, at the noise without either."""
         gain = without.posterior.gain(own, self.settings.octaves)[0] + own.log_prior - self.against
         least = gain - self.settings.within_nats
-        return [c for g, c in self.offers(without) if g >= least and c.group.name != own.name]
+        return [
+            c for g, c in self.offers(without)
+            if g >= least and c.group.name != own.name and not (own.event and c.group.cause == own.cause)
+        ]  # fmt: skip
 
-    def offers(self, state: State) -> list[tuple[float, Chosen]]:
-        """Every group that a set has room for by its linear gain, the likeliest first."""
+    def offers(self, state: State, *, late: bool = False) -> list[tuple[float, Chosen]]:
+        """Every group that a set has room for by its linear gain, the likeliest first; late ones are proposed on request."""
         taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
+
+        def fits(g: Group) -> bool:
+            return not (g.key in taken or (g.cause, "all joints") in taken or g.family in families)
+
+        cells, p = self.problem.cells, state.posterior
+        proposed = [g for g in self.problem.proposals(p, late=late) if fits(g)]
+        count, placed = cells.count, [self.problem.place(g) for g in proposed]
+        wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
+        pairs = [*((g, g) for g in self.problem.groups if fits(g)), *zip(proposed, placed, strict=True)]
         out = []
-        for g in self.problem.groups:
-            if g.key in taken or (g.cause, "all joints") in taken or g.family in families:
-                continue
-            gain, scale = state.posterior.gain(g, self.settings.octaves)
-            out.append((gain + g.log_prior - self.against, Chosen(g, scale)))
+        for plain, g in pairs:
+            gain, scale = wider.gain(g, self.settings.octaves)
+            out.append((gain + g.log_prior - self.against, Chosen(plain, scale)))
+        cells.truncate(count)
         return sorted(out, key=lambda offer: -offer[0])
+
+    def with_one(self, rest: Sequence[Chosen], chosen: Chosen, near: Posterior) -> State:
+        """A set with one cause more, whose columns are added where they are not in the problem."""
+        kind = chosen.group.cause if chosen.group.members else None
+        if not chosen.group.columns:
+            chosen = replace(chosen, group=self.problem.place(chosen.group))
+        return self.value((*(c for c in rest if c.group.cause != kind), chosen), near)
 
     def _grown(self, state: State, *, late: bool = False) -> State | None:
         """A set with one cause more that is likelier, its law's errors included; None if none is."""
-        count = self.problem.cells.count
-        events = [] if late else self._events(state)
-        tried = [self.value((*state.chosen, c), state.posterior) for c, _ in events]
+        cells = self.problem.cells
+        count, tried = cells.count, []
         for chosen in self._likely(state, late=late):
-            kept = [
-                c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
-            ]
-            tried.append(self.value((*kept, chosen), state.posterior))
-        for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
-            for c, series in events:
-                if (
-                    c is best.chosen[-1] and self.problem.cells.count == count
-                ):  # they went with the first one tried
-                    own = replace(c, group=replace(c.group, columns=tuple(self.problem.cells.add(series))))
-                    best = self.value((*state.chosen, own), state.posterior)
+            tried.append((self.with_one(state.chosen, chosen, state.posterior).evidence, chosen))
+            cells.truncate(count)
+        for _, chosen in sorted(tried, key=lambda pair: -pair[0])[:2]:
+            best = self.with_one(state.chosen, chosen, state.posterior)
             if best.evidence - state.evidence < self.settings.need_nats:
                 best = self.settled(best)
             if best.evidence - state.evidence < self.settings.need_nats:
                 break
-            if not best.chosen[-1].group.event:
-                self.problem.cells.truncate(count)
             grown = self._pruned(self.formed(best))
             if grown.evidence - state.evidence >= self.settings.need_nats:
                 self.say(f"+ {best.chosen[-1].group.name}: {grown.evidence - state.evidence:.0f} nats")
                 return grown
-            self.problem.cells.truncate(count)
-        self.problem.cells.truncate(count)
+            cells.truncate(count)
+        cells.truncate(count)
         return None
 
     def _likely(self, state: State, *, late: bool) -> list[Chosen]:
@@ -307,57 +322,60 @@ class Search:
         quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
         out: list[Chosen] = []
         for where, most, least in ((state, s.tried, -s.within_nats), (quiet, s.tried_quiet, s.need_nats)):
-            offers = [(gain, c) for gain, c in self.offers(where) if c.group.late == late and gain > least]
+            offers = [(gain, c) for gain, c in self.offers(where, late=late) if c.group.late == late and gain > least]
             known = {c.group.name for c in out}
             out += [c for _, c in offers[:most] if c.group.name not in known]
         return out
 
-    def _events(self, state: State) -> list[tuple[Chosen, list[Series]]]:
-        """The likeliest events, with their columns, which are added."""
-        cells = self.problem.cells
-        found = [
-            (replace(group, columns=tuple(cells.add(series))), series)
-            for group, series in self.problem.events(state.posterior)
-            if group.key not in state.keys
-        ]
-        p = state.posterior
-        wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
-        return [
-            (Chosen(group, wider.gain(group, self.settings.octaves)[1]), series) for group, series in found
-        ]
-
     def formed(self, state: State) -> State:
-        """The set with the law's errors of its last cause."""
-        if state.chosen[-1].group.event:
-            state = self._moved(state)
-        last = state.chosen[-1]
-        forms = self.problem.forms(last.group, state.posterior.mean)
+        """The set with the likeliest shape of its last cause, and its law's errors."""
+        state = self._moved(state)
+        return self._with_errors(state, state.chosen[-1])
+
+    def _with_errors(self, state: State, one: Chosen) -> State:
+        """The set with the errors of a cause's law, unless they alone are likelier than with their law."""
+        forms = self.problem.forms(one.group, state.posterior.mean)
         if not forms:
             return state
-        index = tuple(self.problem.cells.add(forms))
-        return self.value((*state.chosen[:-1], replace(last, forms=index)), state.posterior, 3)
+        count = self.problem.cells.count
+        own = replace(one, forms=tuple(self.problem.cells.add(forms)))
+        formed, without = (
+            self.value([new if c is one else c for c in state.chosen], state.posterior, 3) for new in (own, own.open)
+        )
+        if without.evidence < formed.evidence:
+            return formed
+        self.problem.cells.truncate(count)
+        return state
 
     def _moved(self, state: State) -> State:
-        """The set with its last event at the likeliest instants nearby."""
+        """The set with its last cause in the likeliest shape nearby."""
         cells, (*rest, last) = self.problem.cells, state.chosen
         for _ in range(self.settings.event_steps):
             count, tried = cells.count, []
-            for group, series in self.problem.nearby(last.group):
-                moved = Chosen(replace(group, columns=tuple(cells.add(series))), last.scale)
+            for group in self.problem.nearby(last.group, state.posterior):
+                moved = Chosen(self.problem.place(group), last.scale)
                 tried.append(self.value((*rest, moved), state.posterior))
-            better = max(tried, key=lambda t: t.evidence)
+            better = max(tried, key=lambda t: t.evidence, default=state)
             if better.evidence <= state.evidence:
                 cells.truncate(count)
-                return state
-            state, last = better, better.chosen[-1]
+                break
+            gain, state, last = better.evidence - state.evidence, better, better.chosen[-1]
+            if gain < self.settings.need_nats:
+                break
         return state
 
     def _pruned(self, state: State, *, fresh: bool = True) -> State:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
             loose = state.chosen[: len(state.chosen) - fresh]
+            if any(c.group.late for c in state.chosen):  # a law of no table takes nothing from a listed cause
+                small, size = self.settings.within_nats, state.posterior.size
+                loose = tuple(c for c in loose if c.group.late or size(c.group.columns) < small)
             gone = [{c} for c in loose]
             gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
+            gone = [out for out in gone if self._worth(state, out) < self.settings.within_nats]
+            if not gone:
+                return state
             shorter = [self.value([c for c in state.chosen if c not in out], state.posterior) for out in gone]
             best = max(shorter, key=lambda s: s.evidence)
             if best.evidence < state.evidence:
@@ -366,6 +384,13 @@ class Search:
             self.say(f"- {names}: {best.evidence - state.evidence:.0f} nats")
             state = best
         return state
+
+    def _worth(self, state: State, out: Collection[Chosen]) -> float:
+        """Log evidence of causes beyond their odds, at the noise with them."""
+        kept = self.prior([c for c in state.chosen if c not in out], None)
+        own = sorted({k for c in out for k in (*c.group.columns, *c.forms)})
+        odds = sum(c.group.log_prior - self.against for c in out)
+        return state.posterior.worth(own, kept[own]) + odds
 
 
 def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Array:
@@ -385,7 +410,7 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
     # safe with more columns than rows.
     p = Posterior(cells, slabs, least)
     for _ in range(settings.floor_steps):
-        left, fitted = cells.left(p.mean, p.blocks)
+        left, fitted = p.left
         better = np.maximum((left + fitted) / cells.rows, least)
         settled = np.all(np.abs(np.log(better / p.variance)) < settings.floor_change)
         p = Posterior(cells, slabs, better)

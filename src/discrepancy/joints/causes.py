@@ -370,3 +370,5 @@ OTHERS = (
 """At a link, at two joints or on the whole robot, and what no table lists."""
 WORDS: dict[str, JointCause | OtherCause] = {cause.name: cause for cause in (*CAUSES, *OTHERS)}
 """Every cause by its name."""
+LINKS = frozenset(cause.name for cause in OTHERS if "{link}" in cause.title)
+"""Causes whose place is a link, which may be called as a joint is."""

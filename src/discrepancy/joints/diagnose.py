@@ -94,7 +94,7 @@ def diagnose(
     """
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
-    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise)
+    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
     early = CURVED if given.changed is None else ()
@@ -105,12 +105,13 @@ def diagnose(
     around = again(first, floor=None)
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, until.run(around.search, around.state))
-        if found.state.keys == around.state.keys or until():
+        if until():
             around = found
             break
+        around = found if found.state.keys == around.state.keys else around
         other = again(found, floor=around.search.floor)
         if other.state.evidence < around.state.evidence + settings.need_nats:
-            break  # linear around itself, the new set is no likelier
+            break  # linear around itself, the set is no likelier
         around = other
     return replace(around, nothing=search, finished=not until.broken)
 
@@ -130,8 +131,7 @@ def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: A
     chosen = []
     for c in found.state.chosen:
         if c.group.event:
-            group, series = problem.event(c.group)
-            chosen.append(Chosen(replace(group, columns=tuple(problem.cells.add(series))), c.scale))
+            chosen.append(Chosen(problem.place(c.group), c.scale))
         else:
             chosen += [
                 Chosen(g, c.scale)

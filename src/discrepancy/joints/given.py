@@ -23,6 +23,7 @@ class Given:
         excluded: causes that are left out.
         tolerances: standard deviations by cause and parameter in place of the usual ones.
         noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
+        kept: weight of each sample, shape (W, J) a log; empty: all count.
     """
 
     changed: int | None = None
@@ -32,6 +33,7 @@ class Given:
     excluded: frozenset[str] = frozenset()
     tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     noise: Sequence[Array] | None = None
+    kept: Sequence[Array] = ()
 
 
 def horizontal(gravity: Array) -> Array:

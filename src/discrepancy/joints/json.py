@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 
 from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
-from discrepancy.joints.causes import WORDS
+from discrepancy.joints.causes import LINKS, WORDS
 from discrepancy.joints.findings import Finding, Foretold, JointVerdict, Limit, Member, Offer, Rival, Scatter
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.said import Said, joint_in_words, link_in_words, titled
@@ -89,12 +89,11 @@ class _Told:
         """A place in words."""
         if joint is not None and partner is not None:
             return f"joints {min(joint, partner)} and {max(joint, partner)}"
+        if cause in LINKS:
+            return place if place.startswith("all ") else link_in_words(place)
         if joint is None and place in self.model.joints:
             joint = self.model.joints.index(place) + 1
-        if joint is not None:
-            return joint_in_words(joint, self.model.joints[joint - 1])
-        is_link = cause in WORDS and "link" in WORDS[cause].title and not place.startswith("all ")
-        return link_in_words(place) if is_link else place
+        return place if joint is None else joint_in_words(joint, self.model.joints[joint - 1])
 
     def finding(self, f: Finding) -> Values:
         """An entry of ``causes`` and ``suspected``."""

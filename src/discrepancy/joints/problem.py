@@ -29,7 +29,7 @@ from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.signals import Signals
-from discrepancy.joints.unlisted import SIGNALS, functions
+from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
 from estimator.filtering import low_pass
 
@@ -59,6 +59,8 @@ PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 BEGIN_S = 1.0
 """Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
 died to 15 %; in a stand or a soft joint it looks like a push."""
+READ_RAD = 0.02
+"""Standard deviation of an unlisted error of a position."""
 UNLISTED_NATS = 5.0
 """Log odds of a listed cause over something that no table lists."""
 REST = 1.5
@@ -76,6 +78,7 @@ class JointProblem:
         parts: smoothed logs, around which columns are made.
         cut: samples of each that are rows.
         cells, groups, families, laws: of the engine.
+        withheld: groups of causes that are left out, whose tolerances stay.
         labels: names of the columns.
         tolerance: standard deviations of a healthy robot, shape (K,).
         series: the columns.
@@ -96,6 +99,7 @@ class JointProblem:
     cut: list[slice]
     cells: Cells
     groups: list[Group] = field(default_factory=list)
+    withheld: list[Group] = field(default_factory=list)
     families: list[list[int]] = field(default_factory=list)
     laws: list[list[int]] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
@@ -151,8 +155,10 @@ class JointProblem:
             )
         return S
 
-    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
+        if late:
+            return []
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]
@@ -175,7 +181,7 @@ class JointProblem:
                 best = int(np.argmax(gain))
                 found.append((float(gain[best]), t, best, n))
         return [
-            self.event(self._window(t, first, n, -math.log(windows)))
+            self._window(t, first, n, -math.log(windows))
             for _, t, first, n in sorted(found, reverse=True)[:EVENTS]
         ]
 
@@ -185,12 +191,15 @@ class JointProblem:
         place = f"last link from {first / rate:.1f} s of log {trial + 1}"
         return Group("push", place, (), (PUSH_N,) * 3, log_prior, shape, event=True)
 
-    def event(self, group: Group) -> tuple[Group, list[Series]]:
+    def place(self, group: Group) -> Group:
         """A push with its columns: force along the world's axes, half a sine long."""
-        return group, self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)])
+        columns = self.cells.add(self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)]))
+        return replace(group, columns=tuple(columns))
 
-    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
         """The same push a little earlier, later, shorter and longer."""
+        if not group.event:
+            return []
         shape = dict(group.shape)
         trial = int(shape["trial"])
         rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
@@ -207,7 +216,7 @@ class JointProblem:
             length = round(stretch * n)
             first = round(middle + shift * n - 0.5 * length)
             if length > 2 and first >= BEGIN_S * rate and first + length <= most:
-                out.append(self.event(self._window(trial, first, length, group.log_prior)))
+                out.append(self._window(trial, first, length, group.log_prior))
         return out
 
     def _swaying(self, group: Group, compliance: float) -> list[Series]:
@@ -220,10 +229,10 @@ class JointProblem:
                 for wave in (np.sin, np.cos):
                     way = [np.zeros(len(p.time)) for p in self.parts]
                     way[t] = size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S)
-                    out.append(self._displaced(joint, way))
+                    out.append(self.displaced(joint, way))
         return out
 
-    def _displaced(self, joint: int, way: Sequence[Array]) -> Series:
+    def displaced(self, joint: int, way: Sequence[Array]) -> Series:
         """Torques of a joint that is where the model does not have it, a series (W,) a log."""
         moved = [along(s, joint, x)[c] for s, x, c in zip(self.parts, way, self.cut, strict=True)]
         return {
@@ -251,7 +260,7 @@ class JointProblem:
         if group.cause == "joint_zero":
             joint, zero = self.model.joints.index(group.place), float(values[group.columns[0]])
             turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]
-            return self.rows([self._displaced(joint, way) for way in turns])
+            return self.rows([self.displaced(joint, way) for way in turns])
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -314,9 +323,10 @@ class _Builder:
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
         top *= MOTOR_SHARE if more.motors else 1.0
         edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
-        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S)
         self.residual = residual
         known = range(self.J) if more.joints is None else more.joints
+        kept = [w[:, list(known)] for w in more.kept]
+        self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S, kept)
         self.channel = {j: c for c, j in enumerate(known)}
         self.out = JointProblem(
             model, self.parts, self.cut, self._cells(residual), joints=self.joints, channel=self.channel
@@ -408,14 +418,10 @@ class _Builder:
     ) -> None:
         # Between two days a link carries more or less, and is what it was.
         same = self.more.changed is not None and more.get("family") and cause != "payload"
-        if (
-            same
-            or cause in self.more.excluded
-            or not any(j in self.channel for k in columns for j in self.out.series[k])
-        ):
+        if same or not any(j in self.channel for k in columns for j in self.out.series[k]):
             return
-        sizes = tuple(float(x) for x in slab)
-        self.out.groups.append(Group(cause, place, tuple(columns), sizes, **more))
+        groups = self.out.withheld if cause in self.more.excluded else self.out.groups
+        groups.append(Group(cause, place, tuple(columns), tuple(float(x) for x in slab), **more))
 
     def built(self) -> JointProblem:
         for j in range(self.J):
@@ -438,14 +444,8 @@ class _Builder:
         out.changed = self.more.changed
         body = int(self.tree.joint_body[self.tree.last_link])
         none = self.more.motors or "push" in self.more.excluded  # a gear that sticks looks like a push
-        out.pushed = (
-            []
-            if none
-            else [
-                force_torque(s.motion, body, self.tree.com[body])[c]
-                for s, c in zip(self.parts, self.cut, strict=True)
-            ]
-        )
+        for s, c in zip(self.parts, self.cut, strict=True) if not none else ():
+            out.pushed.append(force_torque(s.motion, body, self.tree.com[body])[c])
         for i, label in enumerate(out.labels):  # from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
@@ -465,8 +465,9 @@ class _Builder:
         band = np.concatenate([self.bands.of_trial(t) for t in range(len(noise))])
         rows = np.bincount(band, minlength=len(self.bands.edges_hz) - 1)
         power = [
-            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise]) ** 2, len(rows))
-            for j in self.channel
+            np.bincount(band, self.bands.spectrum([x[:, j] for x in noise], c) ** 2, len(rows))
+            / self.bands.share(c)
+            for j, c in self.channel.items()
         ]
         return np.array(power) / np.maximum(rows, 1)
 
@@ -528,10 +529,16 @@ class _Builder:
                     cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(cause.shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
-        for number, (signal, terms, sizes) in enumerate(functions(self.joints[j])):
-            index = [self.add(f"{n} unlisted {signal} {k}", 0.0, {j: x}) for k, x in enumerate(terms)]
+        for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
+            if signal == "neighbour's torque" and not j:
+                continue
+            read, slab = signal == "reading", READ_RAD if signal == "reading" else self.spans[j].torque
+            index = [
+                self.add(f"{n} unlisted {signal} {k}", 0.0, self.out.displaced(j, x) if read else {j: x})
+                for k, x in enumerate(terms)
+            ]
             self.group(
-                "unlisted", n, index, self.spans[j].torque * sizes, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
+                "unlisted", n, index, slab * SIZES, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
                 shape=(("signal", float(number)),), late=True,
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
@@ -556,21 +563,15 @@ class _Builder:
 
     def _geometry(self, j: int) -> None:
         n, body = self.names[j], int(self.tree.joint_body[j])
-        zero = self.add(
-            f"{n} zero",
-            self.sd("joint_zero", "zero_rad", ZERO_RAD),
-            self.wide(lambda s: along(s, j, np.ones(len(s.time)))),
-        )
+        tolerance = self.sd("joint_zero", "zero_rad", ZERO_RAD)
+        zero = self.add(f"{n} zero", tolerance, self.wide(lambda s: along(s, j, np.ones(len(s.time)))))
         self.group("joint_zero", n, [zero], [0.1])
         moved = {id(s): by_displacement(s.motion, body) for s in self.parts}
-        lengths = [
-            self.add(
-                f"{n} length {'xyz'[k]}",
-                self.sd("link_length", f"{'xyz'[k]}_m", LENGTH_M),
-                self.wide(lambda s, k=k: moved[id(s)][:, :, k]),
-            )
-            for k in range(3)
-        ]
+        lengths = []
+        for k, x in enumerate("xyz"):
+            tolerance = self.sd("link_length", f"{x}_m", LENGTH_M)
+            column = self.wide(lambda s, k=k: moved[id(s)][:, :, k])
+            lengths.append(self.add(f"{n} length {x}", tolerance, column))
         self.group("link_length", n, lengths, [0.02] * 3)
         self._coupled(j)
 
@@ -619,7 +620,7 @@ class _Builder:
         self.group("gravity_compensation", "robot", [share], [0.5])
 
     def _link(self, body: int) -> None:
-        # Torques are linear in a link's inertial numbers: columns around the model's own are exact for its load.
+        # Torques are linear in moments, which are products of mass and centre: columns around their values.
         n, t, zero = self.model.model.body(body).name, self.given, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
         m, c = t.mass[body], t.com[body]
@@ -630,13 +631,15 @@ class _Builder:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
-        mass = column(f"{n} mass share", spread, inertial_parameters(m, c, zero))
-        half = -math.log(2.0)
+        moved = {} if loaded else self.values  # a load has columns of its own, which are exact
+        at = c + [moved.get(f"{n} com {x}", 0.0) for x in "xyz"]
+        mass = column(f"{n} mass share", spread, inertial_parameters(m, at, zero))
+        half, heavy = -math.log(2.0), m * max(1.0 + moved.get(f"{n} mass share", 0.0), 0.05)
         self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):
             e = 1e-4 * np.eye(3)[k]
-            change = inertial_parameters(m, c + e, zero) - inertial_parameters(m, c - e, zero)
+            change = inertial_parameters(heavy, at + e, zero) - inertial_parameters(heavy, at - e, zero)
             tolerance = self.sd("link_com", f"{'xyz'[k]}_m", INERTIA * max(abs(c[k]), LEAST_COM_M))
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
         self.group("link_com", n, coms, [0.1] * 3, family=family)
@@ -645,14 +648,8 @@ class _Builder:
         self.group("link_inertia", n, [inertia], [2.0], family=family)
         whole = [mass, *coms, inertia]
         self.group(
-            "link_mass",
-            n,
-            whole,
-            [1.0, 0.1, 0.1, 0.1, 2.0],
-            log_prior=half,
-            family=family,
-            shape=(("whole", 1.0),),
-        )
+            "link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], log_prior=half, family=family, shape=(("whole", 1.0),),
+        )  # fmt: skip
         if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.joints.mechanics.motion import Motion
-from discrepancy.joints.mechanics.regressor import force_torque
 from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -26,8 +25,8 @@ CUTOFF_HZ = 20.0
 """Cut-off of the rows. Chosen: arms move below 5 Hz, and bend from some 10 Hz on."""
 CUTOFF_SHARE = 0.15
 """The same over the sampling rate, at most. Chosen."""
-SLOW_SHARES = (0.01, 0.003, 0.03, 0.1)
-"""Of a joint's typical speed, below which the direction of friction fades; the first is the catalogue's. Chosen."""
+SLOW_SHARE = 0.01
+"""Of a joint's typical speed, below which the direction of friction fades. Chosen."""
 SLOW_ROUNDINGS = 2.0
 """The same, at least, over what rounding of the positions makes of a velocity. Chosen: two standard deviations; a joint
 that creeps through the steps of a coarse encoder has no direction."""
@@ -97,34 +96,13 @@ class Signals:
         """Of the nominal tree's bodies."""
         return Motion.of(self.tree, self.q, self.dq, self.ddq)
 
-    @cached_property
-    def pushed(self) -> Array:
-        """Joint torques per newton on the last link's centre of mass along the world's axes, shape (W, J, 3)."""
-        body = int(self.tree.joint_body[self.tree.last_link])
-        return force_torque(self.motion, body, self.tree.com[body])
-
-    @property
-    def residual(self) -> Array:
-        """Measured torque minus what the nominal model asks for, shape (W, J)."""
-        return self.torque - self.asked
-
-    @property
-    def asked(self) -> Array:
-        """Torques that the nominal model asks for, its friction included, shape (W, J)."""
-        dry = self.tree.coulomb * self.direction(self.slow)
-        return self.inverse + dry + self.tree.viscous * self.dq
-
     @property
     def slow(self) -> Array:
         """Speeds below which the direction of friction fades, shape (J,): slow, and told from the reading's steps."""
         cutoff, rate = smoothing_hz(self.log.rate_hz), self.log.rate_hz
         # Rounding as white noise of step^2 / 12, low-passed and differentiated.
         rounding = self.log.position_step * 2.0 * np.pi * np.sqrt(cutoff**3 / (18.0 * rate))
-        return np.maximum(SLOW_SHARES[0] * self.typical, SLOW_ROUNDINGS * rounding)
-
-    def direction(self, slow: Array) -> Array:
-        """Direction of motion in [-1, 1], shape (W, J); it fades below the speeds ``slow``, shape (J,) or ()."""
-        return np.clip(self.dq / slow, -1.0, 1.0)
+        return np.maximum(SLOW_SHARE * self.typical, SLOW_ROUNDINGS * rounding)
 
 
 def smoothing_hz(rate_hz: float) -> float:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from discrepancy.joints.mechanics.nominal import inverse_torque
 from discrepancy.joints.mechanics.tree import Tree
@@ -30,6 +31,9 @@ LEAST_S, LEAST_SAMPLES = 2.0, 40
 """A part that is used, at least."""
 PARTS, PART_S = 3, 4.0
 """Parts of a single log, and their length at least: each holds most of the motion's poses."""
+LIMIT_RAD, LIMIT_M, LIMIT_S = 6e-3, 3e-3, 0.05
+"""How near to a limit its force may act, and how long what is left out fades. Derived: three tolerances of zeros and
+lengths; half a period of the fastest row."""
 LEAST_SPEED = 1e-6
 RESTS = 2.0
 """Noise over which readings of a joint must scatter for it to move."""
@@ -47,6 +51,8 @@ class Trials:
         parts: for each part its run and the samples of it.
         names: of the parts.
         noise: a draw of what the sensors add to the residual of each run, shape (W, J).
+        kept: weight of each sample of each run, zero where a joint is at a limit, shape (W, J); empty: none is.
+        limited: time that each joint spends at its limits [s], shape (J,).
     """
 
     runs: tuple[Signals, ...]
@@ -56,6 +62,8 @@ class Trials:
     parts: tuple[tuple[int, slice], ...]
     names: tuple[str, ...]
     noise: tuple[Array, ...]
+    kept: tuple[Array, ...]
+    limited: Array
 
     @property
     def signals(self) -> tuple[Signals, ...]:
@@ -97,7 +105,27 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
         edges = np.linspace(0, len(s.time), most + 1).astype(int)
         parts += [(k, slice(int(a), int(b))) for a, b in itertools.pairwise(edges)]
     names = tuple(_name(runs[k], at, whole=len(parts) == len(every)) for k, at in parts)
-    return Trials(tuple(runs), changed, joints, motors, tuple(parts), names, noise)
+    kept, limited = off_limits(model, runs)
+    return Trials(tuple(runs), changed, joints, motors, tuple(parts), names, noise, kept, limited)
+
+
+def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array, ...], Array]:
+    """Weights of samples that fade to zero where a joint is at a limit, whose force nobody knows, and the time there.
+
+    A joint that spends most of its time beyond its limits has others than the model.
+    """
+    slack = model.model.jnt_margin + np.where(model.slides, LIMIT_M, LIMIT_RAD)
+    at = [(s.q < model.lower + slack) | (s.q > model.upper - slack) for s in runs]
+    time = np.sum([x.sum(axis=0) / s.rate_hz for x, s in zip(at, runs, strict=True)], axis=0)
+    time[time > 0.5 * sum(len(s.time) / s.rate_hz for s in runs)] = 0.0
+    if not time.any():
+        return (), time
+    kept = []
+    for x, s in zip(at, runs, strict=True):
+        n = round(LIMIT_S * s.rate_hz)
+        wide = maximum_filter1d((x & (time > 0)).astype(float), 4 * n + 1, axis=0)
+        kept.append(1.0 - uniform_filter1d(wide, 2 * n + 1, axis=0))
+    return tuple(kept), time
 
 
 def part_of(s: Signals, at: slice) -> Signals:
@@ -144,6 +172,13 @@ def notes_of(logs: Sequence[JointLog]) -> Iterator[str]:
         more = len(notes) - 1
         parts = f"{more} more part{'s' if more > 1 else ''} of the logs"
         yield notes[0] + (f" So it is, with other numbers, in {parts}." if more else "")
+
+
+def at_limits(model: SerialModel, limited: Array) -> Iterator[str]:
+    """What is left out because a joint is at a limit of the model."""
+    for name, seconds in zip(model.joints, limited, strict=True):
+        if seconds:
+            yield f"{seconds:.2g} s of {name} at its limits in the model are left out: nobody knows the limit's torque."
 
 
 def resting(logs: Sequence[JointLog]) -> Iterator[str]:

@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.evidence.odds import Odds, odds_of
+from discrepancy.evidence.odds import Odds, borne_out, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.joints.causes import LINKS
 from discrepancy.joints.diagnose import Outcome, Until, diagnose
 from discrepancy.joints.findings import (
     Event,
@@ -32,7 +33,7 @@ from discrepancy.joints.model import SerialModel
 from discrepancy.joints.parts import Parts
 from discrepancy.joints.servo.loop import loop_laws, sentences
 from discrepancy.joints.servo.motor import driven_by_voltage
-from discrepancy.joints.trials import Trials, notes_of, resting, trials_of
+from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
 from discrepancy.joints.unlisted import SIGNALS
 from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
@@ -90,6 +91,7 @@ def judged(
     )
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
+    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)
     return _Judge(model, trials, outcome, parts, odds).verdict([*notes_of([*logs, *reference])])
@@ -134,7 +136,7 @@ class _Judge:
             before=tuple(self._offers(plain, nothing)),
             after=tuple(self._offers(self.search, self.state)),
             limits=tuple(self._limits()),
-            notes=(*notes, *resting(logs), *self._notes()),
+            notes=(*notes, *at_limits(self.model, self.trials.limited), *resting(logs), *self._notes()),
             finished=self.outcome.finished,
             by_the_others=self.by_the_others,
             traces=self.traces,
@@ -156,8 +158,9 @@ class _Judge:
         kin = [g for g in told if g.key == own.key or (own.family and g.family == own.family)]
         return nothing < 1.0 - NAMED and bool(kin or [g for g in told[:1] if g.cause == "unlisted"])
 
-    def _joint(self, place: str) -> int | None:
-        return self.model.joints.index(place) + 1 if place in self.model.joints else None
+    def _joint(self, cause: str, place: str) -> int | None:
+        known = cause not in LINKS and place in self.model.joints
+        return self.model.joints.index(place) + 1 if known else None
 
     def _findings(self, o: Odds, values: Posterior | None = None) -> list[Finding]:
         """One finding; members of a kind of which less than half are off are findings of their own."""
@@ -170,14 +173,14 @@ class _Judge:
         kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
         unlisted = c.cause == "unlisted"
         rivals = tuple(
-            Rival(r.group.cause, r.group.place, self._joint(r.group.place), r.probability,
+            Rival(r.group.cause, r.group.place, self._joint(*r.group.key), r.probability,
                   float(np.log(max(o.probability, 1e-12) / max(r.probability, 1e-12))))
             for r in o.rivals[:RIVALS] if r.group is not None
         )  # fmt: skip
         plain = Finding(
             cause="unlisted" if unlisted else c.cause,
             place=c.place,
-            joint=self._joint(c.place),
+            joint=self._joint(*c.key),
             members=() if unlisted else self._members(c, values or self.whole),
             probability=probability + kin,
             over_nothing=o.over_nothing,
@@ -203,7 +206,7 @@ class _Judge:
         return bool(np.any(np.abs(self.whole.mean[at]) > SIGNIFICANT_SE * size))
 
     def _partner(self, group: Group) -> int | None:
-        joint = self._joint(group.place)
+        joint = self._joint(*group.key)
         return joint - 1 if group.cause == "coupled_drive" and joint else None
 
     def _event(self, group: Group) -> Event | None:
@@ -228,7 +231,7 @@ class _Judge:
             values, errors = physical(
                 self.problem, own, posterior.mean[at], posterior.covariance[np.ix_(at, at)]
             )
-            out.append(Member(place, self._joint(place), values, errors))
+            out.append(Member(place, self._joint(*own.key), values, errors))
         return tuple(out)
 
     def by_the_others(self, trial: int) -> tuple[Finding, ...]:
@@ -336,7 +339,7 @@ class _Judge:
         taken = {k for c in self.state.chosen for k in c.group.columns}
         kinds: dict[str, list[tuple[Group, float]]] = {}
         p = self.state.posterior
-        for g in self.problem.groups:
+        for g in (*self.problem.groups, *self.problem.withheld):
             if g.members or (g.shape and any(v for _, v in g.shape)) or taken & set(g.columns):
                 continue
             sizes = [self.problem.tolerance[k] for k in g.columns]
@@ -346,7 +349,7 @@ class _Judge:
         out = []
         for cause, each in kinds.items():
             factor = float(np.sqrt(np.mean([off for _, off in each])))
-            if len(each) > 1 and factor > SCATTER:
+            if factor > SCATTER:
                 far = sorted(each, key=lambda pair: -pair[1])
                 members = tuple(m for g, _ in far for m in self._members_of(g))
                 sizes = np.array([self.problem.tolerance[k] for k in far[0][0].columns])
@@ -357,17 +360,19 @@ class _Judge:
     def _members_of(self, g: Group) -> Iterator[Member]:
         p, k = self.state.posterior, list(g.columns)
         values, errors = physical(self.problem, g, p.mean[k], p.covariance[np.ix_(k, k)])
-        yield Member(g.place, self._joint(g.place), values, errors)
+        yield Member(g.place, self._joint(*g.key), values, errors)
 
     def _offers(self, search: Search, state: State) -> Iterator[Offer]:
         for nats, chosen in search.offers(state)[:OFFERS]:
             g = chosen.group
-            yield Offer(g.cause, g.place, self._joint(g.place), nats)
+            yield Offer(g.cause, g.place, self._joint(*g.key), nats)
 
     def _limits(self) -> Iterator[Limit]:
         """Sizes that would be noticed nine times in ten, with everything else as it was found."""
         taken = {c.group.key for c in self.state.chosen}
-        need = np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats)) + NOTICED
+        s = self.search.settings
+        open_ = s.open_nats if taken else 0.0
+        need = np.sqrt(2.0 * (self.search.against + s.need_nats + open_)) + NOTICED
         for g in self.problem.groups:
             known = g.key in taken or (g.cause, "all joints") in taken
             if known or g.members or g.cause == "unlisted" or any(v for _, v in g.shape):
@@ -381,7 +386,7 @@ class _Judge:
                 told = {n: abs(x) if ok else None for (n, x), ok in zip(value.items(), seen, strict=True)}
             else:
                 continue
-            yield Limit(g.cause, g.place, self._joint(g.place), told)
+            yield Limit(g.cause, g.place, self._joint(*g.key), told)
 
     def _notes(self) -> Iterator[str]:
         for motor in self.trials.motors:

@@ -47,8 +47,6 @@ REFIT_ROUNDS, SHORT_ROUNDS = 3, 12
 LEAST_STEP = 0.2
 """Of a step, beyond which it is halved where it makes things worse. Derived: with a slope k times that of the columns
 steps of a share s leave |1 - s k| of the error, so that down to an eighth all k below 16 settle."""
-PUSH_MOVES = (-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4)
-"""By which ends of a push are moved to refine it, in its duration. Chosen."""
 EVENT_PARTS = 16
 """Parts of an event's interval in which its ends are sought, and of these at its ends. Chosen: 0.4 % of it."""
 EVENT_LOUD_POWER = 2.25

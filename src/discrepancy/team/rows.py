@@ -261,7 +261,18 @@ class TeamRows(Rig):
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        out, there = [], {candidate.key for candidate, _ in active}
+        there = {candidate.key for candidate, _ in active}
+        left = self.residual_there(shared, local, active)
+        return [
+            x + self._all_at_origin(t) - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there)
+            for t, x in enumerate(left)
+        ]
+
+    def residual_there(
+        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        """The exact whitened residual where all is linear: what the robots are off by is in none of it."""
+        out = []
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
             unknowns = linear.shared.moved(shared), linear.bases.moved(x)
@@ -273,8 +284,7 @@ class TeamRows(Rig):
             residual += as_loud(signals, *unknowns, linear, self.sensed.signals[t])
             for candidate, values in modelled:
                 residual -= self._unwhitened(t, candidate) @ self.beyond(candidate, values)
-            left = self.whitening[t](residual) + self._all_at_origin(t)
-            out.append(left - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there))
+            out.append(self.whitening[t](residual))
             rested(linear)
         return out
 

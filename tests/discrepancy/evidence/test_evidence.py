@@ -44,7 +44,9 @@ def covariance_of_rows(
     cells: Cells, X: list[np.ndarray], prior: np.ndarray, variance: np.ndarray
 ) -> np.ndarray:
     """Dense covariance of all rows, channel after channel."""
-    noise = np.concatenate([np.repeat(v, n) for v, n in zip(variance, cells.rows, strict=True)])
+    noise = np.concatenate(
+        [np.repeat(v, np.diff(c.starts)) for v, c in zip(variance, cells.channels, strict=True)]
+    )
     every = np.concatenate(X)
     return np.diag(noise) + (every * prior) @ every.T
 
@@ -142,15 +144,25 @@ def test_covariance_is_the_scatter_of_the_values() -> None:
     assert abs(np.mean(np.prod(errors, axis=1))) < 0.15
 
 
-def test_blocks_are_those_of_the_covariance_also_where_columns_came_later(rng: np.random.Generator) -> None:
+def test_squares_explained_are_those_of_the_covariance_also_where_columns_came_later(
+    rng: np.random.Generator,
+) -> None:
     cells, _, _ = problem(rng)
     p = Posterior(cells, np.array([0.5, 0.0, 2.0, 0.1]), rng.uniform(0.3, 2.0, (2, 3)))
     expected = p.covariance
     cells.add([{1: [rng.standard_normal(n) for n in LENGTHS]}])
     assert p.variances == pytest.approx(np.diag(expected), rel=1e-10)
-    for channel, block in zip(cells.channels, p.blocks, strict=True):
-        k = channel.columns[channel.columns < 4]
-        assert block[: len(k), : len(k)] == pytest.approx(expected[np.ix_(k, k)], abs=1e-12)
+    mean, wide = np.append(p.mean, 0.0), np.pad(expected, ((0, 1), (0, 1)))
+    for found, full in zip(p.left, cells.left(mean, wide), strict=True):
+        assert found == pytest.approx(full, rel=1e-10)
+
+
+def test_what_a_group_is_worth_is_the_difference_of_evidences(rng: np.random.Generator) -> None:
+    cells, _, _ = problem(rng)
+    prior, variance = np.array([0.5, 0.0, 2.0, 0.1]), rng.uniform(0.3, 2.0, (2, 3))
+    less = np.array([0.5, 0.0, 0.0, 0.04])
+    expected = Posterior(cells, prior, variance).log_evidence - Posterior(cells, less, variance).log_evidence
+    assert Posterior(cells, prior, variance).worth([2, 3], less[[2, 3]]) == pytest.approx(expected, rel=1e-9)
 
 
 def test_noise_is_learnt() -> None:

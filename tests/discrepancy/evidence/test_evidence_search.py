@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells, Series
+from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from estimator.arrays import Array
@@ -31,10 +32,13 @@ class Machine:
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         return np.zeros(self.cells.count)
 
-    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         return []
 
-    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+    def place(self, group: Group) -> Group:
+        return group
+
+    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
         return []
 
     def forms(self, group: Group, values: Array) -> list[Series]:
@@ -100,3 +104,68 @@ def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) ->
     else:
         assert share.max() < 0.01
         assert state.evidence > plain.evidence - 6.0
+
+
+def test_what_is_unlisted_stands_only_for_what_listed_causes_leave() -> None:
+    """Its columns span the listed cause, too, so that it alone would be likelier."""
+    rng = np.random.default_rng(5)
+    x, other = wave(rng), wave(rng)
+    y = 5.0 * x + 0.3 * other + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]}, {0: [x]}, {0: [other]}])
+    listed = Group("cause", "joint", (0,), (5.0,))
+    machine = Machine(cells, [listed, Group("unlisted", "joint", (1, 2), (5.0, 1.0), late=True)])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    state = search.run(search.value([], None))
+    assert state.keys == {("cause", "joint"), ("unlisted", "joint")}
+
+
+def test_a_law_that_only_brings_its_errors_is_not_found() -> None:
+    """What a tolerance has in full leaves something else, which a law's errors have, and its law has not."""
+    rng = np.random.default_rng(5)
+    x, other = wave(rng), wave(rng)
+    y = 2.0 * x + 0.4 * other + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]}, {0: [x]}])
+
+    class Tolerated(Machine):
+        def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+            return np.array([0.0, 4.0])
+
+    machine = Tolerated(cells, [Group("cause", "joint", (0,), (3.0,))], others=[other])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    assert search.fixed([Chosen(machine.groups[0], 1.0)]).chosen == ()
+
+
+@pytest.mark.parametrize("large", [0.0, 5.0])
+def test_a_small_cause_is_sure_alone_and_not_beside_what_a_large_one_may_leave(large: float) -> None:
+    rng = np.random.default_rng(6)
+    columns = [wave(rng), wave(rng)]
+    y = large * columns[0] + 0.0053 * columns[1] + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]} for x in columns])
+    machine = Machine(cells, [Group(name, "joint", (k,), (1.0,)) for k, name in enumerate(("one", "other"))])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    wanted = machine.groups if large else machine.groups[1:]
+    state = search.settled(search.value([Chosen(g, 1.0) for g in wanted], None))
+    *_, small = odds_of(search, state)
+    assert 5.0 < small.over_nothing < 9.5
+    assert small.probability < 0.5 if large else small.probability > 0.99
+
+
+def test_of_two_causes_that_are_nearly_alike_one_stays() -> None:
+    """Either alone explains what both do, but for a few nats: that there is one of them stays certain."""
+    rng = np.random.default_rng(7)
+    x, y = wave(rng), wave(rng)
+    twin = x + 0.02 * y
+    torque = 0.5 * x + 0.005 * y + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [torque[:, None]])
+    cells.add([{0: [x]}, {0: [twin]}])
+    machine = Machine(cells, [Group(name, "joint", (k,), (1.0,)) for k, name in enumerate(("one", "twin"))])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    both = search.settled(search.value([Chosen(g, 1.0) for g in machine.groups], None))
+    state = borne_out(search, both)
+    assert len(state.chosen) == 1
+    (only,) = odds_of(search, state)
+    assert only.over_nothing > 100.0
+    assert sum(r.probability for r in only.rivals if r.group is None) < 1e-6

@@ -1,0 +1,94 @@
+"""From recordings of a team to the likeliest causes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from discrepancy import rules
+from discrepancy.evidence.search import Search, State
+from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.team.around import around, exact, opened_by, placed
+from discrepancy.team.problem import TeamProblem, team_problem
+from discrepancy.team.rows import TeamRows
+from estimator.errors import InputError
+
+LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
+"""Causes after which rows have another noise: a search goes on only beside what they leave open."""
+
+
+@dataclass(frozen=True, eq=False)
+class TeamOutcome:
+    """What a search found.
+
+    Attributes:
+        problem: linear around what was found.
+        search: on it.
+        state: the likeliest set.
+        nothing: the search and the state without causes, around the robots as they are found without.
+        finished: whether the search came to its end.
+    """
+
+    problem: TeamProblem
+    search: Search
+    state: State
+    nothing: tuple[Search, State]
+    finished: bool = True
+
+
+def search_team(
+    rig: TeamRows, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> TeamOutcome:  # fmt: skip
+    """The likeliest causes of what a team's model leaves of its recordings."""
+    problem = team_problem(rig)
+    search = Search(problem, problem.sensors, settings, say, stop)
+    state = search.fixed(())
+    for _ in range(settings.rounds):
+        moved = _moved(problem, state)
+        if moved is None:
+            break
+        say("linear around the robots as they are found")
+        problem = moved
+        search = replace(search, problem=problem)
+        state = search.fixed(())
+    nothing = search, state
+    state = search.run(state, LEAVE_OPEN)
+    for _ in range(2 * settings.rounds):
+        if not state.chosen or stop():
+            break
+        before = state.keys
+        search, state, same = _beside(search, state)
+        if same:
+            break
+        state = search.run(state, LEAVE_OPEN)
+        if state.keys == before:
+            break
+    return TeamOutcome(search.problem, search, state, nothing, not stop())
+
+
+def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
+    try:
+        return around(problem, state)
+    except InputError:  # no such robots: what acts on these is something else
+        return None
+
+
+def _beside(search: Search, state: State) -> tuple[Search, State, bool]:
+    """The same set in a problem that is linear around it, and whether that is the same problem but for little."""
+    old = search.problem
+    opened, moved = opened_by(old, state), _moved(old, state)
+    problem, same = old, True
+    if opened is not None or moved is not None or old.opened is not None:
+        near = moved or old
+        problem, same = team_problem(near.rig, opened, near.catalogue), False
+        search = replace(search, problem=problem, best=None)
+        state = search.fixed(placed(problem, old, state.chosen))
+    for _ in range(search.settings.rounds):
+        problem, miss = exact(problem, state)
+        search = replace(search, problem=problem, best=None)
+        state = search.settled(search.value(state.chosen, state.posterior))
+        if miss < rules.STRAIGHT_CHI2_PER_N:
+            break
+        same = same and miss < rules.STRAIGHT_BESIDE_CHI2_PER_N
+    return search, state, same

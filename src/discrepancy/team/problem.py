@@ -1,0 +1,525 @@
+"""Recordings of a team as a linear problem, linear around given robots, payload and causes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+
+from discrepancy import rules
+from discrepancy.candidate import Candidate, Transient
+from discrepancy.evidence.cells import Cells, Series
+from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.search import Chosen
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.linear.origin import origin_of
+from discrepancy.team.rows import TeamRows
+from discrepancy.team.unlisted import Laws
+from estimator.arrays import Array
+
+EDGES_HZ = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
+"""Octaves of the noise; rows come 12.5 times a second. What rests is a band of its own."""
+UNKNOWN = 1e4
+"""Standard deviations that the data alone would leave of an unknown, in which its prior is as wide as none."""
+SLAB = 64.0
+"""Largest size of a fault that is expected, in tolerances or typical sizes."""
+LIKELIEST = 8
+"""Shapes and events whose exact linear gain is computed in each step."""
+NEAR = 3
+"""Shapes nearby whose evidence is computed in each step."""
+STEP_SHARE = 1.0
+"""Standard deviation of a step of a number of a shape, in that number."""
+EXACT = ("phi_zero", "theta_zero", "link_length", "base_tilt", "sea_bias", "payload_mass", "clock_delay", "torque_skew")
+"""Causes whose law is geometry or arithmetic."""
+Values = Mapping[tuple[object, ...], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class RowBands:
+    """Cosine coefficients of the moving rows of each trial by octave; rows of holds are a band of their own.
+
+    Attributes:
+        rates_hz: of moving rows.
+        moving, lengths: how many rows move, and all of them.
+        edges_hz: of the bands; the last is that of the holds.
+    """
+
+    rates_hz: Sequence[float]
+    moving: Sequence[int]
+    lengths: Sequence[int]
+    edges_hz: Array
+
+    def of_trial(self, trial: int) -> NDArray[np.intp]:
+        """Band of every row of a channel of three components, shape (3 n,)."""
+        m, last = self.moving[trial], len(self.edges_hz) - 2
+        frequency = np.arange(m) * self.rates_hz[trial] / (2.0 * m)
+        band = np.minimum(np.searchsorted(self.edges_hz, frequency, side="right") - 1, last - 1)
+        return np.repeat(np.append(band, np.full(self.lengths[trial] - m, last)), 3)
+
+    def share(self, channel: int) -> float:
+        """Of a channel's rows that are kept."""
+        return 1.0
+
+    def spectrum(self, series: Sequence[Array], channel: int = 0) -> Array:
+        """Rows of all trials of one channel, (n, 3, ...) each, as coefficients, shape (sum 3 n, ...)."""
+        out = []
+        for t, x in enumerate(series):
+            m = self.moving[t]
+            moved = np.asarray(dct(x[:m], axis=0, norm="ortho"))
+            out.append(np.concatenate([moved, x[m:]]).reshape(3 * len(x), *x.shape[2:]))
+        return np.concatenate(out)
+
+    def rows(self, spectrum: Array) -> list[Array]:
+        """The inverse, shape (sum 3 n, ...) to (n, 3, ...) each."""
+        out, first = [], 0
+        for m, n in zip(self.moving, self.lengths, strict=True):
+            x = spectrum[first : first + 3 * n].reshape(n, 3, *spectrum.shape[1:])
+            out.append(np.concatenate([np.asarray(idct(x[:m], axis=0, norm="ortho")), x[m:]]))
+            first += 3 * n
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """Causes at places in shapes whose columns are not in the problem.
+
+    Attributes:
+        groups: without columns.
+        X: all their columns in the rows of each channel, in the order of the cells, shape (C, n, k).
+    """
+
+    groups: Sequence[Group]
+    X: Array
+
+    @property
+    def spans(self) -> list[slice]:
+        """Columns of each group."""
+        ends = np.cumsum([len(g.slab) for g in self.groups])
+        return [slice(e - len(g.slab), e) for e, g in zip(ends, self.groups, strict=True)]
+
+
+@dataclass(eq=False)
+class TeamProblem:
+    """A linear problem; see ``evidence.search.Linear``.
+
+    Attributes:
+        rig: the recordings, linear.
+        cells, groups, families, laws: of the engine.
+        labels: candidate of a column, and which parameter; None of unknowns.
+        tolerance: standard deviations of a healthy team, shape (K,).
+        listed: shapes whose columns are not in the problem.
+        shared, local: columns of the unknowns of all trials, and of each.
+        opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C); or None.
+        candidates: by the identity of a group.
+        catalogue: columns that do not change.
+        there: values where all is linear, shape (K,).
+    """
+
+    rig: TeamRows
+    cells: Cells
+    groups: list[Group] = field(default_factory=list)
+    families: list[list[int]] = field(default_factory=list)
+    laws: list[list[int]] = field(default_factory=list)
+    labels: list[tuple[Candidate, int] | None] = field(default_factory=list)
+    tolerance: list[float] = field(default_factory=list)
+    listed: Listed | None = None
+    shared: list[int] = field(default_factory=list)
+    local: list[list[int]] = field(default_factory=list)
+    opened: Sequence[Array] | None = None
+    candidates: dict[Hashable, Candidate] = field(default_factory=dict)
+    catalogue: Catalogue | None = None
+    there: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def sensors(self) -> Array:
+        """Rows are whitened: noise has unit variance."""
+        return np.ones((len(self.cells.channels), len(self.cells.bands.edges_hz) - 1))
+
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        """Variances of unknowns and of a healthy team."""
+        return np.array(self.tolerance) ** 2
+
+    # --- columns
+
+    def rows_of(self, x: Sequence[Array]) -> list[Array]:
+        """Whitened rows (n, C, ...) of every trial beside what chosen causes leave open."""
+        if self.opened is None:
+            return list(x)
+        return [(w @ r.reshape(*r.shape[:2], -1)).reshape(r.shape) for w, r in zip(self.opened, x, strict=True)]
+
+    def columns_of(self, candidate: Candidate) -> list[Array]:
+        """Columns of a candidate, shape (n, C, k) a trial."""
+        return self.rows_of(self.rig.columns(candidate))
+
+    def spectra(self, columns: Sequence[Array]) -> Array:
+        """Columns (n, 3 C, k), one array a trial, as rows of the cells, shape (C, n, k)."""
+        bands, order = self.cells.bands, self.cells.order
+        return np.stack([
+            bands.spectrum([x[:, k : k + 3] for x in columns])[order] for k in range(0, columns[0].shape[1], 3)
+        ])  # fmt: skip
+
+    def add(self, columns: Sequence[Array]) -> list[int]:
+        """Append columns (n, 3 C, k), one array a trial."""
+        return self.cells.add_rows(self.spectra(columns))
+
+    def beside(self, X: Array) -> Array:
+        """Rows of the cells, shape (C, n, k), beside what chosen causes leave open."""
+        if self.opened is None:
+            return X
+        bands, order = self.cells.bands, self.cells.order
+        plain = np.empty_like(X)
+        plain[:, order] = X
+        each = [np.concatenate(parts, axis=1) for parts in zip(*(bands.rows(x) for x in plain), strict=True)]
+        return self.spectra(self.rows_of(each)).astype(X.dtype)
+
+    def listing(self, candidates: Iterable[Candidate], count: int) -> Listed:
+        """Candidates with their columns, apart from the problem; ``count``: shapes of equal probability."""
+        groups, each = [], []
+        for c in candidates:
+            groups.append(self.group_of(c, -math.log(c.among or count)))
+            each.append(self.spectra(self.columns_of(c)).astype(np.float32))
+        return Listed(groups, np.concatenate(each, axis=2))
+
+    def group_of(self, candidate: Candidate, log_prior: float, columns: Sequence[int] = ()) -> Group:
+        """A candidate as a group of the engine."""
+        at = candidate.transient
+        place = candidate.place if at is None else f"{candidate.place} from {at.start_s:.1f} s of trial {at.trial + 1}"
+        shape = tuple((k, float(v)) for k, v in candidate.shape.items())
+        shape += (("trial", float(at.trial)),) if at else ()
+        positive = CAUSES[candidate.cause].positive
+        least = tuple(0.0 if p.name in positive else -np.inf for p in candidate.parameters) if positive else ()
+        g = Group(
+            candidate.cause, place, tuple(columns), tuple(SLAB * candidate.units), log_prior, shape, least,
+            event=at is not None,
+        )  # fmt: skip
+        self.candidates[g.identity] = candidate
+        return g
+
+    def values_of(self, group: Group, x: Array) -> Array:
+        """Values of a group's parameters, those that do not show among them, shape (k,)."""
+        out = np.zeros(len(self.candidates[group.identity].parameters))
+        for n, k in enumerate(group.columns):
+            label = self.labels[k] if k < len(self.labels) else None
+            out[n if label is None else label[1]] = x[k]
+        return out
+
+    def place(self, group: Group) -> Group:
+        """A shape or a law with its columns, which are added to the problem."""
+        law = self.laws_of.laws.get(group.identity) if group.late else None
+        if law is not None:
+            pairs = zip(self.rig.whitening, self.laws_of.columns(law), strict=True)
+            return replace(group, columns=tuple(self.add(self.rows_of([w(x) for w, x in pairs]))))
+        return replace(group, columns=tuple(self.add(self.columns_of(self.candidates[group.identity]))))
+
+    # --- proposals
+
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
+        """The likeliest shapes and pushes; or, late, laws that no table lists."""
+        if late:
+            return self.laws_of.proposed(self, posterior)
+        out: list[Group] = []
+        if self.listed is not None:
+            gains = self.gains(posterior, self.listed)
+            for i in np.argsort(-gains):
+                group = self.listed.groups[i]
+                if sum(g.key == group.key for g in out) < 2:
+                    out.append(group)
+                if len(out) == LIKELIEST:
+                    break
+        return [*out, *self.pushes(posterior)]
+
+    def gains(self, posterior: Posterior, listed: Listed, octaves: int = 5) -> Array:
+        """Log evidence that each listed shape adds, its prior included, shape (L,)."""
+        cells, spans = self.cells, listed.spans
+        s, L, z = posterior._factor
+        active = posterior.active
+        at = np.full(cells.count, -1)
+        at[active] = np.arange(len(active))
+        K = listed.X.shape[2]
+        G, b, squares = np.zeros((len(active), K)), np.zeros(K), [np.zeros((len(g.slab),) * 2) for g in listed.groups]
+        for channel, own, X in zip(cells.channels, posterior.variance, listed.X, strict=True):
+            weight = np.repeat(1.0 / own, np.diff(channel.starts)).astype(np.float32)[:, None]
+            keep = np.flatnonzero(at[channel.columns] >= 0)
+            G[at[channel.columns[keep]]] += (channel.X[:, keep].astype(np.float32) * weight).T @ X
+            b += X.T @ (weight[:, 0] * channel.y)
+            for square, k in zip(squares, spans, strict=True):
+                square += (X[:, k] * weight).T @ X[:, k]
+        U = L.forward(s[:, None] * G)
+        Q, out = b - U.T @ z, np.empty(len(spans))
+        for i, (group, k) in enumerate(zip(listed.groups, spans, strict=True)):
+            R, each = squares[i] - U[:, k].T @ U[:, k], []
+            for scale in 0.5 ** np.arange(octaves):
+                B = np.array(group.slab) * scale
+                w, V = np.linalg.eigh(B[:, None] * R * B)
+                lam = 1.0 + np.maximum(w, 0.0)
+                u = V.T @ (B * Q[k])
+                value = 0.5 * float(np.sum(u**2 / lam - np.log(lam)))
+                each.append(value)
+            out[i] = logsumexp(each) - np.log(octaves) + group.log_prior
+        return out
+
+    def pushes(self, posterior: Posterior) -> list[Group]:
+        """The likeliest push of each duration: force and moment on the payload, constant for a while."""
+        if "push" in self.rig.excluded:
+            return []
+        found, windows = [], 0
+        for t, (score, D) in enumerate(zip(self.left(posterior), self.wrenches, strict=True)):
+            linear = self.rig.linear[t]
+            m, rate, time = linear.reduction.moving, self.cells.bands.rates_hz[t], linear.reduction.time
+            Q = np.einsum("nck,nc->nk", D[:m], score[:m, -6:])
+            R = np.einsum("nck,ncl->nkl", D[:m], D[:m])
+            q, r = (np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)]) for x in (Q, R))
+            ridge = 1e-6 * np.eye(6) * np.trace(r[-1]) / max(m, 1)
+            for seconds in rules.TEAM_PUSH_S:
+                n = max(2, round(seconds * rate))
+                if 2 * n > m:
+                    continue
+                dq, dr = q[n:] - q[:-n], r[n:] - r[:-n] + ridge
+                gain = 0.5 * np.einsum("wk,wk->w", dq, np.linalg.solve(dr, dq[..., None])[..., 0])
+                windows += 2 * len(gain) // n
+                best = int(np.argmax(gain))
+                found.append((float(gain[best]), t, float(time[best]), seconds))
+        given = self.rig.tolerances.get("push", {})
+        return [
+            self.group_of(CAUSES["push"].event(given, Transient(t, start, seconds)), -math.log(windows))
+            for _, t, start, seconds in sorted(found, reverse=True)[:NEAR]
+        ]
+
+    @property
+    def wrenches(self) -> list[Array]:
+        """Whitened balance rows of forces along {b1} and moments in {1}, shape (n, 6, 6) a trial."""
+        if "wrenches" not in self.__dict__:
+            out = []
+            for linear, white in zip(self.rig.linear, self.rig.whitening, strict=True):
+                R = linear.data.R_bi[:, 0]
+                eye = np.broadcast_to(np.eye(3), R.shape)
+                force = linear.of_wrench(np.swapaxes(R, 1, 2), np.zeros_like(R))
+                moment = linear.of_wrench(np.zeros_like(R), eye)
+                out.append(white(np.concatenate([force, moment], axis=2)))
+            self.__dict__["wrenches"] = [x[:, -6:] for x in self.rows_of(out)]
+        return self.__dict__["wrenches"]
+
+    def left(self, posterior: Posterior) -> list[Array]:
+        """Rows that a posterior leaves over their variance, shape (n, C) a trial."""
+        parts = []
+        for channel, own in zip(self.cells.channels, posterior.variance, strict=True):
+            left = (channel.y - channel.X @ posterior.mean[channel.columns]) / np.repeat(own, np.diff(channel.starts))
+            rows = np.empty_like(left)
+            rows[self.cells.order] = left
+            parts.append(self.cells.bands.rows(rows))
+        return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
+
+    @cached_property
+    def laws_of(self) -> Laws:
+        """What no table lists."""
+        return Laws(self.rig.linear)
+
+    # --- shapes and forms
+
+    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
+        """The same cause in neighbouring shapes, the likeliest by the linear problem without it."""
+        if group.late:
+            return []
+        candidate = self.candidates[group.identity]
+        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate) + self.rig.grown(candidate)
+        out = self._stepped(candidate, group, posterior)
+        if near:
+            prior = posterior.prior.copy()
+            base = self.prior((), None)
+            for k in group.columns:
+                prior[k] = base[k] if k < len(base) else 0.0
+            listed = self.listing(near, 1)
+            listed = replace(listed, groups=[replace(g, log_prior=-math.log(c.among or math.exp(-group.log_prior)))
+                                             for g, c in zip(listed.groups, near, strict=True)])  # fmt: skip
+            gains = self.gains(Posterior(self.cells, prior, posterior.variance), listed)
+            out += [listed.groups[i] for i in np.argsort(-gains)[:NEAR]]
+        return out
+
+    def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
+        """The cause with the numbers of its shape a Gauss-Newton step further."""
+        steps = self.rig.steps(candidate)
+        names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
+        if not steps or len(steps) != len(names):
+            return []
+        x, count = self.values_of(group, posterior.mean), self.cells.count
+        ends = [[self.columns_of(c) for c in pair] for *pair, _ in steps]
+        slopes = [
+            [(b - a) @ x / width for a, b in zip(*pair, strict=True)]
+            for pair, (_, _, width) in zip(ends, steps, strict=True)
+        ]
+        index = self.add([np.stack(each, axis=2) for each in zip(*slopes, strict=True)])
+        numbers = np.array([candidate.shape[n] for n in names])
+        size = [max(abs(v), width) * STEP_SHARE for v, (_, _, width) in zip(numbers, steps, strict=True)]
+        prior = np.append(posterior.prior, np.zeros(self.cells.count - len(posterior.prior)))
+        prior[index] = np.square(size)
+        moved = numbers + Posterior(self.cells, prior, posterior.variance).mean[index]
+        self.cells.truncate(count)
+        shape = dict(candidate.shape) | dict(zip(names, moved.tolist(), strict=True))
+        try:
+            return [self.group_of(candidate.in_shape(shape), group.log_prior)]
+        except (ValueError, ArithmeticError):
+            return []
+
+    def forms(self, group: Group, values: Array) -> list[Series]:
+        """The trace of each number times smooth functions of time, place, speed and load; and earlier or later."""
+        if group.cause in EXACT or group.event or group.late:
+            return []
+        x = self.values_of(group, values)
+        each = self.columns_of(self.candidates[group.identity])
+        return [form for k in np.flatnonzero(x) for form in self._forms([c[..., k] * x[k] for c in each])]
+
+    def _forms(self, traces: Sequence[Array]) -> list[Series]:
+        """Forms of one trace, rows (n, C) a trial."""
+        parts, moving = [], self.cells.bands.moving
+        slopes = [np.gradient(r[:m], axis=0) for r, m in zip(traces, moving, strict=True)]
+        size, steep = (math.sqrt(sum(float(np.sum(r**2)) for r in rows)) for rows in (traces, slopes))
+        for t, trace in enumerate(traces):
+            smooth = [math.sqrt(3.0) * np.linspace(-1.0, 1.0, len(trace))]
+            for name, q in self.rig.quantities(t).items():
+                q = np.log(q + 0.1 * np.sqrt(np.mean(q**2)) + 1e-12) if name == "speed" else q
+                smooth.append((q - q.mean()) / (q.std() + 1e-12))
+            late = np.zeros_like(trace)
+            late[: moving[t]] = slopes[t] * size / max(steep, 1e-300)
+            parts.append(np.stack([*(trace * f[:, None] for f in smooth), late], axis=2))
+        return [
+            {c: [x[:, 3 * c : 3 * c + 3, k] for x in parts] for c in range(len(self.cells.channels))}
+            for k in range(parts[0].shape[2])
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """Columns of a healthy team and of all shapes.
+
+    Attributes:
+        rig: whose columns those of a healthy team are.
+        groups: of causes in their first shapes, their columns counted from zero.
+        labels, tolerance, kinds: of the columns; ``kinds`` their numbers by cause.
+        X: their rows, shape (C, n, k).
+        listed: all other shapes.
+        apart: by candidate, columns by which its other shapes differ.
+        candidates: by the identity of a group.
+    """
+
+    rig: TeamRows
+    groups: list[Group]
+    labels: list[tuple[Candidate, int] | None]
+    tolerance: list[float]
+    kinds: Mapping[str, list[int]]
+    X: Array
+    listed: Listed
+    apart: Mapping[Hashable, Array]
+    candidates: Mapping[Hashable, Candidate]
+
+    @classmethod
+    def of(cls, plain: TeamProblem, near: Catalogue | None = None) -> Catalogue:
+        """For the rig of a problem without columns in which nothing is left open.
+
+        Args:
+            plain: the problem.
+            near: of a rig with the same whitening nearby, whose other shapes will do: they are only proposed.
+        """
+        rig = plain.rig
+        groups: list[Group] = []
+        labels: list[tuple[Candidate, int] | None] = []
+        tolerance, kinds, rows = list[float](), dict[str, list[int]](), list[Array]()
+        others: list[Listed] = []
+        apart: dict[Hashable, Array] = {}
+        for candidate in rig.candidates():
+            shapes = rig.refinements(candidate)
+            count, first = 1 + len(shapes), len(labels)
+            if not any(candidate.tolerant):
+                others += [] if near else [plain.listing([candidate, *shapes], count)]
+                continue
+            X = plain.spectra(rig.columns(candidate))
+            shown = np.flatnonzero(X.any(axis=(0, 1)))
+            g = plain.group_of(candidate, -math.log(count), range(first, first + len(shown)))
+            least = tuple(g.least[k] for k in shown) if g.least else ()
+            groups.append(replace(g, slab=tuple(g.slab[k] for k in shown), least=least))
+            labels += [(candidate, int(k)) for k in shown]
+            tolerance += [candidate.parameters[k].tolerance for k in shown]
+            rows.append(X[..., shown])
+            if shapes:
+                if near:
+                    apart[candidate.key] = near.apart[candidate.key]
+                else:
+                    others.append(plain.listing(shapes, count))
+                    firsts = [span.start for span in others[-1].spans]
+                    apart[candidate.key] = _apart(X[..., 0], others[-1].X[..., firsts].astype(float))
+                rows.append(apart[candidate.key])
+                tolerance += [candidate.parameters[0].tolerance] * rows[-1].shape[2]
+                labels += [None] * rows[-1].shape[2]
+            kinds.setdefault(candidate.cause, []).extend(range(first, len(labels)))
+        listed = near.listed if near else Listed(
+            [g for e in others for g in e.groups], np.concatenate([e.X for e in others], axis=2)
+        )  # fmt: skip
+        known = {**near.candidates, **plain.candidates} if near else plain.candidates
+        return cls(rig, groups, labels, tolerance, kinds, np.concatenate(rows, axis=2), listed, apart, known)
+
+
+def _apart(first: Array, others: Array, most: int = 2) -> Array:
+    """Columns by which a healthy part in another of its shapes differs from the first, shape (C, n, k)."""
+    apart = others - first[..., None]
+    w, V = np.linalg.eigh(np.einsum("cnk,cnl->kl", apart, apart))
+    return apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2])
+
+
+def team_problem(
+    rig: TeamRows, opened: Sequence[Array] | None = None, catalogue: Catalogue | None = None
+) -> TeamProblem:
+    """The linear problem of a rig.
+
+    Args:
+        rig: recordings, linear.
+        opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C).
+        catalogue: columns of this rig, or of one with the same whitening nearby; None makes them.
+    """
+    rows = list(rig.rows([]))
+    moving = [len(r.residual) if r.moving is None else r.moving for r in rows]
+    bands = RowBands([s.signals.rate_hz / s.reduction.step for s in rig.linear], moving,
+                     [len(r.residual) for r in rows], np.append(EDGES_HZ, [np.inf, np.inf]))  # fmt: skip
+    plain = TeamProblem(rig, Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows]))
+    if catalogue is None or catalogue.rig is not rig:
+        catalogue = Catalogue.of(plain, catalogue)
+    out = TeamProblem(rig, Cells(bands, []), opened=opened, catalogue=catalogue)
+    out.candidates = dict(catalogue.candidates)
+    out.cells = plain.cells
+    columns = out.beside(catalogue.X)
+    residual = [x.reshape(len(x), -1, 3) for x in out.rows_of([r.residual for r in rows])]
+    out.cells = Cells.of(bands, residual)
+    there = np.zeros(len(catalogue.labels))  # values count from the design, not from where all is linear
+    for k, label in enumerate(catalogue.labels):
+        at = None if label is None else origin_of(label[0], rig.origin)
+        there[k] = 0.0 if at is None else at[label[1]]
+    for channel, X in zip(out.cells.channels, columns, strict=True):
+        channel.y += X @ there
+        channel.squares = np.array([channel.y[a:b] @ channel.y[a:b] for a, b in pairwise(channel.starts)])
+
+    def unknown(columns: Sequence[Array]) -> list[int]:
+        columns = out.rows_of(columns)
+        size = np.sqrt(sum(np.sum(x**2, axis=(0, 1)) for x in columns))
+        out.tolerance += list(np.where(size > 0, UNKNOWN / np.maximum(size, 1e-300), 0.0))
+        out.labels += [None] * len(size)
+        return out.add(columns)
+
+    out.shared = unknown([r.shared for r in rows])
+    for t, r in enumerate(rows):
+        own = [r.local if k == t else np.zeros((*o.residual.shape, r.local.shape[2])) for k, o in enumerate(rows)]
+        out.local.append(unknown(own))
+    first = out.cells.count
+    out.cells.add_rows(columns)
+    out.there = np.append(np.zeros(first), there)
+    out.labels += catalogue.labels
+    out.tolerance += catalogue.tolerance
+    out.groups = [replace(g, columns=tuple(first + k for k in g.columns)) for g in catalogue.groups]
+    out.families = [[first + k for k in kind] for kind in catalogue.kinds.values() if len(kind) > 1]
+    out.listed = replace(catalogue.listed, X=out.beside(catalogue.listed.X))
+    return out
