@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
@@ -267,7 +267,7 @@ class Search:
         ]  # fmt: skip
 
     def offers(self, state: State, *, late: bool = False) -> list[tuple[float, Chosen]]:
-        """Every group that a set has room for by its linear gain, the likeliest first; late ones are proposed on request."""
+        """Every group that a set has room for by its linear gain, the likeliest first."""
         taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
 
         def fits(g: Group) -> bool:
@@ -322,7 +322,11 @@ class Search:
         quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
         out: list[Chosen] = []
         for where, most, least in ((state, s.tried, -s.within_nats), (quiet, s.tried_quiet, s.need_nats)):
-            offers = [(gain, c) for gain, c in self.offers(where, late=late) if c.group.late == late and gain > least]
+            offers = [
+                (gain, c)
+                for gain, c in self.offers(where, late=late)
+                if c.group.late == late and gain > least
+            ]
             known = {c.group.name for c in out}
             out += [c for _, c in offers[:most] if c.group.name not in known]
         return out
@@ -340,7 +344,8 @@ class Search:
         count = self.problem.cells.count
         own = replace(one, forms=tuple(self.problem.cells.add(forms)))
         formed, without = (
-            self.value([new if c is one else c for c in state.chosen], state.posterior, 3) for new in (own, own.open)
+            self.value([new if c is one else c for c in state.chosen], state.posterior, 3)
+            for new in (own, own.open)
         )
         if without.evidence < formed.evidence:
             return formed

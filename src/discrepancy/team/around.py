@@ -52,7 +52,9 @@ def found_in(problem: TeamProblem, state: State) -> Found:
     for k, label in enumerate(problem.labels):
         if label is not None:
             candidate, parameter = label
-            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][parameter] = x[k]
+            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][
+                parameter
+            ] = x[k]
     listed = [c.group for c in state.chosen if not c.group.late]
     active = tuple((problem.candidates[g.identity], problem.values_of(g, x)) for g in listed)
     local = tuple(-x[columns][:own] for columns in problem.local)
@@ -90,7 +92,7 @@ def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, 
     exact, total = problem.rows_of(exact), 0.0
     for c, channel in enumerate(problem.cells.channels):
         straight = channel.y - channel.X @ x[channel.columns]
-        there = problem.cells.bands.spectrum([r[:, 3 * c : 3 * c + 3] for r in exact])[problem.cells.order]
+        there = problem.bands.spectrum([r[:, 3 * c : 3 * c + 3] for r in exact])[problem.cells.order]
         total += float(np.sum((there - straight) ** 2))
     return total / sum(len(channel.y) for channel in problem.cells.channels)
 

@@ -58,13 +58,13 @@ def search_team(
         if not state.chosen or stop():
             break
         before = state.keys
-        search, state, same = _beside(search, state)
+        problem, search, state, same = _beside(problem, search, state)
         if same:
             break
         state = search.run(state, LEAVE_OPEN)
         if state.keys == before:
             break
-    return TeamOutcome(search.problem, search, state, nothing, not stop())
+    return TeamOutcome(problem, search, state, nothing, not stop())
 
 
 def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
@@ -74,9 +74,8 @@ def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
         return None
 
 
-def _beside(search: Search, state: State) -> tuple[Search, State, bool]:
+def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem, Search, State, bool]:
     """The same set in a problem that is linear around it, and whether that is the same problem but for little."""
-    old = search.problem
     opened, moved = opened_by(old, state), _moved(old, state)
     problem, same = old, True
     if opened is not None or moved is not None or old.opened is not None:
@@ -91,4 +90,4 @@ def _beside(search: Search, state: State) -> tuple[Search, State, bool]:
         if miss < rules.STRAIGHT_CHI2_PER_N:
             break
         same = same and miss < rules.STRAIGHT_BESIDE_CHI2_PER_N
-    return search, state, same
+    return problem, search, state, same

@@ -7,22 +7,22 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
-from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate, Transient
-from discrepancy.evidence.cells import Cells, Series
+from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.origin import origin_of
 from discrepancy.team.rows import TeamRows
-from discrepancy.team.unlisted import Laws
+from discrepancy.team.unlisted import OPEN_NATS, Laws
 from estimator.arrays import Array
 
 EDGES_HZ = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
@@ -37,25 +37,29 @@ NEAR = 3
 """Shapes nearby whose evidence is computed in each step."""
 STEP_SHARE = 1.0
 """Standard deviation of a step of a number of a shape, in that number."""
-EXACT = ("phi_zero", "theta_zero", "link_length", "base_tilt", "sea_bias", "payload_mass", "clock_delay", "torque_skew")
+EXACT = (
+    "phi_zero",
+    "theta_zero",
+    "link_length",
+    "base_tilt",
+    "sea_bias",
+    "payload_mass",
+    "clock_delay",
+    "torque_skew",
+)
 """Causes whose law is geometry or arithmetic."""
 Values = Mapping[tuple[object, ...], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class RowBands:
-    """Cosine coefficients of the moving rows of each trial by octave; rows of holds are a band of their own.
+class RowBands(Bands):
+    """Cosine coefficients of the moving rows of each trial by octave; rows of holds are a band of their own, the last.
 
     Attributes:
-        rates_hz: of moving rows.
-        moving, lengths: how many rows move, and all of them.
-        edges_hz: of the bands; the last is that of the holds.
+        moving: how many rows move.
     """
 
-    rates_hz: Sequence[float]
-    moving: Sequence[int]
-    lengths: Sequence[int]
-    edges_hz: Array
+    moving: Sequence[int] = ()
 
     def of_trial(self, trial: int) -> NDArray[np.intp]:
         """Band of every row of a channel of three components, shape (3 n,)."""
@@ -63,10 +67,6 @@ class RowBands:
         frequency = np.arange(m) * self.rates_hz[trial] / (2.0 * m)
         band = np.minimum(np.searchsorted(self.edges_hz, frequency, side="right") - 1, last - 1)
         return np.repeat(np.append(band, np.full(self.lengths[trial] - m, last)), 3)
-
-    def share(self, channel: int) -> float:
-        """Of a channel's rows that are kept."""
-        return 1.0
 
     def spectrum(self, series: Sequence[Array], channel: int = 0) -> Array:
         """Rows of all trials of one channel, (n, 3, ...) each, as coefficients, shape (sum 3 n, ...)."""
@@ -139,6 +139,11 @@ class TeamProblem:
     there: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
+    def bands(self) -> RowBands:
+        """Of the rows."""
+        return cast("RowBands", self.cells.bands)
+
+    @property
     def sensors(self) -> Array:
         """Rows are whitened: noise has unit variance."""
         return np.ones((len(self.cells.channels), len(self.cells.bands.edges_hz) - 1))
@@ -153,7 +158,9 @@ class TeamProblem:
         """Whitened rows (n, C, ...) of every trial beside what chosen causes leave open."""
         if self.opened is None:
             return list(x)
-        return [(w @ r.reshape(*r.shape[:2], -1)).reshape(r.shape) for w, r in zip(self.opened, x, strict=True)]
+        return [
+            (w @ r.reshape(*r.shape[:2], -1)).reshape(r.shape) for w, r in zip(self.opened, x, strict=True)
+        ]
 
     def columns_of(self, candidate: Candidate) -> list[Array]:
         """Columns of a candidate, shape (n, C, k) a trial."""
@@ -161,7 +168,7 @@ class TeamProblem:
 
     def spectra(self, columns: Sequence[Array]) -> Array:
         """Columns (n, 3 C, k), one array a trial, as rows of the cells, shape (C, n, k)."""
-        bands, order = self.cells.bands, self.cells.order
+        bands, order = self.bands, self.cells.order
         return np.stack([
             bands.spectrum([x[:, k : k + 3] for x in columns])[order] for k in range(0, columns[0].shape[1], 3)
         ])  # fmt: skip
@@ -174,7 +181,7 @@ class TeamProblem:
         """Rows of the cells, shape (C, n, k), beside what chosen causes leave open."""
         if self.opened is None:
             return X
-        bands, order = self.cells.bands, self.cells.order
+        bands, order = self.bands, self.cells.order
         plain = np.empty_like(X)
         plain[:, order] = X
         each = [np.concatenate(parts, axis=1) for parts in zip(*(bands.rows(x) for x in plain), strict=True)]
@@ -191,11 +198,17 @@ class TeamProblem:
     def group_of(self, candidate: Candidate, log_prior: float, columns: Sequence[int] = ()) -> Group:
         """A candidate as a group of the engine."""
         at = candidate.transient
-        place = candidate.place if at is None else f"{candidate.place} from {at.start_s:.1f} s of trial {at.trial + 1}"
+        place = (
+            candidate.place
+            if at is None
+            else f"{candidate.place} from {at.start_s:.1f} s of trial {at.trial + 1}"
+        )
         shape = tuple((k, float(v)) for k, v in candidate.shape.items())
         shape += (("trial", float(at.trial)),) if at else ()
         positive = CAUSES[candidate.cause].positive
-        least = tuple(0.0 if p.name in positive else -np.inf for p in candidate.parameters) if positive else ()
+        least = (
+            tuple(0.0 if p.name in positive else -np.inf for p in candidate.parameters) if positive else ()
+        )
         g = Group(
             candidate.cause, place, tuple(columns), tuple(SLAB * candidate.units), log_prior, shape, least,
             event=at is not None,
@@ -224,7 +237,9 @@ class TeamProblem:
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest shapes and pushes; or, late, laws that no table lists."""
         if late:
-            return self.laws_of.proposed(self, posterior)
+            v = posterior.variance
+            noise = 0.5 * float(np.sum(self.cells.rows * (v - 1.0 - np.log(v))))
+            return self.laws_of.proposed(self.left(posterior), self._white) if noise > OPEN_NATS else []
         out: list[Group] = []
         if self.listed is not None:
             gains = self.gains(posterior, self.listed)
@@ -244,7 +259,11 @@ class TeamProblem:
         at = np.full(cells.count, -1)
         at[active] = np.arange(len(active))
         K = listed.X.shape[2]
-        G, b, squares = np.zeros((len(active), K)), np.zeros(K), [np.zeros((len(g.slab),) * 2) for g in listed.groups]
+        G, b, squares = (
+            np.zeros((len(active), K)),
+            np.zeros(K),
+            [np.zeros((len(g.slab),) * 2) for g in listed.groups],
+        )
         for channel, own, X in zip(cells.channels, posterior.variance, listed.X, strict=True):
             weight = np.repeat(1.0 / own, np.diff(channel.starts)).astype(np.float32)[:, None]
             keep = np.flatnonzero(at[channel.columns] >= 0)
@@ -311,11 +330,17 @@ class TeamProblem:
         """Rows that a posterior leaves over their variance, shape (n, C) a trial."""
         parts = []
         for channel, own in zip(self.cells.channels, posterior.variance, strict=True):
-            left = (channel.y - channel.X @ posterior.mean[channel.columns]) / np.repeat(own, np.diff(channel.starts))
+            left = (channel.y - channel.X @ posterior.mean[channel.columns]) / np.repeat(
+                own, np.diff(channel.starts)
+            )
             rows = np.empty_like(left)
             rows[self.cells.order] = left
-            parts.append(self.cells.bands.rows(rows))
+            parts.append(self.bands.rows(rows))
         return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
+
+    def _white(self, rows: Sequence[Array]) -> list[Array]:
+        """Rows (n, C, k) whitened one by one."""
+        return self.rows_of([w.rows_only(r) for w, r in zip(self.rig.whitening, rows, strict=True)])
 
     @cached_property
     def laws_of(self) -> Laws:
@@ -329,7 +354,11 @@ class TeamProblem:
         if group.late:
             return []
         candidate = self.candidates[group.identity]
-        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate) + self.rig.grown(candidate)
+        near = (
+            self.rig.refinements(candidate, finer=True)
+            + self.rig.further(candidate)
+            + self.rig.grown(candidate)
+        )
         out = self._stepped(candidate, group, posterior)
         if near:
             prior = posterior.prior.copy()
@@ -378,7 +407,7 @@ class TeamProblem:
 
     def _forms(self, traces: Sequence[Array]) -> list[Series]:
         """Forms of one trace, rows (n, C) a trial."""
-        parts, moving = [], self.cells.bands.moving
+        parts, moving = [], self.bands.moving
         slopes = [np.gradient(r[:m], axis=0) for r, m in zip(traces, moving, strict=True)]
         size, steep = (math.sqrt(sum(float(np.sum(r**2)) for r in rows)) for rows in (traces, slopes))
         for t, trace in enumerate(traces):
@@ -468,7 +497,7 @@ class Catalogue:
 def _apart(first: Array, others: Array, most: int = 2) -> Array:
     """Columns by which a healthy part in another of its shapes differs from the first, shape (C, n, k)."""
     apart = others - first[..., None]
-    w, V = np.linalg.eigh(np.einsum("cnk,cnl->kl", apart, apart))
+    _, V = np.linalg.eigh(np.einsum("cnk,cnl->kl", apart, apart))
     return apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2])
 
 
@@ -484,8 +513,9 @@ def team_problem(
     """
     rows = list(rig.rows([]))
     moving = [len(r.residual) if r.moving is None else r.moving for r in rows]
-    bands = RowBands([s.signals.rate_hz / s.reduction.step for s in rig.linear], moving,
-                     [len(r.residual) for r in rows], np.append(EDGES_HZ, [np.inf, np.inf]))  # fmt: skip
+    rates = [linear.signals.rate_hz / linear.reduction.step for linear in rig.linear]
+    edges = np.append(EDGES_HZ, [np.inf, np.inf])
+    bands = RowBands(rates, [len(r.residual) for r in rows], edges, moving=moving)
     plain = TeamProblem(rig, Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows]))
     if catalogue is None or catalogue.rig is not rig:
         catalogue = Catalogue.of(plain, catalogue)
@@ -498,7 +528,7 @@ def team_problem(
     there = np.zeros(len(catalogue.labels))  # values count from the design, not from where all is linear
     for k, label in enumerate(catalogue.labels):
         at = None if label is None else origin_of(label[0], rig.origin)
-        there[k] = 0.0 if at is None else at[label[1]]
+        there[k] = 0.0 if label is None or at is None else at[label[1]]
     for channel, X in zip(out.cells.channels, columns, strict=True):
         channel.y += X @ there
         channel.squares = np.array([channel.y[a:b] @ channel.y[a:b] for a, b in pairwise(channel.starts)])
@@ -512,7 +542,9 @@ def team_problem(
 
     out.shared = unknown([r.shared for r in rows])
     for t, r in enumerate(rows):
-        own = [r.local if k == t else np.zeros((*o.residual.shape, r.local.shape[2])) for k, o in enumerate(rows)]
+        own = [
+            r.local if k == t else np.zeros((*o.residual.shape, r.local.shape[2])) for k, o in enumerate(rows)
+        ]
         out.local.append(unknown(own))
     first = out.cells.count
     out.cells.add_rows(columns)

@@ -264,7 +264,9 @@ class TeamRows(Rig):
         there = {candidate.key for candidate, _ in active}
         left = self.residual_there(shared, local, active)
         return [
-            x + self._all_at_origin(t) - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there)
+            x
+            + self._all_at_origin(t)
+            - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there)
             for t, x in enumerate(left)
         ]
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import rankdata
 
-from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.posterior import Group
 from discrepancy.laws.place import Place
 from discrepancy.laws.variable import TIME, Variable
 from discrepancy.team.laws.directions import directions_at
@@ -18,14 +17,12 @@ from discrepancy.team.laws.variables import joint_variable, signals_of
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 
-if TYPE_CHECKING:
-    from discrepancy.team.problem import TeamProblem
-
 TERMS = 7
 """Cosines of a function: periods down to a quarter of the signal's range."""
 SIZES = {
     "tau reading": 5e-3, "phi reading": 1e-4, "theta reading": 1e-4, "gimbal torque": 2e-3, "base position": 1e-5,
-    "grasp position": 1e-5, "force on payload": 0.02, "payload mass": 0.01, "payload centre": 3e-3, "payload spin": 0.01,
+    "grasp position": 1e-5, "force on payload": 0.02, "payload mass": 0.01, "payload centre": 3e-3,
+    "payload spin": 0.01,
 }  # fmt: skip
 """Typical small errors of a place, in its unit: the tolerances of the listed causes there."""
 SLAB = 16.0
@@ -110,12 +107,13 @@ class Laws:
             out.append(np.einsum("npc,npk->nck", D, rows))
         return out
 
-    def proposed(self, problem: TeamProblem, posterior: Posterior) -> list[Group]:
-        """The likeliest laws by what rows leave along the direction of their place; none where all is noise."""
-        rows, v = problem.cells.rows, posterior.variance
-        if 0.5 * float(np.sum(rows * (v - 1.0 - np.log(v)))) < OPEN_NATS:
-            return []
-        left = problem.left(posterior)
+    def proposed(self, left: Sequence[Array], white: Callable[[list[Array]], list[Array]]) -> list[Group]:
+        """The likeliest laws by what rows leave along the direction of their place.
+
+        Args:
+            left: rows over their variance, shape (n, C) a trial.
+            white: whitens rows (n, C, 1) one by one.
+        """
         directions: dict[tuple[object, int], list[Array]] = {}
         bases: dict[str, list[Array]] = {}
         found = []
@@ -123,19 +121,16 @@ class Laws:
             key = law.place.key, law.component
             if key not in directions:
                 each = [directions_at(t, law.place)[:, law.component, 0] for t in self.linear]
-                white = [w.rows_only(d) for w, d in zip(problem.rig.whitening, each, strict=True)]
-                directions[key] = problem.rows_of([d[..., None] for d in white])
+                directions[key] = white([d[..., None] for d in each])
             if law.variable.name not in bases:
                 pairs = zip(self.linear, self.basis(law.variable), strict=True)
                 bases[law.variable.name] = [b[t.reduction.sample] for t, b in pairs]
             slab = np.array(law.group.slab)
             A, b = np.eye(TERMS), np.zeros(TERMS)
             for D, z, f in zip(directions[key], left, bases[law.variable.name], strict=True):
-                d = D[..., 0]
-                f = (f - f.mean(axis=0)) * slab
-                A += (f * np.sum(d**2, axis=1)[:, None]).T @ f
-                b += f.T @ np.sum(d * z, axis=1)
-            gain = 0.5 * float(b @ np.linalg.solve(A, b) - np.linalg.slogdet(A)[1])
-            found.append((gain, law))
+                d, g = D[..., 0], (f - f.mean(axis=0)) * slab
+                A += (g * np.sum(d**2, axis=1)[:, None]).T @ g
+                b += g.T @ np.sum(d * z, axis=1)
+            found.append((0.5 * float(b @ np.linalg.solve(A, b) - np.linalg.slogdet(A)[1]), law))
         best = sorted(found, key=lambda pair: -pair[0])[:LIKELIEST]
         return [law.group for gain, law in best if gain > 0.0]

@@ -35,7 +35,11 @@ def test_a_hidden_effect_is_found_and_nothing_besides(request_) -> None:
     (effect,) = sealed.open({"found": [chosen.group.cause for chosen in outcome.state.chosen]})["effects"]
     (chosen,) = outcome.state.chosen
     found = outcome.problem.candidates[chosen.group.identity]
-    assert (found.cause, found.robot, found.joint) == (effect["cause"], effect.get("robot"), effect.get("joint"))
+    assert (found.cause, found.robot, found.joint) == (
+        effect["cause"],
+        effect.get("robot"),
+        effect.get("joint"),
+    )
     (odds,) = odds_of(outcome.search, outcome.state)
     assert odds.probability > 0.9
     values = outcome.problem.values_of(chosen.group, outcome.state.posterior.mean)
