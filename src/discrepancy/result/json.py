@@ -165,17 +165,21 @@ def diagnosis_to_dict(
         "detection_limits": detection_limits(explanation),
         "residual": {
             "chi2_per_n": explanation.after / explanation.samples,
-            "signature": plain(signature(rig, explanation.fit)),
+            "signature": plain(signature(rig, _remaining(rig, explanation.fit))),
             "chi2_per_n_tolerated": explanation.before / explanation.samples,
             "unlisted_nats": float(explanation.unlisted_nats),
             "nominal": {
                 "chi2_per_n": nominal.misfit / explanation.samples,
-                "signature": plain(signature(rig, nominal)),
+                "signature": plain(signature(rig, _remaining(rig, nominal))),
             },
         },
         "notes": list(diagnosis.notes),
     }
     return values | {"remains": remains(values)}
+
+
+def _remaining(rig: Rig, fit: Fit) -> list[Array]:
+    return [fit.remaining(t) for t in range(len(rig.trials))]
 
 
 def _cause(

@@ -1,18 +1,15 @@
-"""What a search found at a robot's joints, link by link, in physical values."""
+"""What a search found, place by place, in physical values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from discrepancy.joints.model import SerialModel
-from discrepancy.joints.servo.motor import Motor
-from discrepancy.joints.signals import Signals
-from discrepancy.result.traces import Trace
-from estimator.arrays import Array
+if TYPE_CHECKING:
+    from discrepancy.result.traces import Trace
 
-Verdict = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
+Word = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -124,28 +121,6 @@ class Scatter:
     members: tuple[Member, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Foretold:
-    """How well the torques of one trial are foretold by the others.
-
-    Attributes:
-        trial: its name.
-        before, after: root mean squares of measured minus foretold torque without and with the findings, as the other
-            trials have them, shape (J,) [N m or N].
-        noise: of the rows, shape (J,).
-        torque: root mean square of the measured torque, shape (J,).
-        chi2_before, chi2_after: squares over the noise's variance, per row.
-    """
-
-    trial: str
-    before: Array
-    after: Array
-    noise: Array
-    torque: Array
-    chi2_before: float
-    chi2_after: float
-
-
 @dataclass(frozen=True)
 class Offer:
     """What one more cause would gain.
@@ -176,41 +151,32 @@ class Limit:
     sizes: Mapping[str, float | None]
 
 
-@dataclass(frozen=True, eq=False)
-class JointVerdict:
-    """What logs say of a model of a robot of joints.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Verdict:
+    """What logs say of a model.
 
     Attributes:
-        model: the robot as described.
-        parts: the trials: smoothed logs, or parts of one.
         trials: their names.
-        motors: drives that tell no torque, and what they give by what they were given.
-        reference: names of the trials of the robot while it was well.
-        verdict: one of the five.
+        reference: names of the trials of the machine while it was well.
+        verdict: one of the five words.
         findings: in the order of their worth.
         suspected: those that are too improbable to be named.
         scatter: kinds that are off everywhere.
-        foretold: one a trial, each by the others; by all of them where there is one trial only (``validated``).
         validated: whether there are two trials at least.
         chi2_per_n: squares over the noise's variance per row, as modelled, with tolerances, and with the findings.
         before, after: what one more cause would gain with nothing found, and with what is found.
         limits: what would have been noticed.
         notes: sentences.
         finished: whether the search came to its end.
-        by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
         traces: residuals by trial, for pictures.
     """
 
-    model: SerialModel
-    parts: Sequence[Signals]
     trials: tuple[str, ...]
-    motors: tuple[Motor, ...]
-    reference: tuple[str, ...]
-    verdict: Verdict
+    reference: tuple[str, ...] = ()
+    verdict: Word
     findings: tuple[Finding, ...]
     suspected: tuple[Finding, ...]
     scatter: tuple[Scatter, ...]
-    foretold: tuple[Foretold, ...]
     validated: bool
     chi2_per_n: tuple[float, float, float]
     before: tuple[Offer, ...]
@@ -218,5 +184,4 @@ class JointVerdict:
     limits: tuple[Limit, ...]
     notes: tuple[str, ...]
     finished: bool
-    by_the_others: Callable[[int], tuple[Finding, ...]]
     traces: Callable[[], list[Trace]]
