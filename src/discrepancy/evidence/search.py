@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
@@ -347,8 +347,7 @@ class Search:
         count = self.problem.cells.count
         own = replace(one, forms=tuple(self.problem.cells.add(forms)))
         formed, without = (
-            self.value([new if c is one else c for c in state.chosen], state.posterior, 3)
-            for new in (own, own.open)
+            self.value([new if c is one else c for c in state.chosen], state.posterior, 3) for new in (own, own.open)
         )
         if without.evidence < formed.evidence:
             return formed
