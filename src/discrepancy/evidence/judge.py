@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -46,7 +46,12 @@ class Judge(ABC):
         nothing: the search and the state without causes, where the machine is without.
         parts: of the logs.
         odds: of every cause of the set.
+
+    Attributes:
+        tolerated: whether nats by part are told beside everything that is off within its tolerance.
     """
+
+    tolerated: ClassVar[bool] = False
 
     def __init__(
         self, problem: Tolerant, found: Side, nothing: Side, parts: Parts, odds: Sequence[Odds]
@@ -175,10 +180,11 @@ class Judge(ABC):
         sets = [[o.chosen for o in kept[:k]] for k in range(len(kept) + 1)]
         left = [parts.left(parts.mean(self.prior(own, tolerated=False, events=False))) for own in sets]
         several, rows = parts.count > 1, float(parts.rows.sum())
-        each = []
-        for prior in [self.prior(own, tolerated=False) for own in sets] if several else []:
-            each.append([parts.left(parts.foretold(prior, t), t) for t in range(parts.count)])
-        held, done = [sum(one) for one in each], []
+        sides = (
+            [self._foretold_each(sets, tolerated=side) for side in (False, self.tolerated)] if several else []
+        )
+        held, each = [sum(one) for one in sides[0]] if several else [], sides[-1] if several else []
+        done = []
         for k, o in enumerate(kept):
             lasts = several and not set(parts.columns_of(o.chosen.group.columns)) & set(
                 np.flatnonzero(parts.events)
@@ -187,6 +193,14 @@ class Judge(ABC):
             share, out = _share(left, k, rows), _share(held, k, rows) if lasts else None
             done += [replace(f, in_sample=share, held_out=out, folds=folds) for f in self.findings(o)]
         return done
+
+    def _foretold_each(self, sets: Sequence[Sequence[Chosen]], *, tolerated: bool) -> list[list[float]]:
+        """Squares left in each part, foretold by the others with each of some sets in the model."""
+        priors = [self.prior(own, tolerated=tolerated) for own in sets]
+        return [
+            [self.parts.left(self.parts.foretold(prior, t), t) for t in range(self.parts.count)]
+            for prior in priors
+        ]
 
     def _chi2(self) -> tuple[float, float, float]:
         """Squares left over the floor's variance, per row: as modelled, with tolerances, with the causes."""

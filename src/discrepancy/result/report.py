@@ -37,8 +37,8 @@ MOST_PLACES = 12
 """Rows of a kind that is off everywhere."""
 PLACES, WHATS, LEAST_WHAT, SIZES, GAP = 24, 34, 22, 38, "  "
 """Widest columns of places and of what there is, the narrowest of that, room for sizes, and what is between columns."""
-PARTS = "two joints|a (?:driven joint|gimbal axis|joint|link|leg|robot|base|grasp)"
-"""Of a machine, as titles name them."""
+PARTS = "two joints|a (?:driven joint|joint|link|leg|robot|base|grasp)"
+"""Of a machine, as titles name them, where the place tells which."""
 COUNTS = ("trial", "last_trial")
 """Numbers that count."""
 TOGETHER = "\N{NO-BREAK SPACE}"
@@ -110,25 +110,28 @@ def _gain(values: Values) -> Iterable[str]:
     gain = values["gain"]
     if gain is None or not values["causes"]:
         return
-    share, of = _removed(values)
     if not (gain["validated"] if is_of_joints(values) else values["recordings"][1:]):
         yield "There is one trial only, so the findings are not tested on data left out of the fit."
-    elif share is not None:
+    elif not is_of_joints(values):
+        yield from _likelier([cause["folds"] for cause in values["causes"] if cause["folds"]])
+    elif gain["removed"] is not None:
+        share = gain["removed"]["share"]
         they = "it removes" if len(values["causes"]) == 1 else "they remove"
         if share > 0.0:
-            yield f"In trials left out of the fit {they} {100.0 * share:.0f} % of {of} beyond noise."
+            yield f"In trials left out of the fit {they} {100.0 * share:.0f} % of the torques' error beyond noise."
         else:
-            yield f"In trials left out of the fit {of} is no smaller with that."
+            yield "In trials left out of the fit the torques' error is no smaller with that."
 
 
-def _removed(values: Values) -> tuple[float | None, str]:
-    """Share of what is off in trials left out of the fit that the findings remove, and what that is."""
-    if is_of_joints(values):
-        removed = values["gain"]["removed"]
-        return removed and removed["share"], "the torques' error"
-    shares = [cause["explained"]["held_out"] for cause in values["causes"]]
-    known = [share for share in shares if share is not None]
-    return sum(known) if known else None, "the misfit"
+def _likelier(folds: Sequence[Sequence[float]]) -> Iterable[str]:
+    """What findings that last are worth to trials that the others foretell."""
+    if folds:
+        each = [sum(gains) for gains in zip(*folds, strict=True)]
+        better = sum(gain > 0.0 for gain in each)
+        yield (
+            f"Foretold by the others, {better} of {len(each)} trials are likelier with that, all together by "
+            f"{sum(each):.0f} nats."
+        )
 
 
 def _advice(values: Values, *, verbose: bool) -> Iterable[str]:
@@ -263,8 +266,11 @@ def _sizes(parameters: Values, *, verbose: bool) -> list[str]:
     """Numbers of one place, a line each; components of a vector in one; moments of inertia on request."""
     shown = one_each((parameter(name)[1], entry["value"]) for name, entry in parameters.items())
     vectors: dict[str, list[str]] = {}
-    for name in parameters:
-        if verbose or not name.startswith("inertia_"):
+    for name, entry in parameters.items():
+        absent = (
+            entry["value"] == 0.0 and entry["se"] is None
+        )  # chosen, such as a second length of one pendulum
+        if verbose or not (absent or name.startswith("inertia_")):
             vectors.setdefault(re.sub(r"(^|_)[xyz]_", r"\1*_", name), []).append(name)
     out = []
     for stem, names in vectors.items():
@@ -339,7 +345,8 @@ def _suspicion(entry: Values) -> str:
 def _misfit(values: Values) -> str:
     residual = values["residual"]
     text = f"chi2/n is {three_digits(residual['nominal']['chi2_per_n'])} as modelled, "
-    text += f"{three_digits(residual['chi2_per_n_tolerated'])} with all a little off, within its tolerance"
+    far = "as far as its kind scatters" if values["scatter"] else "within its tolerance"
+    text += f"{three_digits(residual['chi2_per_n_tolerated'])} with all a little off, {far}"
     if values["causes"]:
         text += f", {three_digits(residual['chi2_per_n'])} with what is found"
     return f"{text} (up to {SETTINGS.clean_chi2:g} counts as clean)."
