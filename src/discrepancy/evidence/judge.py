@@ -84,7 +84,7 @@ class Judge(ABC):
     def sizes(self, group: Group, sizes: Array, seen: Array) -> Mapping[str, float | None] | None:
         """Sizes of columns that would be noticed, of those that are seen, in physical units; None: it is not told."""
 
-    def fitted(self, problem: Tolerant) -> Sequence[int]:
+    def fitted(self, problem: Any) -> Sequence[int]:
         """Columns that are fitted with the model as it is."""
         return ()
 

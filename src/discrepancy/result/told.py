@@ -1,4 +1,4 @@
-"""JSON form of a verdict of the small engine, the same of all machines; ``discrepancy.result.json`` documents the keys."""
+"""JSON form of a verdict, the same of all machines; ``discrepancy.result.json`` documents the keys."""
 
 from __future__ import annotations
 

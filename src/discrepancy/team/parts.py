@@ -8,7 +8,7 @@ import numpy as np
 
 from discrepancy.evidence.parts import Parts
 from discrepancy.evidence.search import State
-from discrepancy.team.problem import TeamProblem
+from discrepancy.team.problem import RowBands, TeamProblem
 from estimator.arrays import Array
 
 
@@ -48,10 +48,11 @@ def _each(problem: TeamProblem, state: State) -> Iterator[tuple[Array, Array, fl
 
 def left_of(problem: TeamProblem, x: Array) -> list[Array]:
     """Whitened rows that values of the columns leave, shape (n, C) a trial."""
-    parts = []
+    bands, parts = problem.cells.bands, []
+    assert isinstance(bands, RowBands)
     for channel in problem.cells.channels:
         rows = np.empty_like(channel.y)
         known = channel.columns < len(x)
         rows[problem.cells.order] = channel.y - channel.X[:, known] @ x[channel.columns[known]]
-        parts.append(problem.cells.bands.rows(rows))
+        parts.append(bands.rows(rows))
     return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]

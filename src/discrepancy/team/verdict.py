@@ -1,4 +1,4 @@
-"""From a search in recordings of a team to a verdict: causes with their effects, probabilities and what they are worth."""
+"""From a search in recordings of a team to a verdict: causes with probabilities, sizes, and what they are worth."""
 
 from __future__ import annotations
 
@@ -63,14 +63,15 @@ class _TeamJudge(Judge):
     tolerated = True
 
     def __init__(self, outcome: TeamOutcome) -> None:
-        odds, plain = odds_of(outcome.search, outcome.state), outcome.nothing
+        assert isinstance(outcome.problem.rig, TeamRig)
+        self.rig, plain = outcome.problem.rig, outcome.nothing
+        odds = odds_of(outcome.search, outcome.state)
         parts = parts_of(outcome.problem, outcome.state)
         super().__init__(outcome.problem, (outcome.search, outcome.state), plain, parts, odds)
 
     def verdict(self, outcome: TeamOutcome, notes: Sequence[str]) -> TeamVerdict:
         """All that is told."""
-        told, problem, rig = self.told(), self.problem, self.problem.rig
-        assert isinstance(rig, TeamRig)
+        told, problem, rig = self.told(), self.problem, self.rig
         prior, fitted = np.zeros(len(self.state.posterior.prior)), self.fitted(problem)
         prior[fitted] = self.state.posterior.prior[fitted]
         plain = Posterior(problem.cells, prior, self.search.floor).mean
@@ -94,7 +95,9 @@ class _TeamJudge(Judge):
 
     @property
     def _candidates(self) -> dict[tuple[str, str], Candidate]:
-        known = {**self.nothing[0].problem.candidates, **self.problem.candidates}
+        plain = self.nothing[0].problem
+        assert isinstance(plain, TeamProblem)
+        known = {**plain.candidates, **self.problem.candidates}
         return {(cause, place): candidate for (cause, place, _), candidate in known.items()}
 
     def joint(self, cause: str, place: str) -> int | None:
@@ -116,7 +119,7 @@ class _TeamJudge(Judge):
         x[which], C[np.ix_(which, which)] = values[0][at], covariance[np.ix_(at, at)]
         if group in [c.group for c in self.state.chosen]:
             C = self._with_shape(group, candidate, x, C)
-        numbers, errors = CAUSES[candidate.cause].report(x, C, self.problem.rig._context(candidate))
+        numbers, errors = CAUSES[candidate.cause].report(x, C, self.rig._context(candidate))
         return (Member(group.place, candidate.joint, numbers, errors),)
 
     def _parameters(self, group: Group) -> list[int]:
@@ -148,7 +151,7 @@ class _TeamJudge(Judge):
             told[names[n]] = float(size) if ok else None
         return told
 
-    def fitted(self, problem: TeamProblem) -> Sequence[int]:
+    def fitted(self, problem: Any) -> Sequence[int]:
         return [*problem.shared, *(k for own in problem.local for k in own)]
 
     def unseen(self) -> Collection[Group]:
@@ -189,12 +192,13 @@ def traces(rig: TeamRig, opened: Sequence[Array] | None, left: Mapping[str, Sequ
     for t, (linear, white) in enumerate(zip(rig.linear, rig.whitening, strict=True)):
         z = [left[name][t] for name in ("before", "after")]
         if opened is not None:
-            z = [np.linalg.solve(opened[t], x[..., None])[..., 0] for x in z]
+            z = [np.asarray(np.linalg.solve(opened[t], x[..., None])[..., 0], dtype=np.float64) for x in z]
         sigma = np.empty_like(z[0])
         sigma[: white.moving] = white.loudness * np.linalg.norm(white.chol_moving, axis=1)
         sigma[white.moving :] = np.linalg.norm(white.chol_alone, axis=1)
-        out.append(Trace(rig.trials[t], linear.reduction.time, white.moving, rig.row_rate_hz(t),
-                         *(unwhitened(white, x) for x in z), sigma, *z, rig.quantities(t)))  # fmt: skip
+        before, after = (unwhitened(white, x) for x in z)
+        out.append(Trace(rig.trials[t], linear.reduction.time, white.moving, rig.row_rate_hz(t), before, after, sigma,
+                         z[0], z[1], rig.quantities(t)))  # fmt: skip
     return out
 
 
