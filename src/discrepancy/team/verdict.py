@@ -98,7 +98,7 @@ class _TeamJudge(Judge):
         plain = self.nothing[0].problem
         assert isinstance(plain, TeamProblem)
         known = {**plain.candidates, **self.problem.candidates}
-        return {(cause, place): candidate for (cause, place, _), candidate in known.items()}
+        return {(key[0], key[1]): candidate for key, candidate in known.items() if isinstance(key, tuple)}
 
     def joint(self, cause: str, place: str) -> int | None:
         candidate = self._candidates.get((cause, place))
