@@ -88,6 +88,10 @@ class Judge(ABC):
         """Columns that are fitted with the model as it is."""
         return ()
 
+    def before(self) -> Side:
+        """The search and the state without causes, beside which each cause's gain is told."""
+        return self.nothing
+
     def unseen(self) -> Collection[Group]:
         """Groups of which limits are told, and that have no columns in the problem."""
         return ()
@@ -102,7 +106,7 @@ class Judge(ABC):
         return {
             "verdict": self._word(findings, doubtful, scatter, chi2), "findings": tuple(findings),
             "suspected": tuple(doubtful), "scatter": tuple(scatter), "validated": self.parts.count > 1,
-            "chi2_per_n": chi2, "before": tuple(self._offers(*self.nothing)),
+            "chi2_per_n": chi2, "before": tuple(self._offers(*self.before())),
             "after": tuple(self._offers(self.search, self.state)), "limits": tuple(self._limits()),
         }  # fmt: skip
 

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
-from discrepancy.evidence.judge import Judge
+from discrepancy.evidence.judge import Judge, Side
 from discrepancy.evidence.odds import odds_of
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group, Posterior
@@ -153,6 +153,16 @@ class _TeamJudge(Judge):
 
     def fitted(self, problem: Any) -> Sequence[int]:
         return [*problem.shared, *(k for own in problem.local for k in own)]
+
+    def before(self) -> Side:
+        """Noise and spreads are those with the causes: without, a kind's spread takes up what one of it does."""
+        p, prior = self.state.posterior, self.state.posterior.prior.copy()
+        nominal = np.append(self.problem.prior((), None), np.zeros(len(prior)))
+        own = [k for c in self.state.chosen for k in (*c.group.columns, *c.forms)]
+        prior[own] = nominal[own]
+        return self.search, replace(
+            self.state, chosen=(), posterior=Posterior(self.problem.cells, prior, p.variance)
+        )
 
     def unseen(self) -> Collection[Group]:
         """Causes without tolerances, in their first shapes."""

@@ -85,6 +85,8 @@ def test_a_hidden_cause_is_named_with_its_size(faulty: tuple[TeamDiagnosed, dict
         + sum(r["probability"] for r in cause["alternatives"])
     )
     assert total == pytest.approx(1.0, abs=0.02)
+    best = values["evidence"]["before"][0]
+    assert (best["cause"], best["robot"], best["joint"]) == ("sea_bias", effect["robot"], effect["joint"])
     assert values["residual"]["chi2_per_n"] < values["residual"]["chi2_per_n_tolerated"] + 0.1
     estimates = values["gain"]["estimates"]
     assert estimates["before"]["mass_kg"] != estimates["after"]["mass_kg"]
