@@ -184,9 +184,8 @@ class Judge(ABC):
         sets = [[o.chosen for o in kept[:k]] for k in range(len(kept) + 1)]
         left = [parts.left(parts.mean(self.prior(own, tolerated=False, events=False))) for own in sets]
         several, rows = parts.count > 1, float(parts.rows.sum())
-        sides = (
-            [self._foretold_each(sets, tolerated=side) for side in (False, self.tolerated)] if several else []
-        )
+        kinds = sorted({False, self.tolerated}) if several else []
+        sides = [self._foretold_each(sets, tolerated=kind) for kind in kinds]
         held, each = [sum(one) for one in sides[0]] if several else [], sides[-1] if several else []
         done = []
         for k, o in enumerate(kept):
