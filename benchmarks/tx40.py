@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from discrepancy.evidence.parts import PLAIN
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.joints import problem
 from discrepancy.joints.causes import Span
-from discrepancy.joints.diagnose import MOVED, PLAIN, Outcome, diagnose
+from discrepancy.joints.diagnose import MOVED, Outcome, diagnose
 from discrepancy.joints.given import Given
 from discrepancy.joints.mechanics.regressor import body_regressor
 from discrepancy.joints.model import SerialModel, load_model

@@ -18,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from discrepancy.joints.findings import Finding, JointVerdict, Member
+from discrepancy.evidence.findings import Finding, Member
+from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import load_model
 from discrepancy.joints.rolled.closed import LoopDrive
 from discrepancy.joints.rolled.robot import Robot

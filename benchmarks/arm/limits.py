@@ -11,13 +11,13 @@ import numpy as np
 from arm import machine
 from arm.forms import Form
 from discrepancy.evidence.cells import Cells
+from discrepancy.evidence.judge import NOTICED
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Search, floor_of
 from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import JointProblem, joint_problem
 from discrepancy.joints.trials import trials_of
-from discrepancy.joints.verdict import NOTICED
 from mocobot_logs.joints.joint_log import JointLog
 
 

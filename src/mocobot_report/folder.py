@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.joints.text import format_verdict
 from discrepancy.result.read import FORMAT as DIAGNOSIS
 from discrepancy.result.read import parse_diagnosis
+from discrepancy.result.report import format_verdict
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS

@@ -9,17 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.joints.findings import (
-    Event,
-    Finding,
-    Foretold,
-    JointVerdict,
-    Limit,
-    Member,
-    Offer,
-    Rival,
-    Scatter,
-)
+from discrepancy.evidence.findings import Event, Finding, Limit, Member, Offer, Rival, Scatter
+from discrepancy.joints.findings import Foretold, JointVerdict
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.result.traces import Trace
 

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from discrepancy.evidence.parts import PLAIN
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
@@ -21,8 +22,6 @@ from discrepancy.joints.trials import Trials, trials_of
 from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
 
-PLAIN = 3.0
-"""Values are fitted with so many times their prior standard deviation, so that it shrinks nothing."""
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Columns around whose values the problem is made linear again."""

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from discrepancy.evidence.findings import Finding, Member
 from discrepancy.joints.causes import WORDS
-from discrepancy.joints.findings import Finding, JointVerdict, Member
+from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import SerialModel, load_spec
 from discrepancy.joints.said import titled
 from discrepancy.joints.values import axes_of_tilt

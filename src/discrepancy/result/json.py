@@ -1,10 +1,10 @@
 """JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
 
 format, version     "mocobot-diagnosis", 3; version 2 has no ``machine``, ``finished`` and ``members``
-machine             "team", or "joints" of one robot of hinges and slides (``discrepancy.joints.json``), for which
-                    ``told``, ``event``, ``at`` and ``reference`` are there besides, and where ``prior_odds``,
-                    ``share_left``, ``law``, ``foretold``, ``unlisted_nats``, ``nats`` of ``scatter`` and ``chi2_per_n``
-                    of alternatives are null
+machine             "team", or "joints" of one robot of hinges and slides. A verdict of ``discrepancy.evidence`` on either
+                    (``discrepancy.result.told``) has ``told``, ``event``, ``at``, ``reference`` and a limit's ``place``
+                    besides. In it ``prior_odds``, ``share_left``, ``law``, ``foretold``, ``unlisted_nats``, ``nats`` of
+                    ``scatter`` and ``chi2_per_n`` of alternatives are null
 finished            whether the search came to its end
 recordings          names of the trials
 reference           names of the trials of the robot while it was well
@@ -15,7 +15,7 @@ causes              list, in the order of discovery, of
     kind, name, place, sentence    in words: the cause, the cause at its place, its place, what it does
     parameters                     {name: {value, se}}; se is null for what was chosen, not fitted; of a cause of all
                                    joints (joint null, place "all joints") the medians over its members
-    members                        list of {name, place, joint, parameters}, one a place; empty of a team
+    members                        list of {name, place, joint, parameters}, one a place
     told                           list of {cause, place, name}: the smallest set that holds 90 %, the likeliest first
     event                          {trial (from 1), start_s, duration_s} of what acted once, else null; ``at`` has its
                                    first two numbers
@@ -27,7 +27,8 @@ causes              list, in the order of discovery, of
     instead                        {nothing, unlisted}: probabilities that nothing is there, or something that is not
                                    in the catalogue and looks like it; with ``probability`` and those of the
                                    alternatives they add up to 1
-    folds                          nats by which every trial is likelier with it, foretold by the others
+    folds                          nats by which every trial is likelier with it, foretold by the others; of a team
+                                   beside everything that is off within its tolerance
     law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
                                    formula, units of the parameters}: an error at ``targets`` that is a function of
                                    signals, and ``traces`` of the error as it was located beside it
@@ -40,8 +41,8 @@ causes              list, in the order of discovery, of
 places              where something unlisted was looked for, the likeliest first: {place, robot, joint, nats}; empty
                     where nothing unlisted is left
 suspected           what would explain some of it, but is not probable enough to be named: list of {cause, kind, name,
-                    family, robot, joint, place, at, sentence, probability, over_nothing}; of "joints" all that
-                    causes have
+                    family, robot, joint, place, at, sentence, probability, over_nothing}; where ``told``
+                    is, all that causes have
 scatter             kinds of which all places are off by more than the tolerance, the farthest first: list of
     cause, kind, family, sentence
     factor                         their spread over the tolerance
@@ -69,7 +70,7 @@ not_simulated       why there is no closed-loop comparison, or null
 rollouts            of serial robots: measured states let go in simulation, see ``joints.rolled.told``; else null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
 detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
-                    times in ten; null where these recordings say nothing; of "joints" with ``place``
+                    times in ten; null where these recordings say nothing
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
     chi2_per_n_tolerated           with no cause, and everything off as far as its kind scatters
     unlisted_nats                  by how much what is left is likelier something than clean noise
@@ -165,17 +166,21 @@ def diagnosis_to_dict(
         "detection_limits": detection_limits(explanation),
         "residual": {
             "chi2_per_n": explanation.after / explanation.samples,
-            "signature": plain(signature(rig, explanation.fit)),
+            "signature": plain(signature(rig, _remaining(rig, explanation.fit))),
             "chi2_per_n_tolerated": explanation.before / explanation.samples,
             "unlisted_nats": float(explanation.unlisted_nats),
             "nominal": {
                 "chi2_per_n": nominal.misfit / explanation.samples,
-                "signature": plain(signature(rig, nominal)),
+                "signature": plain(signature(rig, _remaining(rig, nominal))),
             },
         },
         "notes": list(diagnosis.notes),
     }
     return values | {"remains": remains(values)}
+
+
+def _remaining(rig: Rig, fit: Fit) -> list[Array]:
+    return [fit.remaining(t) for t in range(len(rig.trials))]
 
 
 def _cause(

@@ -1,24 +1,23 @@
 """Where the misfit sits: channels, trials, speed, frequency, and whose torques it points along."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from discrepancy.digits import three_digits
-from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
 from estimator.arrays import Array
 
 
-def signature(rig: Rig, fit: Fit) -> dict[str, Any]:
-    """Describe what a fit leaves of the whitened residual beyond noise, as plain numbers.
+def signature(rig: Rig, z: Sequence[Array]) -> dict[str, Any]:
+    """Describe what is left of the whitened residual beyond noise, shape (n, C) a trial, as plain numbers.
 
     Returns:
         ``chi2_per_n`` in all and by ``kind`` of channel, ``robot``, ``trial``; ``moving_share``: part of the excess
         while the rig moves; ``correlation`` of its size with the rig's explanatory quantities; ``frequency_hz``:
         median frequency of the worst channel; ``along``: the source along which most of it points; ``sentence``.
     """
-    z = [fit.remaining(t) for t in range(len(rig.trials))]
     squares = np.concatenate([(x**2) for x in z])
     out: dict[str, Any] = {"chi2_per_n": float(squares.mean())}
     kinds = sorted({channel.kind for channel in rig.channels})
@@ -47,7 +46,7 @@ def signature(rig: Rig, fit: Fit) -> dict[str, Any]:
     return out
 
 
-def _median_frequency(rig: Rig, z: list[Array], channel: int) -> float:
+def _median_frequency(rig: Rig, z: Sequence[Array], channel: int) -> float:
     power, at = 0.0, None
     for t, x in enumerate(z):
         rate = rig.row_rate_hz(t)
@@ -58,7 +57,7 @@ def _median_frequency(rig: Rig, z: list[Array], channel: int) -> float:
     return float(at[np.searchsorted(total, 0.5 * total[-1])]) if at is not None else 0.0
 
 
-def _along(rig: Rig, z: list[Array]) -> dict[str, float]:
+def _along(rig: Rig, z: Sequence[Array]) -> dict[str, float]:
     """Share of the squared residual along each source's own direction (one of C dimensions, or a few)."""
     shares: dict[str, list[float]] = {}
     total = sum(float(np.sum(x**2)) for x in z)

@@ -372,25 +372,32 @@ class TeamProblem:
             out += [listed.groups[i] for i in np.argsort(-gains)[:NEAR]]
         return out
 
-    def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
-        """The cause with the numbers of its shape a Gauss-Newton step further."""
+    def slopes(self, candidate: Candidate, x: Array) -> tuple[list[int], Array, Array]:
+        """Columns by the numbers of a shape that the data determine, appended; these numbers, and sizes of steps."""
         steps = self.rig.steps(candidate)
         names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
         if not steps or len(steps) != len(names):
-            return []
-        x, count = self.values_of(group, posterior.mean), self.cells.count
+            return [], np.zeros(0), np.zeros(0)
         ends = [[self.columns_of(c) for c in pair] for *pair, _ in steps]
         slopes = [
             [(b - a) @ x / width for a, b in zip(*pair, strict=True)]
             for pair, (_, _, width) in zip(ends, steps, strict=True)
         ]
-        index = self.add([np.stack(each, axis=2) for each in zip(*slopes, strict=True)])
         numbers = np.array([candidate.shape[n] for n in names])
         size = [max(abs(v), width) * STEP_SHARE for v, (_, _, width) in zip(numbers, steps, strict=True)]
+        return self.add([np.stack(each, axis=2) for each in zip(*slopes, strict=True)]), numbers, np.array(size)
+
+    def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
+        """The cause with the numbers of its shape a Gauss-Newton step further."""
+        count = self.cells.count
+        index, numbers, size = self.slopes(candidate, self.values_of(group, posterior.mean))
+        if not index:
+            return []
         prior = np.append(posterior.prior, np.zeros(self.cells.count - len(posterior.prior)))
         prior[index] = np.square(size)
         moved = numbers + Posterior(self.cells, prior, posterior.variance).mean[index]
         self.cells.truncate(count)
+        names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
         shape = dict(candidate.shape) | dict(zip(names, moved.tolist(), strict=True))
         try:
             return [self.group_of(candidate.in_shape(shape), group.log_prior)]

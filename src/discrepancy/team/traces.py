@@ -1,14 +1,12 @@
 """A team's residuals for the plots: the whitening undone."""
 
 import numpy as np
-from scipy.signal import lfilter
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.traces import Trace
 from discrepancy.team.rig import TeamRig
-from estimator.arrays import Array
+from discrepancy.team.verdict import unwhitened
 
 
 def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:
@@ -35,18 +33,3 @@ def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:
             )
         )
     return out
-
-
-def unwhitened(white: Whitening, y: Array) -> Array:
-    """The residual whose whitening is y, shape (n, C) -> (n, C)."""
-    order, moving = white.ar.shape[1], white.moving
-    z = y[:moving].copy()
-    for c in range(y.shape[1] if moving > order else 0):
-        a = np.concatenate([[1.0], -white.ar[c]])
-        # The first rows are as they were; they are the past of the first that was predicted.
-        past = [
-            float(np.dot(white.ar[c][k:], z[order - 1 :: -1, c][: order - k] if order else []))
-            for k in range(order)
-        ]
-        z[order:, c], _ = lfilter([1.0], a, white.innovation[c] * z[order:, c], zi=np.array(past))
-    return np.concatenate([white.loudness * (z @ white.chol_moving.T), y[moving:] @ white.chol_alone.T])

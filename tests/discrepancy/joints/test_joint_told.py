@@ -14,13 +14,13 @@ import pytest
 from command import refused, run
 from diagnosed import check_finite, small_diagnosis
 from discrepancy.cause_names.serial import NAMES
+from discrepancy.evidence.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS
-from discrepancy.joints.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints.json import verdict_to_dict
 from discrepancy.joints.said import Said, parameter_name
-from discrepancy.joints.text import format_verdict
 from discrepancy.result.read import read_diagnosis
+from discrepancy.result.report import format_verdict
 from estimator.errors import InputError
 from joint_verdicts import (
     JOINTS,

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.joints.findings import Event, Finding, Member
+from discrepancy.evidence.findings import Event, Finding, Member
 from discrepancy.joints.mechanics.nominal import inverse_torque
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel, load_model

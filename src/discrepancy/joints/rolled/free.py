@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.joints.findings import Event
+from discrepancy.evidence.findings import Event
 from discrepancy.joints.rolled.robot import LoggedTorques, Robot
 from discrepancy.joints.signals import Signals, smoothing_hz
 from estimator.arrays import Array

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from discrepancy.evidence.findings import Finding
 from discrepancy.joints.effects import all_effects, label
-from discrepancy.joints.findings import Finding
 from discrepancy.joints.model import SerialModel, load_spec
 from discrepancy.joints.signals import Signals
 from estimator.arrays import Array

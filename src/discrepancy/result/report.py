@@ -1,4 +1,4 @@
-"""The text of a verdict on a robot of joints: at most five sentences and one table; the rest on request."""
+"""The text of a verdict of the small engine: at most five sentences and one table; the rest on request."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from discrepancy.causes.units import one_each, parameter
 from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.result.evidence_list import label
-from discrepancy.result.read import VERDICTS
+from discrepancy.result.read import VERDICTS, is_of_joints
 from discrepancy.result.remains import remedy
 from discrepancy.result.text import (
     NOTHING_WRONG_HERE,
@@ -37,6 +37,10 @@ MOST_PLACES = 12
 """Rows of a kind that is off everywhere."""
 PLACES, WHATS, LEAST_WHAT, SIZES, GAP = 24, 34, 22, 38, "  "
 """Widest columns of places and of what there is, the narrowest of that, room for sizes, and what is between columns."""
+PARTS = "two joints|a (?:driven joint|joint|link|leg|robot|base|grasp)"
+"""Of a machine, as titles name them, where the place tells which."""
+COUNTS = ("trial", "last_trial")
+"""Numbers that count."""
 TOGETHER = "\N{NO-BREAK SPACE}"
 """Between words that stay in one line of a cell."""
 Row = tuple[list[str], list[str], list[str], str]
@@ -47,7 +51,7 @@ def format_verdict(values: Values, *, verbose: bool = False) -> str:
     """Readable report of at most 100 columns.
 
     Args:
-        values: a verdict in the form of ``verdict_to_dict``.
+        values: a verdict in the form of ``result.told``.
         verbose: whether to tell rivals, limits, rollouts, notes and evidence, too.
     """
     lines = [*wrapped(" ".join(_sentences(values, verbose=verbose)), ""), *_table(values, verbose=verbose)]
@@ -93,7 +97,7 @@ def _found(values: Values) -> str:
         names[0] if len(names) == 1 else f"{between.join(names[:-1])}{between.rstrip(', ')} and {names[-1]}"
     )
     than = "the reference" if values["reference"] else "its model"
-    return f"The robot differs from {than} by {listed}."
+    return f"The {'robot' if is_of_joints(values) else 'team'} differs from {than} by {listed}."
 
 
 def _either(cause: Values) -> str:
@@ -106,8 +110,10 @@ def _gain(values: Values) -> Iterable[str]:
     gain = values["gain"]
     if gain is None or not values["causes"]:
         return
-    if not gain["validated"]:
+    if not (gain["validated"] if is_of_joints(values) else values["recordings"][1:]):
         yield "There is one trial only, so the findings are not tested on data left out of the fit."
+    elif not is_of_joints(values):
+        yield from _likelier([cause["folds"] for cause in values["causes"] if cause["folds"]])
     elif gain["removed"] is not None:
         share = gain["removed"]["share"]
         they = "it removes" if len(values["causes"]) == 1 else "they remove"
@@ -115,6 +121,17 @@ def _gain(values: Values) -> Iterable[str]:
             yield f"In trials left out of the fit {they} {100.0 * share:.0f} % of the torques' error beyond noise."
         else:
             yield "In trials left out of the fit the torques' error is no smaller with that."
+
+
+def _likelier(folds: Sequence[Sequence[float]]) -> Iterable[str]:
+    """What findings that last are worth to trials that the others foretell."""
+    if folds:
+        each = [sum(gains) for gains in zip(*folds, strict=True)]
+        better = sum(gain > 0.0 for gain in each)
+        yield (
+            f"Foretold by the others, {better} of {len(each)} trials are likelier with that, all together by "
+            f"{sum(each):.0f} nats."
+        )
 
 
 def _advice(values: Values, *, verbose: bool) -> Iterable[str]:
@@ -131,7 +148,10 @@ def _advice(values: Values, *, verbose: bool) -> Iterable[str]:
         if values["detection_limits"]:
             yield f"What would have been noticed is listed {'below' if verbose else 'with --verbose'}."
     else:
-        yield "The pictures that --out writes show at which speed, position and load the torques part."
+        what = (
+            "position and load the torques part" if is_of_joints(values) else "place and load the rows part"
+        )
+        yield f"The pictures that --out writes show at which speed, {what}."
 
 
 def _lower(text: str) -> str:
@@ -183,9 +203,10 @@ def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
     what, chance = _whats(cause), _chance(cause["probability"])
     members = cause.get("members") or [cause]
     if len(members) == 1:
-        sizes = _sizes(members[0]["parameters"], verbose=verbose)
-        if cause.get("event"):
-            event = cause["event"]
+        event, numbers = cause.get("event"), members[0]["parameters"]
+        told = event or {}
+        sizes = _sizes({name: x for name, x in numbers.items() if name not in told}, verbose=verbose)
+        if event:
             sizes.append(f"trial {event['trial']}, {event['start_s']:.2f} s, for {event['duration_s']:.2f} s")
         yield [cause["place"]], what, sizes or [""], chance
     else:
@@ -220,7 +241,7 @@ def _each(place: str, what: list[str], members: Sequence[Values], chance: str) -
 
 def _what(kind: str) -> str:
     """A cause in words without its place."""
-    return re.sub(r" (in|of|at) (a joint|a link|two joints)\b", "", kind)
+    return re.sub(rf" (in|of|at) ({PARTS})\b", "", kind)
 
 
 def _whats(cause: Values) -> list[str]:
@@ -242,23 +263,32 @@ def _chance(probability: float) -> str:
 
 
 def _sizes(parameters: Values, *, verbose: bool) -> list[str]:
-    """Numbers of one place, a line each; three of a point in one; moments of inertia on request."""
+    """Numbers of one place, a line each; components of a vector in one; moments of inertia on request."""
     shown = one_each((parameter(name)[1], entry["value"]) for name, entry in parameters.items())
-    point = [name for name in parameters if re.fullmatch(r"[xyz]_\w+", name)]
-    out = []
+    vectors: dict[str, list[str]] = {}
     for name, entry in parameters.items():
-        if name in point[1:] or (name.startswith("inertia_") and not verbose):
-            continue
-        if name in point:
-            numbers = [_number(each, parameters[each], shown, named=False, unit=False) for each in point]
-            out.append(f"x, y, z: {', '.join(numbers)} {_unit(name, shown)[0]}")
+        absent = (
+            entry["value"] == 0.0 and entry["se"] is None
+        )  # chosen, such as a second length of one pendulum
+        if verbose or not (absent or name.startswith("inertia_")):
+            vectors.setdefault(re.sub(r"(^|_)[xyz]_", r"\1*_", name), []).append(name)
+    out = []
+    for stem, names in vectors.items():
+        numbers = [_number(name, parameters[name], shown, named=len(names) == 1 < len(parameters),
+                           unit=len(names) == 1) for name in names]  # fmt: skip
+        if len(names) == 1:
+            out += numbers
         else:
-            out.append(_number(name, entry, shown, named=len(parameters) > 1))
+            axes = ", ".join(re.findall(r"(?:^|_)([xyz])_", "|".join(names).replace("|", "_")))
+            word = parameter(stem.replace("*_", "", 1))[0] if stem[0] != "*" else ""
+            out.append(f"{f'{word} {axes}'.strip()}: {', '.join(numbers)} {_unit(names[0], shown)[0]}")
     return out
 
 
 def _unit(name: str, shown: Mapping[str, tuple[str, float]]) -> tuple[str, float]:
     unit = parameter(name)[1]
+    if name in COUNTS:
+        return "", 1.0
     return shown[unit] if unit else ("%", 100.0)
 
 
@@ -315,7 +345,8 @@ def _suspicion(entry: Values) -> str:
 def _misfit(values: Values) -> str:
     residual = values["residual"]
     text = f"chi2/n is {three_digits(residual['nominal']['chi2_per_n'])} as modelled, "
-    text += f"{three_digits(residual['chi2_per_n_tolerated'])} with all a little off, within its tolerance"
+    far = "as far as its kind scatters" if values["scatter"] else "within its tolerance"
+    text += f"{three_digits(residual['chi2_per_n_tolerated'])} with all a little off, {far}"
     if values["causes"]:
         text += f", {three_digits(residual['chi2_per_n'])} with what is found"
     return f"{text} (up to {SETTINGS.clean_chi2:g} counts as clean)."

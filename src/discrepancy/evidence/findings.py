@@ -1,0 +1,187 @@
+"""What a search found, place by place, in physical values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from discrepancy.result.traces import Trace
+
+Word = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Member:
+    """One place of a finding.
+
+    Attributes:
+        place: name of the joint, link or base.
+        joint: which joint, from 1; None of links and of the base.
+        values: by parameter name, with the unit as suffix.
+        errors: standard errors by the same names.
+    """
+
+    place: str
+    joint: int | None
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Event:
+    """When something acted.
+
+    Attributes:
+        trial: which, from 0.
+        start_s: on the trial's log's clock [s].
+        duration_s: [s].
+    """
+
+    trial: int
+    start_s: float
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What else may be in a finding's place.
+
+    Attributes:
+        cause, place, joint: as of findings.
+        probability: of it.
+        nats: by how much it is less likely than the finding.
+    """
+
+    cause: str
+    place: str
+    joint: int | None
+    probability: float
+    nats: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A cause that is there, and why.
+
+    Attributes:
+        cause: name in the tables of causes; ``unlisted`` if none of them is as likely as something else there.
+        place: name of the joint, link or base; ``all joints`` of a kind.
+        joint: which joint, from 1; None of links, the base and a kind.
+        partner: the other joint of a coupled drive, from 1.
+        members: the places with their values; more than one only of a kind.
+        shape: numbers inside its columns, such as ``share`` of the typical speed.
+        of: signal of the joint that something unlisted is a function of; empty where that is not known.
+        event: when it acted, if it did so once.
+        probability: that it is this cause, at this place.
+        over_nothing: by how much it is likelier than nothing in its place [nats].
+        nothing: probability that nothing is there.
+        unlisted: probability that something is there that no table lists.
+        rivals: what else may be there, the likeliest first.
+        told: causes and places of the smallest set that holds 90 %, the likeliest first.
+        folds: by how much each trial, foretold by the others, is likelier with it beside the findings before [nats].
+        in_sample: share of the model's misfit that it removes beyond the findings before it.
+        held_out: the same in trials foretold by the others; None of a single trial and of events.
+    """
+
+    cause: str
+    place: str
+    joint: int | None
+    members: tuple[Member, ...]
+    probability: float
+    over_nothing: float
+    nothing: float
+    unlisted: float
+    partner: int | None = None
+    shape: Mapping[str, float] = field(default_factory=dict)
+    of: str = ""
+    event: Event | None = None
+    rivals: tuple[Rival, ...] = ()
+    told: tuple[tuple[str, str], ...] = ()
+    folds: tuple[float, ...] = ()
+    in_sample: float = 0.0
+    held_out: float | None = None
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """A kind whose members are off by more than three tolerances, all alike.
+
+    Attributes:
+        cause: name in the tables of causes.
+        factor: root mean square of how far they are off over their tolerances.
+        tolerance: by parameter name.
+        members: the farthest off first.
+    """
+
+    cause: str
+    factor: float
+    tolerance: Mapping[str, float]
+    members: tuple[Member, ...]
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What one more cause would gain.
+
+    Attributes:
+        cause, place, joint: as of findings.
+        nats: log odds over nothing.
+    """
+
+    cause: str
+    place: str
+    joint: int | None
+    nats: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What would have been noticed nine times in ten.
+
+    Attributes:
+        cause, place, joint: as of findings.
+        sizes: by parameter name; None where these logs say nothing of it.
+    """
+
+    cause: str
+    place: str
+    joint: int | None
+    sizes: Mapping[str, float | None]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Verdict:
+    """What logs say of a model.
+
+    Attributes:
+        trials: their names.
+        reference: names of the trials of the machine while it was well.
+        verdict: one of the five words.
+        findings: in the order of their worth.
+        suspected: those that are too improbable to be named.
+        scatter: kinds that are off everywhere.
+        validated: whether there are two trials at least.
+        chi2_per_n: squares over the noise's variance per row, as modelled, with tolerances, and with the findings.
+        before, after: what one more cause would gain with nothing found, and with what is found.
+        limits: what would have been noticed.
+        notes: sentences.
+        finished: whether the search came to its end.
+        traces: residuals by trial, for pictures.
+    """
+
+    trials: tuple[str, ...]
+    reference: tuple[str, ...] = ()
+    verdict: Word
+    findings: tuple[Finding, ...]
+    suspected: tuple[Finding, ...]
+    scatter: tuple[Scatter, ...]
+    validated: bool
+    chi2_per_n: tuple[float, float, float]
+    before: tuple[Offer, ...]
+    after: tuple[Offer, ...]
+    limits: tuple[Limit, ...]
+    notes: tuple[str, ...]
+    finished: bool
+    traces: Callable[[], list[Trace]]

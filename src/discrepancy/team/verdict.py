@@ -1,0 +1,227 @@
+"""From a search in recordings of a team to a verdict: causes with probabilities, sizes, and what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from discrepancy.candidate import Candidate
+from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
+from discrepancy.evidence.judge import Judge, Side
+from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.parts import Values
+from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.least_squares.whitening import Whitening
+from discrepancy.result.traces import Trace
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.diagnose import TeamOutcome
+from discrepancy.team.estimates import Estimate, to_dict
+from discrepancy.team.parts import left_of, parts_of
+from discrepancy.team.problem import TeamProblem
+from discrepancy.team.rig import TeamRig
+from estimator.arrays import Array
+
+STEPS = 10.0
+"""Steps of a number of a shape up to which it may be off, a prior as wide as none."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TeamVerdict(Verdict):
+    """What recordings say of a model of a team.
+
+    Attributes:
+        rig: the recordings.
+        candidates: by cause and place as findings have them.
+        left: whitened rows that are left, as simulated (``before``) and with everything that was found (``after``).
+        estimates: of the payload, by the same names.
+    """
+
+    rig: TeamRig
+    candidates: Mapping[tuple[str, str], Candidate]
+    left: Mapping[str, Sequence[Array]]
+    estimates: Mapping[str, Estimate]
+
+
+def judged_team(outcome: TeamOutcome, notes: Sequence[str] = ()) -> TeamVerdict:
+    """What a search found, told.
+
+    Args:
+        outcome: of the search.
+        notes: sentences on the recordings.
+    """
+    return _TeamJudge(outcome).verdict(outcome, notes)
+
+
+class _TeamJudge(Judge):
+    """What one search found in recordings of a team."""
+
+    problem: TeamProblem
+    tolerated = True
+
+    def __init__(self, outcome: TeamOutcome) -> None:
+        assert isinstance(outcome.problem.rig, TeamRig)
+        self.rig, plain = outcome.problem.rig, outcome.nothing
+        odds = odds_of(outcome.search, outcome.state)
+        parts = parts_of(outcome.problem, outcome.state)
+        super().__init__(outcome.problem, (outcome.search, outcome.state), plain, parts, odds)
+
+    def verdict(self, outcome: TeamOutcome, notes: Sequence[str]) -> TeamVerdict:
+        """All that is told."""
+        told, problem, rig = self.told(), self.problem, self.rig
+        prior, fitted = np.zeros(len(self.state.posterior.prior)), self.fitted(problem)
+        prior[fitted] = self.state.posterior.prior[fitted]
+        plain = Posterior(problem.cells, prior, self.search.floor).mean
+        values = {"before": plain, "after": self.state.posterior.mean}
+        left = {name: left_of(problem, x) for name, x in values.items()}
+        return TeamVerdict(
+            **told,
+            trials=tuple(rig.trials),
+            notes=tuple(notes),
+            finished=outcome.finished,
+            traces=lambda: traces(rig, problem.opened, left),
+            rig=rig,
+            candidates=self._candidates,
+            left=left,
+            estimates={
+                name: to_dict(rig.linear[0].shared.moved(-x[problem.shared])) for name, x in values.items()
+            },
+        )
+
+    # --- groups
+
+    @property
+    def _candidates(self) -> dict[tuple[str, str], Candidate]:
+        plain = self.nothing[0].problem
+        assert isinstance(plain, TeamProblem)
+        known = {**plain.candidates, **self.problem.candidates}
+        return {(key[0], key[1]): candidate for key, candidate in known.items() if isinstance(key, tuple)}
+
+    def joint(self, cause: str, place: str) -> int | None:
+        candidate = self._candidates.get((cause, place))
+        return candidate and candidate.joint
+
+    def more(self, group: Group) -> Mapping[str, Any]:
+        candidate = self.problem.candidates.get(group.identity)
+        at = candidate and candidate.transient
+        if candidate is None or at is None:
+            return {"shape": dict(candidate.shape) if candidate else {}}
+        return {"event": Event(at.trial, float(at.start_s), float(at.duration_s))}
+
+    def members(self, group: Group, values: Values) -> tuple[Member, ...]:
+        candidate = self.problem.candidates[group.identity]
+        covariance, at = values[1], self.parts.columns_of(group.columns)
+        x, C = np.zeros(len(candidate.parameters)), np.zeros((len(candidate.parameters),) * 2)
+        which = self._parameters(group)
+        x[which], C[np.ix_(which, which)] = values[0][at], covariance[np.ix_(at, at)]
+        if group in [c.group for c in self.state.chosen]:
+            C = self._with_shape(group, candidate, x, C)
+        numbers, errors = CAUSES[candidate.cause].report(x, C, self.rig._context(candidate))
+        return (Member(group.place, candidate.joint, numbers, errors),)
+
+    def _parameters(self, group: Group) -> list[int]:
+        """Which parameter of its candidate each column of a group is."""
+        labels = [self.problem.labels[k] if k < len(self.problem.labels) else None for k in group.columns]
+        return [n if label is None else label[1] for n, label in enumerate(labels)]
+
+    def _with_shape(self, group: Group, candidate: Candidate, x: Array, C: Array) -> Array:
+        """Covariance of values and of the numbers of the shape that the data determine, shape (k + s, k + s)."""
+        cells, p, k = self.problem.cells, self.state.posterior, len(x)
+        count = cells.count
+        index, _, size = self.problem.slopes(candidate, x)
+        if index:
+            prior = np.append(p.prior, np.zeros(cells.count - len(p.prior)))
+            prior[self.parts.active], prior[index] = self.parts.prior, (STEPS * size) ** 2
+            at, to = [*group.columns, *index], [*self._parameters(group), *range(k, k + len(index))]
+            C = np.zeros((k + len(index),) * 2)
+            C[np.ix_(to, to)] = Posterior(cells, prior, p.variance).covariance[np.ix_(at, at)]
+        cells.truncate(count)
+        return C
+
+    def tolerances(self, group: Group) -> Mapping[str, float]:
+        return {p.name: p.tolerance for p in self.problem.candidates[group.identity].parameters}
+
+    def sizes(self, group: Group, sizes: Array, seen: Array) -> Mapping[str, float | None] | None:
+        told: dict[str, float | None] = dict.fromkeys(self.tolerances(group))
+        names = list(told)
+        for n, size, ok in zip(self._parameters(group), sizes, seen, strict=True):
+            told[names[n]] = float(size) if ok else None
+        return told
+
+    def fitted(self, problem: Any) -> Sequence[int]:
+        return [*problem.shared, *(k for own in problem.local for k in own)]
+
+    def before(self) -> Side:
+        """Noise and spreads are those with the causes: without, a kind's spread takes up what one of it does."""
+        p, prior = self.state.posterior, self.state.posterior.prior.copy()
+        nominal = np.append(self.problem.prior((), None), np.zeros(len(prior)))
+        own = [k for c in self.state.chosen for k in (*c.group.columns, *c.forms)]
+        prior[own] = nominal[own]
+        return self.search, replace(
+            self.state, chosen=(), posterior=Posterior(self.problem.cells, prior, p.variance)
+        )
+
+    def unseen(self) -> Collection[Group]:
+        """Causes without tolerances, in their first shapes."""
+        first: dict[tuple[str, str], Group] = {}
+        known = {g.key for g in self.problem.groups}
+        for g in self.problem.listed.groups if self.problem.listed else ():
+            if g.key not in known:
+                first.setdefault(g.key, g)
+        return first.values()
+
+    def _shaped(self, group: Group) -> bool:
+        return False  # other shapes are listed apart
+
+    def _scatter(self) -> list[Scatter]:
+        """Kinds that are off everywhere, by the numbers that have tolerances."""
+        return [
+            replace(
+                s,
+                members=tuple(
+                    replace(m, values={n: x for n, x in m.values.items() if n in s.tolerance})
+                    for m in s.members
+                ),
+            )
+            for s in super()._scatter()
+        ]
+
+
+def traces(rig: TeamRig, opened: Sequence[Array] | None, left: Mapping[str, Sequence[Array]]) -> list[Trace]:
+    """Residuals of every trial for pictures.
+
+    Args:
+        rig: the recordings.
+        opened: what makes rows white beside what chosen causes leave open, shape (n, C, C) a trial; or None.
+        left: rows so whitened, ``before`` and ``after``, shape (n, C) a trial.
+    """
+    out = []
+    for t, (linear, white) in enumerate(zip(rig.linear, rig.whitening, strict=True)):
+        z = [left[name][t] for name in ("before", "after")]
+        if opened is not None:
+            z = [np.asarray(np.linalg.solve(opened[t], x[..., None])[..., 0], dtype=np.float64) for x in z]
+        sigma = np.empty_like(z[0])
+        sigma[: white.moving] = white.loudness * np.linalg.norm(white.chol_moving, axis=1)
+        sigma[white.moving :] = np.linalg.norm(white.chol_alone, axis=1)
+        before, after = (unwhitened(white, x) for x in z)
+        out.append(Trace(rig.trials[t], linear.reduction.time, white.moving, rig.row_rate_hz(t), before, after, sigma,
+                         z[0], z[1], rig.quantities(t)))  # fmt: skip
+    return out
+
+
+def unwhitened(white: Whitening, y: Array) -> Array:
+    """The residual whose whitening is y, shape (n, C) -> (n, C)."""
+    order, moving = white.ar.shape[1], white.moving
+    z = y[:moving].copy()
+    for c in range(y.shape[1] if moving > order else 0):
+        a = np.concatenate([[1.0], -white.ar[c]])
+        # The first rows are as they were; they are the past of the first that was predicted.
+        past = [
+            float(np.dot(white.ar[c][k:], z[order - 1 :: -1, c][: order - k] if order else []))
+            for k in range(order)
+        ]
+        z[order:, c], _ = lfilter([1.0], a, white.innovation[c] * z[order:, c], zi=np.array(past))
+    return np.concatenate([white.loudness * (z @ white.chol_moving.T), y[moving:] @ white.chol_alone.T])
