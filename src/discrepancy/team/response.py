@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -17,12 +18,15 @@ from discrepancy.digits import three_digits
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Key, Search, State
+from discrepancy.team.around import found_in, robots_at
+from discrepancy.team.closed_loop import named_effects, posture, team_of
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.gain import MARGIN_SHARE, Gain, Response, is_worse, mean_chi2
 from discrepancy.team.problem import TeamProblem
-from discrepancy.team.rig import TeamRig
+from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arrays import Array
 from estimator.processes import ends_with_this
+from mocobot_sim.extended.extended import write_extended
 
 TOLD_NATS = 5.0
 """By which the closed loop at least prefers what responds better by the margin. Chosen."""
@@ -261,7 +265,9 @@ def confirm(
         simulated: called with 1 for every simulated trial.
     """
     search, problem, chosen = outcome.search, outcome.problem, [o.chosen for o in odds]
-    nothing = Hypothesis(outcome.nothing[0].problem, outcome.nothing[1])
+    plain = outcome.nothing[0].problem
+    assert isinstance(plain, TeamProblem)
+    nothing = Hypothesis(plain, outcome.nothing[1])
     trials = len(problem.local)
     if not chosen:
         (before,) = responses([nothing], jobs, simulated)
@@ -367,3 +373,37 @@ def _with_all_as_found(
     if not left or np.mean(left) <= VISIBLE_CHI2_PER_N:
         return gain
     return replace(gain, as_found=responses([replace(found, whole=True)], jobs, simulated)[0])
+
+
+def as_found(outcome: TeamOutcome) -> AsFound:
+    """Robots, payload and causes as a search found them.
+
+    Raises:
+        InputError: there are no such robots.
+    """
+    found = found_in(outcome.problem, outcome.state)
+    units, _, shared = robots_at(outcome.problem.rig, found)
+    return AsFound.of(units, shared, found.active)
+
+
+def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *, whole: bool = False) -> None:
+    """Write the estimated team with causes in it as an extended model; ``mocobot simulate --model`` takes it.
+
+    Args:
+        outcome: of a search.
+        chosen: those of its causes that are named.
+        folder: to be written.
+        whole: whether every healthy part is in it as it is found, within its tolerance, too.
+
+    Raises:
+        InputError: the folder cannot be written, or a cause has values that no effect can have.
+    """
+    found = Hypothesis(outcome.problem, _only(outcome, chosen), whole)
+    rig, told = found.rig, found.told(None)
+    effects = [e for cause, values in told.active for e in named_effects(cause, rig.effects(cause, values))]
+    causes = [cause for cause, _ in told.active]
+    parts = rig.of_healthy(0, causes, told.healthy) if whole else []
+    shared, bases = rig.linear[0].shared.moved(told.shared), rig.linear[0].bases.moved(told.local)
+    scene = team_of(shared, bases, [*effects, *parts], *posture(rig.robots_of(0, told.healthy)))
+    extra = {"recordings": list(rig.trials), "causes": [cause.label for cause in causes]}
+    write_extended(scene, effects, folder, extra, parts)
