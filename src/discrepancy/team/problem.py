@@ -409,8 +409,9 @@ class Catalogue:
         rig = plain.rig
         groups: list[Group] = []
         labels: list[tuple[Candidate, int] | None] = []
-        tolerance, kinds, rows = list[float](), dict[str, list[int]](), list[Array]()
-        others: list[Listed] = []
+        none = np.zeros((len(plain.cells.channels), len(plain.cells.order), 0), dtype=np.float32)
+        tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none.astype(float)]
+        others = [Listed([], none)]
         apart: dict[Hashable, Array] = {}
         for candidate in rig.candidates():
             shapes = rig.refinements(candidate)
