@@ -52,8 +52,12 @@ def found_in(problem: TeamProblem, state: State) -> Found:
     for k, label in enumerate(problem.labels):
         if label is not None:
             candidate, parameter = label
-            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][parameter] = x[k]
-    active = tuple((problem.candidates[c.group.identity], problem.values_of(c.group, x)) for c in state.chosen)
+            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][
+                parameter
+            ] = x[k]
+    active = tuple(
+        (problem.candidates[c.group.identity], problem.values_of(c.group, x)) for c in state.chosen
+    )
     local = tuple(-x[columns][:own] for columns in problem.local)
     return Found(-x[problem.shared], local, tuple(values.values()), active)
 
@@ -169,8 +173,9 @@ def opened_by(problem: TeamProblem, state: State) -> list[Array] | None:
             if patches.width:
                 if covariance is None:
                     covariance = [np.zeros((*r.residual.shape, r.residual.shape[1])) for r in rig.linear]
-                P = patches.dense() * abs(float(values[0]))
-                covariance[t] += P @ np.swapaxes(P, 1, 2)
+                for patch in patches.each:
+                    P = patch.values * abs(float(values[0]))
+                    covariance[t][patch.where, patch.first :, patch.first :] += P @ np.swapaxes(P, 1, 2)
     if covariance is None:
         return None
     out = []

@@ -75,15 +75,22 @@ class Hypothesis:
         assert isinstance(self.problem.rig, TeamRig)
         return self.problem.rig
 
+    @cached_property
+    def causes(self) -> list[tuple[Candidate, Group]]:
+        """Those of the set that a simulation can have: what no table lists has no effect."""
+        known = self.problem.candidates
+        groups = [c.group for c in self.state.chosen if c.group.identity in known]
+        return [(known[g.identity], g) for g in groups]
+
     @property
     def of_trials(self) -> bool:
         """Whether a cause is there in some trials only: the others say nothing of it."""
-        return any(self.problem.candidates[c.group.identity].of_trials for c in self.state.chosen)
+        return any(candidate.of_trials for candidate, _ in self.causes)
 
     @cached_property
     def carried(self) -> dict[int, list[int]]:
         """Columns of each healthy part that a simulation has, by the identity of its candidate."""
-        there = {self.problem.candidates[c.group.identity].key for c in self.state.chosen}
+        there = {candidate.key for candidate, _ in self.causes}
         out: dict[int, list[int]] = {}
         for k, label in enumerate(self.problem.labels):
             if label and label[0].key not in there and (self.whole or self.rig.carried(label[0])):
@@ -94,7 +101,7 @@ class Hypothesis:
     def alone(self) -> NDArray[np.intp]:
         """Columns of unknowns and causes."""
         p = self.problem
-        own = [k for c in self.state.chosen for k in c.group.columns]
+        own = [k for _, group in self.causes for k in group.columns]
         return np.array([*p.shared, *(k for local in p.local for k in local), *own], dtype=np.intp)
 
     @cached_property
@@ -153,7 +160,7 @@ class Hypothesis:
         every = np.zeros(self.problem.cells.count)
         every[self.columns] = x
         p = self.problem
-        active = [(p.candidates[c.group.identity], p.values_of(c.group, every)) for c in self.state.chosen]
+        active = [(candidate, p.values_of(group, every)) for candidate, group in self.causes]
         return Told(
             -every[p.shared], -every[p.local[t]][: self.rig.local_unknowns], active, self._healthy(every)
         )
@@ -260,11 +267,14 @@ def confirm(
 
     Args:
         outcome: of a search; its rig can simulate.
-        odds: of the causes that are named; other causes of the set are not simulated.
+        odds: of the causes that are named; other causes of the set, and what no table lists, are not simulated.
         jobs: parallel processes.
         simulated: called with 1 for every simulated trial.
     """
-    search, problem, chosen = outcome.search, outcome.problem, [o.chosen for o in odds]
+    search, problem = outcome.search, outcome.problem
+    others = tuple(o for o in odds if o.chosen.group.identity not in problem.candidates)
+    odds = [o for o in odds if o not in others]
+    chosen = [o.chosen for o in odds]
     plain = outcome.nothing[0].problem
     assert isinstance(plain, TeamProblem)
     nothing = Hypothesis(plain, outcome.nothing[1])
@@ -272,11 +282,11 @@ def confirm(
     if not chosen:
         (before,) = responses([nothing], jobs, simulated)
         gain = _with_all_as_found(Gain(before, before, trials > 1), nothing, jobs, simulated)
-        return Confirmed(outcome, (), gain, {}, contradicted=False, notes=())
+        return Confirmed(outcome, others, gain, {}, contradicted=False, notes=())
     state, count, swaps = _only(outcome, chosen), problem.cells.count, list(_swaps(outcome, odds))
     named = Hypothesis(problem, state)
-    others = [Hypothesis(problem, swap.state(search, state)) for swap in swaps]
-    before, after, *each = responses([nothing, named, *others], jobs, simulated)
+    swapped = [Hypothesis(problem, swap.state(search, state)) for swap in swaps]
+    before, after, *each = responses([nothing, named, *swapped], jobs, simulated)
     problem.cells.truncate(count)
     values = {(swap.own.key, swap.rival.key): mean_chi2(r) for swap, r in zip(swaps, each, strict=True)}
     first, tried, notes = mean_chi2(after), dict(values), []
@@ -311,7 +321,7 @@ def confirm(
     final = Hypothesis(problem, state)
     gain = Gain(before, after, trials > 1 and not final.of_trials)
     gain = _with_all_as_found(gain, final, jobs, simulated)
-    return Confirmed(outcome, tuple(odds), gain, tried, contradicted, tuple(notes))
+    return Confirmed(outcome, (*odds, *others), gain, tried, contradicted, tuple(notes))
 
 
 def _only(outcome: TeamOutcome, chosen: Sequence[Chosen]) -> State:
