@@ -28,7 +28,7 @@ import tyro
 from arm import machine
 from arm.sets import ArmSet, Kind
 from arm.sets import make as make_arm
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import diagnose, labels_of
 from discrepancy.joints.given import Given
@@ -38,7 +38,7 @@ from mocobot_logs.joints.joint_log import JointLog
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
-        "load_friction")  # fmt: skip
+        "load_friction", "quadratic_drag")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
 """Names of one thing at one joint: no log without rests parts the first, terms of one friction are the last."""
 SURE = 0.9
@@ -127,7 +127,7 @@ def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item
     places = {"payload": model.bodies[-1], "push": "last link", "gravity_direction": "base"}
     faults = [e | {"place": places.get(e["cause"], f"joint{e['joint']}")} for e in made.truth["effects"]]
     if request.kind in ("unlisted", "left-out"):
-        faults = [f | {"cause": "unlisted"} for f in faults]
+        faults = [f | {"law": f["cause"] or f["name"], "cause": "unlisted"} for f in faults]
     truth = {"kind": request.kind, "faults": faults, "values": {}, "excluded": list(request.excluded)}
     return model, [made.log], truth
 
@@ -137,12 +137,13 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Sett
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
     outcome = diagnose(model, logs, settings, say=lambda line: steps.append(str(line)), given=given)
-    causes = []
-    for o in odds_of(outcome.search, outcome.state):
+    state, causes = borne_out(outcome.search, outcome.state), []
+    for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
         told = [None if g is None else g.key for g in o.told()]
         causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})
+    outcome = replace(outcome, state=state)
     numbers, hidden = labels_of(outcome), {f["cause"] for f in truth["faults"]}
     offers = enumerate(outcome.search.offers(outcome.state))
     listed = [[round(g, 1), c.group.name] for k, (g, c) in offers if k < 3 or c.group.cause in hidden]
@@ -150,8 +151,9 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Sett
 
 
 def _same(fault: Item, key: Sequence[str]) -> bool:
-    """Whether a cause at a place is the fault, or what no log parts from it."""
-    names = {n for family in ALIKE if fault["cause"] in family for n in family} | {fault["cause"]}
+    """Whether a cause at a place is the fault, or what no log parts from it; of a law of no table, from its law."""
+    law = fault.get("law", fault["cause"])
+    names = {n for family in ALIKE if law in family for n in family} | {fault["cause"]}
     return key[0] in names and (fault["cause"] == "push" or key[1] == fault["place"])
 
 

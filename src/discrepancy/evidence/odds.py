@@ -53,19 +53,37 @@ class Odds:
         return tuple(out)
 
 
+def borne_out(search: Search, state: State) -> State:
+    """The set without causes that are likelier what the other causes' laws leave, the weakest taken out first."""
+    while len(state.chosen) > 1:
+        shorter = [_without(search, state, c) for c in state.chosen]
+        best = max(shorter, key=lambda s: s.evidence)
+        if best.evidence + _left(search, best) < state.evidence:
+            break
+        state = best
+    return state
+
+
 def odds_of(search: Search, state: State) -> list[Odds]:
     """Probabilities of all causes of a set, which a search found."""
-    empty = search.settled(search.value((), state.posterior)).evidence
-    return [_odds(search, state, c, empty) for c in state.chosen]
+    return [_odds(search, state, c) for c in state.chosen]
 
 
-def _odds(search: Search, state: State, own: Chosen, empty: float) -> Odds:
+def _without(search: Search, state: State, own: Chosen) -> State:
+    return search.settled(search.value([c for c in state.chosen if c is not own], state.posterior))
+
+
+def _left(search: Search, state: State) -> float:
+    """Log odds over nothing of what a set's laws leave, which looks like a cause; not more than the set is worth."""
+    empty = search.settled(search.value((), state.posterior))
+    return float(np.clip(state.evidence - empty.evidence, 0.0, search.settings.open_nats))
+
+
+def _odds(search: Search, state: State, own: Chosen) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
-    without = search.settled(search.value(rest, state.posterior))
-    # What laws leave looks like a cause, but a set does not leave more than it is worth.
-    left = float(np.clip(without.evidence - empty, 0.0, search.settings.open_nats))
-    weighed: list[tuple[float, Group | None]] = [(without.evidence + left, None)]
+    without = _without(search, state, own)
+    weighed: list[tuple[float, Group | None]] = [(without.evidence + _left(search, without), None)]
     for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
         rival = search.with_one(rest, chosen, without.posterior)

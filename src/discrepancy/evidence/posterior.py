@@ -252,6 +252,12 @@ class Posterior:
         kept = root * h @ np.linalg.solve(A, root * h) - np.linalg.slogdet(A)[1]
         return float(0.5 * (h @ (Z.T @ z) - np.linalg.slogdet(C)[1] - kept))
 
+    def size(self, columns: Sequence[int]) -> float:
+        """Half the squares over the noise of what columns add with their values."""
+        k = np.searchsorted(self.active, columns)
+        x = self.mean[list(columns)]
+        return float(0.5 * x @ self._weighted[0][np.ix_(k, k)] @ x)
+
     def possible(self, group: Group, scale: float) -> float:
         """Log evidence that the bounds of a group's values add, where the group is in the model."""
         if not group.least:

@@ -68,8 +68,8 @@ class Linear(Protocol):
         """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
         ...
 
-    def proposals(self, posterior: Posterior) -> Sequence[Group]:
-        """Events and shapes whose columns are not in the problem, the likeliest first."""
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> Sequence[Group]:
+        """Events and shapes whose columns are not in the problem, the likeliest first; or those that are late."""
         ...
 
     def place(self, group: Group) -> Group:
@@ -129,12 +129,7 @@ class Search:
     def __post_init__(self) -> None:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
-    def value(
-        self,
-        chosen: Sequence[Chosen],
-        near: Posterior | None,
-        steps: int | None = None,
-    ) -> State:
+    def value(self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
         Args:
@@ -271,15 +266,15 @@ class Search:
             if g >= least and c.group.name != own.name and not (own.event and c.group.cause == own.cause)
         ]  # fmt: skip
 
-    def offers(self, state: State) -> list[tuple[float, Chosen]]:
-        """Every group that a set has room for by its linear gain, the likeliest first."""
+    def offers(self, state: State, *, late: bool = False) -> list[tuple[float, Chosen]]:
+        """Every group that a set has room for by its linear gain, the likeliest first; late ones are proposed on request."""
         taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
 
         def fits(g: Group) -> bool:
             return not (g.key in taken or (g.cause, "all joints") in taken or g.family in families)
 
         cells, p = self.problem.cells, state.posterior
-        proposed = [g for g in self.problem.proposals(p) if fits(g)]
+        proposed = [g for g in self.problem.proposals(p, late=late) if fits(g)]
         count, placed = cells.count, [self.problem.place(g) for g in proposed]
         wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
         pairs = [*((g, g) for g in self.problem.groups if fits(g)), *zip(proposed, placed, strict=True)]
@@ -299,8 +294,6 @@ class Search:
 
     def _grown(self, state: State, *, late: bool = False) -> State | None:
         """A set with one cause more that is likelier, its law's errors included; None if none is."""
-        if late and not any(g.late for g in self.problem.groups):
-            return None
         cells = self.problem.cells
         count, tried = cells.count, []
         for chosen in self._likely(state, late=late):
@@ -329,7 +322,7 @@ class Search:
         quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
         out: list[Chosen] = []
         for where, most, least in ((state, s.tried, -s.within_nats), (quiet, s.tried_quiet, s.need_nats)):
-            offers = [(gain, c) for gain, c in self.offers(where) if c.group.late == late and gain > least]
+            offers = [(gain, c) for gain, c in self.offers(where, late=late) if c.group.late == late and gain > least]
             known = {c.group.name for c in out}
             out += [c for _, c in offers[:most] if c.group.name not in known]
         return out
@@ -375,8 +368,9 @@ class Search:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
         while len(state.chosen) > fresh:
             loose = state.chosen[: len(state.chosen) - fresh]
-            if any(c.group.late for c in state.chosen):  # a law of no table stands for no listed cause
-                loose = tuple(c for c in loose if c.group.late)
+            if any(c.group.late for c in state.chosen):  # a law of no table takes nothing from a listed cause
+                small, size = self.settings.within_nats, state.posterior.size
+                loose = tuple(c for c in loose if c.group.late or size(c.group.columns) < small)
             gone = [{c} for c in loose]
             gone += [{c, d} for c, d in combinations(loose, 2) if c.group.place == d.group.place]
             gone = [out for out in gone if self._worth(state, out) < self.settings.within_nats]

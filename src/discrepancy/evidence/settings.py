@@ -18,7 +18,7 @@ class Settings:
         need_nats: log odds by which a set must be likelier to replace another (1: a factor of e).
         cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
         open_nats: log odds over nothing of what the laws of other causes leave where one is taken out. Fitted by log
-            score to arms with effects whose laws are not the table's: 7 to 14 are as good.
+            score to arms with effects whose laws are not the table's: 9 to 14 score alike.
         most_causes: largest set.
         tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
         tried_quiet: the same of those that are likeliest with the noise at its floor.
@@ -38,7 +38,7 @@ class Settings:
     """
 
     floor_rows: float = 20.0
-    spread_rows: float = 5.0
+    spread_rows: float = 8.0
     least_spread: float = 1e-6
     most_spread: float = 1.0
     form_share: float = 0.1

@@ -29,7 +29,7 @@ from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.signals import Signals
-from discrepancy.joints.unlisted import SIGNALS, functions
+from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
 from estimator.filtering import low_pass
 
@@ -59,6 +59,8 @@ PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
 BEGIN_S = 1.0
 """Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
 died to 15 %; in a stand or a soft joint it looks like a push."""
+READ_RAD = 0.02
+"""Standard deviation of an unlisted error of a position."""
 UNLISTED_NATS = 5.0
 """Log odds of a listed cause over something that no table lists."""
 REST = 1.5
@@ -76,6 +78,7 @@ class JointProblem:
         parts: smoothed logs, around which columns are made.
         cut: samples of each that are rows.
         cells, groups, families, laws: of the engine.
+        withheld: groups of causes that are left out, whose tolerances stay.
         labels: names of the columns.
         tolerance: standard deviations of a healthy robot, shape (K,).
         series: the columns.
@@ -96,6 +99,7 @@ class JointProblem:
     cut: list[slice]
     cells: Cells
     groups: list[Group] = field(default_factory=list)
+    withheld: list[Group] = field(default_factory=list)
     families: list[list[int]] = field(default_factory=list)
     laws: list[list[int]] = field(default_factory=list)
     labels: list[str] = field(default_factory=list)
@@ -151,8 +155,10 @@ class JointProblem:
             )
         return S
 
-    def proposals(self, posterior: Posterior) -> list[Group]:
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
+        if late:
+            return []
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]
@@ -223,10 +229,10 @@ class JointProblem:
                 for wave in (np.sin, np.cos):
                     way = [np.zeros(len(p.time)) for p in self.parts]
                     way[t] = size * wave(2.0 * np.pi * hz * time) * np.exp(-time / SWAY_S)
-                    out.append(self._displaced(joint, way))
+                    out.append(self.displaced(joint, way))
         return out
 
-    def _displaced(self, joint: int, way: Sequence[Array]) -> Series:
+    def displaced(self, joint: int, way: Sequence[Array]) -> Series:
         """Torques of a joint that is where the model does not have it, a series (W,) a log."""
         moved = [along(s, joint, x)[c] for s, x, c in zip(self.parts, way, self.cut, strict=True)]
         return {
@@ -254,7 +260,7 @@ class JointProblem:
         if group.cause == "joint_zero":
             joint, zero = self.model.joints.index(group.place), float(values[group.columns[0]])
             turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]
-            return self.rows([self._displaced(joint, way) for way in turns])
+            return self.rows([self.displaced(joint, way) for way in turns])
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -412,14 +418,10 @@ class _Builder:
     ) -> None:
         # Between two days a link carries more or less, and is what it was.
         same = self.more.changed is not None and more.get("family") and cause != "payload"
-        if (
-            same
-            or cause in self.more.excluded
-            or not any(j in self.channel for k in columns for j in self.out.series[k])
-        ):
+        if same or not any(j in self.channel for k in columns for j in self.out.series[k]):
             return
-        sizes = tuple(float(x) for x in slab)
-        self.out.groups.append(Group(cause, place, tuple(columns), sizes, **more))
+        groups = self.out.withheld if cause in self.more.excluded else self.out.groups
+        groups.append(Group(cause, place, tuple(columns), tuple(float(x) for x in slab), **more))
 
     def built(self) -> JointProblem:
         for j in range(self.J):
@@ -442,14 +444,8 @@ class _Builder:
         out.changed = self.more.changed
         body = int(self.tree.joint_body[self.tree.last_link])
         none = self.more.motors or "push" in self.more.excluded  # a gear that sticks looks like a push
-        out.pushed = (
-            []
-            if none
-            else [
-                force_torque(s.motion, body, self.tree.com[body])[c]
-                for s, c in zip(self.parts, self.cut, strict=True)
-            ]
-        )
+        for s, c in zip(self.parts, self.cut, strict=True) if not none else ():
+            out.pushed.append(force_torque(s.motion, body, self.tree.com[body])[c])
         for i, label in enumerate(out.labels):  # from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
@@ -533,10 +529,16 @@ class _Builder:
                     cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(cause.shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
-        for number, (signal, terms, sizes) in enumerate(functions(self.joints[j])):
-            index = [self.add(f"{n} unlisted {signal} {k}", 0.0, {j: x}) for k, x in enumerate(terms)]
+        for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
+            if signal == "neighbour's torque" and not j:
+                continue
+            read, slab = signal == "reading", READ_RAD if signal == "reading" else self.spans[j].torque
+            index = [
+                self.add(f"{n} unlisted {signal} {k}", 0.0, self.out.displaced(j, x) if read else {j: x})
+                for k, x in enumerate(terms)
+            ]
             self.group(
-                "unlisted", n, index, self.spans[j].torque * sizes, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
+                "unlisted", n, index, slab * SIZES, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
                 shape=(("signal", float(number)),), late=True,
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
@@ -561,21 +563,15 @@ class _Builder:
 
     def _geometry(self, j: int) -> None:
         n, body = self.names[j], int(self.tree.joint_body[j])
-        zero = self.add(
-            f"{n} zero",
-            self.sd("joint_zero", "zero_rad", ZERO_RAD),
-            self.wide(lambda s: along(s, j, np.ones(len(s.time)))),
-        )
+        tolerance = self.sd("joint_zero", "zero_rad", ZERO_RAD)
+        zero = self.add(f"{n} zero", tolerance, self.wide(lambda s: along(s, j, np.ones(len(s.time)))))
         self.group("joint_zero", n, [zero], [0.1])
         moved = {id(s): by_displacement(s.motion, body) for s in self.parts}
-        lengths = [
-            self.add(
-                f"{n} length {'xyz'[k]}",
-                self.sd("link_length", f"{'xyz'[k]}_m", LENGTH_M),
-                self.wide(lambda s, k=k: moved[id(s)][:, :, k]),
-            )
-            for k in range(3)
-        ]
+        lengths = []
+        for k, x in enumerate("xyz"):
+            tolerance = self.sd("link_length", f"{x}_m", LENGTH_M)
+            column = self.wide(lambda s, k=k: moved[id(s)][:, :, k])
+            lengths.append(self.add(f"{n} length {x}", tolerance, column))
         self.group("link_length", n, lengths, [0.02] * 3)
         self._coupled(j)
 
@@ -635,9 +631,10 @@ class _Builder:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
-        at = c + [self.values.get(f"{n} com {x}", 0.0) for x in "xyz"]
+        moved = {} if loaded else self.values  # a load has columns of its own, which are exact
+        at = c + [moved.get(f"{n} com {x}", 0.0) for x in "xyz"]
         mass = column(f"{n} mass share", spread, inertial_parameters(m, at, zero))
-        half, heavy = -math.log(2.0), m * max(1.0 + self.values.get(f"{n} mass share", 0.0), 0.05)
+        half, heavy = -math.log(2.0), m * max(1.0 + moved.get(f"{n} mass share", 0.0), 0.05)
         self.group("link_mass", n, [mass], [1.0], log_prior=half, family=family)
         coms = []
         for k in range(3):

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.evidence.odds import Odds, odds_of
+from discrepancy.evidence.odds import Odds, borne_out, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, State
 from discrepancy.evidence.settings import SETTINGS
@@ -91,6 +91,7 @@ def judged(
     )
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
+    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
     odds = odds_of(outcome.search, outcome.state)
     parts = Parts.of(outcome, trials)
     return _Judge(model, trials, outcome, parts, odds).verdict([*notes_of([*logs, *reference])])
@@ -338,7 +339,7 @@ class _Judge:
         taken = {k for c in self.state.chosen for k in c.group.columns}
         kinds: dict[str, list[tuple[Group, float]]] = {}
         p = self.state.posterior
-        for g in self.problem.groups:
+        for g in (*self.problem.groups, *self.problem.withheld):
             if g.members or (g.shape and any(v for _, v in g.shape)) or taken & set(g.columns):
                 continue
             sizes = [self.problem.tolerance[k] for k in g.columns]
@@ -348,7 +349,7 @@ class _Judge:
         out = []
         for cause, each in kinds.items():
             factor = float(np.sqrt(np.mean([off for _, off in each])))
-            if len(each) > 1 and factor > SCATTER:
+            if factor > SCATTER:
                 far = sorted(each, key=lambda pair: -pair[1])
                 members = tuple(m for g, _ in far for m in self._members_of(g))
                 sizes = np.array([self.problem.tolerance[k] for k in far[0][0].columns])

@@ -52,12 +52,9 @@ def found_in(problem: TeamProblem, state: State) -> Found:
     for k, label in enumerate(problem.labels):
         if label is not None:
             candidate, parameter = label
-            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][
-                parameter
-            ] = x[k]
-    active = tuple(
-        (problem.candidates[c.group.identity], problem.values_of(c.group, x)) for c in state.chosen
-    )
+            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][parameter] = x[k]
+    listed = [c.group for c in state.chosen if not c.group.late]
+    active = tuple((problem.candidates[g.identity], problem.values_of(g, x)) for g in listed)
     local = tuple(-x[columns][:own] for columns in problem.local)
     return Found(-x[problem.shared], local, tuple(values.values()), active)
 
@@ -155,7 +152,7 @@ def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
     found, cells = found_in(problem, state), problem.cells
     left = problem.rows_of(problem.rig.residual_there(found.shared, found.local, found.active))
     moved = [*problem.shared, *(k for own in problem.local for k in own)]
-    moved += [k for c in state.chosen for k in c.group.columns]
+    moved += [k for c in state.chosen if not c.group.late for k in c.group.columns]
     x = np.append(problem.there, np.zeros(len(state.posterior.mean) - len(problem.there)))
     x[moved] = state.posterior.mean[moved]
     new = cells.around([r.reshape(len(r), -1, 3) for r in left], x)
@@ -189,7 +186,8 @@ def placed(problem: TeamProblem, other: TeamProblem, chosen: Sequence[Chosen]) -
     """Causes of another problem in this one."""
     out = []
     for c in chosen:
-        problem.candidates[c.group.identity] = other.candidates[c.group.identity]
+        if not c.group.late:
+            problem.candidates[c.group.identity] = other.candidates[c.group.identity]
         own = next((g for g in problem.groups if g.identity == c.group.identity), None)
         out.append(Chosen(own or problem.place(c.group), c.scale))
     return out

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,7 @@ from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.origin import origin_of
 from discrepancy.team.rows import TeamRows
+from discrepancy.team.unlisted import Laws
 from estimator.arrays import Array
 
 EDGES_HZ = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
@@ -210,13 +212,19 @@ class TeamProblem:
         return out
 
     def place(self, group: Group) -> Group:
-        """A shape with its columns, which are added to the problem."""
+        """A shape or a law with its columns, which are added to the problem."""
+        law = self.laws_of.laws.get(group.identity) if group.late else None
+        if law is not None:
+            pairs = zip(self.rig.whitening, self.laws_of.columns(law), strict=True)
+            return replace(group, columns=tuple(self.add(self.rows_of([w(x) for w, x in pairs]))))
         return replace(group, columns=tuple(self.add(self.columns_of(self.candidates[group.identity]))))
 
     # --- proposals
 
-    def proposals(self, posterior: Posterior) -> list[Group]:
-        """The likeliest shapes and pushes."""
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
+        """The likeliest shapes and pushes; or, late, laws that no table lists."""
+        if late:
+            return self.laws_of.proposed(self, posterior)
         out: list[Group] = []
         if self.listed is not None:
             gains = self.gains(posterior, self.listed)
@@ -263,10 +271,10 @@ class TeamProblem:
         if "push" in self.rig.excluded:
             return []
         found, windows = [], 0
-        for t, (score, D) in enumerate(zip(self.scores(posterior), self.wrenches, strict=True)):
+        for t, (score, D) in enumerate(zip(self.left(posterior), self.wrenches, strict=True)):
             linear = self.rig.linear[t]
             m, rate, time = linear.reduction.moving, self.cells.bands.rates_hz[t], linear.reduction.time
-            Q = np.einsum("nck,nc->nk", D[:m], score[:m])
+            Q = np.einsum("nck,nc->nk", D[:m], score[:m, -6:])
             R = np.einsum("nck,ncl->nkl", D[:m], D[:m])
             q, r = (np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)]) for x in (Q, R))
             ridge = 1e-6 * np.eye(6) * np.trace(r[-1]) / max(m, 1)
@@ -299,20 +307,27 @@ class TeamProblem:
             self.__dict__["wrenches"] = [x[:, -6:] for x in self.rows_of(out)]
         return self.__dict__["wrenches"]
 
-    def scores(self, posterior: Posterior) -> list[Array]:
-        """Balance rows that a posterior leaves over their variance, shape (n, 6) a trial."""
+    def left(self, posterior: Posterior) -> list[Array]:
+        """Rows that a posterior leaves over their variance, shape (n, C) a trial."""
         parts = []
-        for channel, own in zip(self.cells.channels[-2:], posterior.variance[-2:], strict=True):
+        for channel, own in zip(self.cells.channels, posterior.variance, strict=True):
             left = (channel.y - channel.X @ posterior.mean[channel.columns]) / np.repeat(own, np.diff(channel.starts))
             rows = np.empty_like(left)
             rows[self.cells.order] = left
             parts.append(self.cells.bands.rows(rows))
-        return [np.concatenate(pair, axis=1) for pair in zip(*parts, strict=True)]
+        return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
+
+    @cached_property
+    def laws_of(self) -> Laws:
+        """What no table lists."""
+        return Laws(self.rig.linear)
 
     # --- shapes and forms
 
     def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
         """The same cause in neighbouring shapes, the likeliest by the linear problem without it."""
+        if group.late:
+            return []
         candidate = self.candidates[group.identity]
         near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate) + self.rig.grown(candidate)
         out = self._stepped(candidate, group, posterior)
@@ -354,20 +369,26 @@ class TeamProblem:
             return []
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """Its trace times smooth functions of time, place, speed and load."""
-        candidate = self.candidates[group.identity]
-        if group.cause in EXACT or group.event:
+        """The trace of each number times smooth functions of time, place, speed and load; and earlier or later."""
+        if group.cause in EXACT or group.event or group.late:
             return []
         x = self.values_of(group, values)
-        parts = []
-        for t, c in enumerate(self.columns_of(candidate)):
-            trace = c @ x
-            time = self.rig.linear[t].reduction.time
-            smooth = [np.linspace(-1.0, 1.0, len(time)) * math.sqrt(3.0)]
+        each = self.columns_of(self.candidates[group.identity])
+        return [form for k in np.flatnonzero(x) for form in self._forms([c[..., k] * x[k] for c in each])]
+
+    def _forms(self, traces: Sequence[Array]) -> list[Series]:
+        """Forms of one trace, rows (n, C) a trial."""
+        parts, moving = [], self.cells.bands.moving
+        slopes = [np.gradient(r[:m], axis=0) for r, m in zip(traces, moving, strict=True)]
+        size, steep = (math.sqrt(sum(float(np.sum(r**2)) for r in rows)) for rows in (traces, slopes))
+        for t, trace in enumerate(traces):
+            smooth = [math.sqrt(3.0) * np.linspace(-1.0, 1.0, len(trace))]
             for name, q in self.rig.quantities(t).items():
                 q = np.log(q + 0.1 * np.sqrt(np.mean(q**2)) + 1e-12) if name == "speed" else q
                 smooth.append((q - q.mean()) / (q.std() + 1e-12))
-            parts.append(np.stack([trace * f[:, None] for f in smooth], axis=2))
+            late = np.zeros_like(trace)
+            late[: moving[t]] = slopes[t] * size / max(steep, 1e-300)
+            parts.append(np.stack([*(trace * f[:, None] for f in smooth), late], axis=2))
         return [
             {c: [x[:, 3 * c : 3 * c + 3, k] for x in parts] for c in range(len(self.cells.channels))}
             for k in range(parts[0].shape[2])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from estimator.arrays import Array
@@ -32,7 +32,7 @@ class Machine:
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         return np.zeros(self.cells.count)
 
-    def proposals(self, posterior: Posterior) -> list[Group]:
+    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         return []
 
     def place(self, group: Group) -> Group:
@@ -151,3 +151,21 @@ def test_a_small_cause_is_sure_alone_and_not_beside_what_a_large_one_may_leave(l
     *_, small = odds_of(search, state)
     assert 5.0 < small.over_nothing < 9.5
     assert small.probability < 0.5 if large else small.probability > 0.99
+
+
+def test_of_two_causes_that_are_nearly_alike_one_stays() -> None:
+    """Either alone explains what both do, but for a few nats: that there is one of them stays certain."""
+    rng = np.random.default_rng(7)
+    x, y = wave(rng), wave(rng)
+    twin = x + 0.02 * y
+    torque = 0.5 * x + 0.005 * y + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [torque[:, None]])
+    cells.add([{0: [x]}, {0: [twin]}])
+    machine = Machine(cells, [Group(name, "joint", (k,), (1.0,)) for k, name in enumerate(("one", "twin"))])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    both = search.settled(search.value([Chosen(g, 1.0) for g in machine.groups], None))
+    state = borne_out(search, both)
+    assert len(state.chosen) == 1
+    (only,) = odds_of(search, state)
+    assert only.over_nothing > 100.0
+    assert sum(r.probability for r in only.rivals if r.group is None) < 1e-6

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+from discrepancy.evidence.search import Search, floor_of
 from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import load_model
+from discrepancy.joints.problem import joint_problem
+from discrepancy.joints.trials import trials_of
+from discrepancy.joints.unlisted import SIGNALS
 from discrepancy.joints.verdict import judged
 from mocobot_logs.joints.joint_log import Drive, JointLog
 
@@ -187,3 +192,39 @@ def test_a_joint_at_its_limits_is_no_cause(tmp_path: Path) -> None:
     found = numbers(verdict_on(tmp_path, limited, change))
     assert set(found) == {("armature", "j2", "armature_kgm2")}
     assert found["armature", "j2", "armature_kgm2"] == pytest.approx(0.04, rel=0.02)
+
+
+def test_what_no_table_lists_goes_with_its_signal(tmp_path: Path) -> None:
+    """An encoder whose disc is off its axis, and a torque sensor that reads some of its neighbour's."""
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM, encoding="utf-8")
+    model, logs = load_model(path), [log_of(mujoco.MjSpec.from_string(ARM), seed) for seed in (1, 2)]
+
+    def signal(change: Callable[[np.ndarray, np.ndarray], None]) -> tuple[str, str]:
+        """Of the likeliest unlisted function."""
+        read = [replace(log, q=log.q.copy(), torque=np.array(log.torque)) for log in logs]
+        for log in read:
+            change(log.q, np.asarray(log.torque))
+        problem = joint_problem(model, trials_of(model, read).runs)
+        search = Search(problem, floor_of(problem, problem.slabs()))
+        groups = [c.group for _, c in search.offers(search.value((), None)) if c.group.late]
+        return groups[0].place, list(SIGNALS)[int(dict(groups[0].shape)["signal"])]
+
+    def disc(q: np.ndarray, torque: np.ndarray) -> None:
+        q[:, 1] += 0.01 * np.sin(2.0 * q[:, 1] + 1.0)
+
+    def neighbour(q: np.ndarray, torque: np.ndarray) -> None:
+        torque[:, 1] += 0.1 * torque[:, 0]
+
+    assert signal(disc) == ("j2", "reading")
+    assert signal(neighbour) == ("j2", "neighbour's torque")
+
+
+def test_tolerances_of_a_cause_that_is_left_out_swallow_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM, encoding="utf-8")
+    spec = mujoco.MjSpec.from_string(ARM)
+    spec.option.gravity = [1.0, 0.0, -9.76]
+    verdict = judged(load_model(path), [log_of(spec, 1), log_of(spec, 2)], excluded=("gravity_direction",))
+    assert verdict.verdict == "miscalibrated"
+    assert [s.cause for s in verdict.scatter] == ["gravity_direction"]

@@ -21,18 +21,19 @@ def along(signals: Signals, at: int, way: Array) -> Array:
         at: the joint.
         way: in which direction and how far, shape (W,).
     """
-    size = float(np.abs(way).max())
-    if size == 0.0:
-        return np.zeros_like(signals.q)
-    step = (STEP_M if signals.tree.slides[at] else STEP_RAD) / size
     first = differentiate(way, signals.rate_hz)
-    moved = []
-    for x, change in (
-        (signals.q, way),
-        (signals.dq, first),
-        (signals.ddq, differentiate(first, signals.rate_hz)),
-    ):
-        other = x.copy()
-        other[:, at] += step * change
-        moved.append(other)
-    return (torque_of(signals.tree, *moved) - rigid_torque(signals.motion)) / step
+    ways = (way, first, differentiate(first, signals.rate_hz))
+    return np.asarray(sum(x * own[:, None] for x, own in zip(_partials(signals, at), ways, strict=True)))
+
+
+def _partials(signals: Signals, at: int) -> list[Array]:
+    """Change of the torques with a joint's position, velocity and acceleration, shape (W, J) each; remembered."""
+    known = signals.__dict__.setdefault("_partials", {})
+    if at not in known:
+        known[at], step = [], STEP_M if signals.tree.slides[at] else STEP_RAD
+        for k in range(3):
+            moved = [signals.q, signals.dq, signals.ddq]
+            moved[k] = moved[k].copy()
+            moved[k][:, at] += step
+            known[at].append((torque_of(signals.tree, *moved) - rigid_torque(signals.motion)) / step)
+    return known[at]
