@@ -385,15 +385,16 @@ def _with_all_as_found(
     return replace(gain, as_found=responses([replace(found, whole=True)], jobs, simulated)[0])
 
 
-def as_found(outcome: TeamOutcome) -> AsFound:
-    """Robots, payload and causes as a search found them.
+def as_found(outcome: TeamOutcome) -> tuple[TeamRig, AsFound]:
+    """The recordings; robots, payload and causes as a search found them.
 
     Raises:
         InputError: there are no such robots.
     """
-    found = found_in(outcome.problem, outcome.state)
-    units, _, shared = robots_at(outcome.problem.rig, found)
-    return AsFound.of(units, shared, found.active)
+    rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
+    assert isinstance(rig, TeamRig)
+    units, _, shared = robots_at(rig, found)
+    return rig, AsFound.of(units, shared, found.active)
 
 
 def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *, whole: bool = False) -> None:
@@ -410,8 +411,10 @@ def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *,
     """
     found = Hypothesis(outcome.problem, _only(outcome, chosen), whole)
     rig, told = found.rig, found.told(None)
-    effects = [e for cause, values in told.active for e in named_effects(cause, rig.effects(cause, values))]
-    causes = [cause for cause, _ in told.active]
+    effects, causes = [], [cause for cause, _ in found.causes]
+    for cause, group in found.causes:  # as large as they are told, beside what is healthy
+        values = outcome.problem.values_of(group, found.state.posterior.mean)
+        effects += named_effects(cause, rig.effects(cause, values))
     parts = rig.of_healthy(0, causes, told.healthy) if whole else []
     shared, bases = rig.linear[0].shared.moved(told.shared), rig.linear[0].bases.moved(told.local)
     scene = team_of(shared, bases, [*effects, *parts], *posture(rig.robots_of(0, told.healthy)))

@@ -126,7 +126,7 @@ def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.Monkey
     parts = search_parts(
         choice,
         lambda some: searched(some, "phi_zero"),
-        lambda outcome: (outcome.problem.rig, as_found(outcome)),
+        as_found,
         said.append,
     )
     assert odd not in choice.taken
