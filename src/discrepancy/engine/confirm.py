@@ -9,7 +9,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.digits import three_digits
 from discrepancy.engine.explanation import Explanation, Found, explain
-from discrepancy.engine.gain import Gain, is_worse, mean_chi2, responses
+from discrepancy.engine.gain import responses
 from discrepancy.inference.exchange import Rival
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import probability
@@ -17,6 +17,7 @@ from discrepancy.inference.refit import exact
 from discrepancy.inference.search import Searched
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
+from discrepancy.team.gain import Gain, is_worse, mean_chi2
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, labels, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
-from discrepancy.engine.gain import Gain, responses, with_all_as_found
+from discrepancy.engine.gain import responses, with_all_as_found
 from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
@@ -19,6 +19,7 @@ from discrepancy.laws.lines import line_nats
 from discrepancy.laws.search import Lawful, with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
+from discrepancy.team.gain import Gain
 
 When = Literal["auto", "always", "never"]
 

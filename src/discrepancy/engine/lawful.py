@@ -8,10 +8,11 @@ from discrepancy import rules
 from discrepancy.digits import three_digits
 from discrepancy.engine.confirm import labels
 from discrepancy.engine.explanation import Explanation, Found
-from discrepancy.engine.gain import mean_chi2, responses
+from discrepancy.engine.gain import responses
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.forms import Refinement
 from discrepancy.rig import Rig
+from discrepancy.team.gain import mean_chi2
 
 
 def laws_of(explanation: Explanation) -> list[Found]:

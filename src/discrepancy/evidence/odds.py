@@ -44,6 +44,7 @@ class Odds:
         every = sorted([(self.probability, self.chosen.group), *((r.probability, r.group) for r in self.rivals)],
                        key=lambda pair: -pair[0])  # fmt: skip
         total, out = 0.0, []
+        share *= sum(probability for probability, _ in every)
         for probability, group in every:
             out.append(group)
             total += probability

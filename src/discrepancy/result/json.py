@@ -92,7 +92,6 @@ from discrepancy.causes.words import Words
 from discrepancy.engine.confirm import Alternative, decided_gap
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Found
-from discrepancy.engine.gain import Gain, Response
 from discrepancy.inference.probability import parted
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.said.numbers import law_to_dict, physical
@@ -106,6 +105,7 @@ from discrepancy.result.remains import remains, scatter_to_dict
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
+from discrepancy.team.gain import Gain, Response
 from estimator.arrays import Array
 
 MOST_PLACES = 8

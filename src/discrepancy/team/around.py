@@ -172,8 +172,9 @@ def opened_by(problem: TeamProblem, state: State) -> list[Array] | None:
             if patches.width:
                 if covariance is None:
                     covariance = [np.zeros((*r.residual.shape, r.residual.shape[1])) for r in rig.linear]
-                P = patches.dense() * abs(float(values[0]))
-                covariance[t] += P @ np.swapaxes(P, 1, 2)
+                for patch in patches.each:
+                    P = patch.values * abs(float(values[0]))
+                    covariance[t][patch.where, patch.first :, patch.first :] += P @ np.swapaxes(P, 1, 2)
     if covariance is None:
         return None
     out = []

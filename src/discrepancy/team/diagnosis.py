@@ -7,14 +7,16 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.engine.diagnose import When, diagnose
+from discrepancy.engine.explanation import explain
 from discrepancy.inference.odds import check_odds
+from discrepancy.inference.search import Searched, search
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.chattering import chattering
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates, seen_by
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
-from discrepancy.team.rig import TeamRig
+from discrepancy.team.rig import AsFound, TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
 from discrepancy.team.words import TeamWords
@@ -73,7 +75,13 @@ def diagnose_team(
 
     choice, searched, notes = Choice.of(recordings, whole=whole), None, ()
     if choice.others:
-        parts = search_parts(choice, rig_of, check_odds(odds), say)
+        prior = check_odds(odds)
+        parts = search_parts(
+            choice,
+            lambda some: search(rig_of(some), progress=say, odds=prior),
+            _as_found,
+            say,
+        )
         choice, searched, notes = parts.choice, parts.searched, parts.notes
     found = diagnose(
         searched.rig if searched else rig_of(choice.searched), closed_loop=closed_loop, laws=laws, odds=odds,
@@ -87,6 +95,11 @@ def diagnose_team(
         loops = (*loops, f"The payload's centre of mass and grasps are in {ENCODERS}.")
     found = replace(found, notes=(*found.notes, *choice.notes, *notes, *loops))
     return Diagnosed(found.rig, found, TeamWords(), own, payload)
+
+
+def _as_found(searched: Searched) -> tuple[TeamRig, AsFound]:
+    assert isinstance(searched.rig, TeamRig)
+    return searched.rig, searched.rig.as_found(explain(searched))
 
 
 def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:

@@ -35,6 +35,8 @@ LIKELIEST = 8
 """Shapes and events whose exact linear gain is computed in each step."""
 NEAR = 3
 """Shapes nearby whose evidence is computed in each step."""
+BLOCK = 64
+"""Columns at a time of which copies are made. Chosen: memory."""
 STEP_SHARE = 1.0
 """Standard deviation of a step of a number of a shape, in that number."""
 EXACT = (
@@ -98,6 +100,15 @@ class Listed:
 
     groups: Sequence[Group]
     X: Array
+
+    @classmethod
+    def together(cls, each: list[Listed]) -> Listed:
+        """All of some, which are taken out of their list one by one: both at once would take twice the memory."""
+        widths = [e.X.shape[2] for e in each]
+        groups, X = [g for e in each for g in e.groups], np.empty((*each[0].X.shape[:2], sum(widths)), np.float32)
+        for first, width in zip(np.cumsum([0, *widths]), widths, strict=False):
+            X[..., first : first + width] = each.pop(0).X
+        return cls(groups, X)
 
     @property
     def spans(self) -> list[slice]:
@@ -181,11 +192,17 @@ class TeamProblem:
         """Rows of the cells, shape (C, n, k), beside what chosen causes leave open."""
         if self.opened is None:
             return X
+        out = np.empty_like(X)
+        for first in range(0, X.shape[2], BLOCK):
+            out[..., first : first + BLOCK] = self._beside(X[..., first : first + BLOCK])
+        return out
+
+    def _beside(self, X: Array) -> Array:
         bands, order = self.bands, self.cells.order
         plain = np.empty_like(X)
         plain[:, order] = X
         each = [np.concatenate(parts, axis=1) for parts in zip(*(bands.rows(x) for x in plain), strict=True)]
-        return self.spectra(self.rows_of(each)).astype(X.dtype)
+        return self.spectra(self.rows_of(each))
 
     def listing(self, candidates: Iterable[Candidate], count: int) -> Listed:
         """Candidates with their columns, apart from the problem; ``count``: shapes of equal probability."""
@@ -466,8 +483,9 @@ class Catalogue:
         rig = plain.rig
         groups: list[Group] = []
         labels: list[tuple[Candidate, int] | None] = []
-        tolerance, kinds, rows = list[float](), dict[str, list[int]](), list[Array]()
-        others: list[Listed] = []
+        none = np.zeros((len(plain.cells.channels), len(plain.cells.order), 0), dtype=np.float32)
+        tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none.astype(float)]
+        others = [Listed([], none)]
         apart: dict[Hashable, Array] = {}
         for candidate in rig.candidates():
             shapes = rig.refinements(candidate)
@@ -494,9 +512,7 @@ class Catalogue:
                 tolerance += [candidate.parameters[0].tolerance] * rows[-1].shape[2]
                 labels += [None] * rows[-1].shape[2]
             kinds.setdefault(candidate.cause, []).extend(range(first, len(labels)))
-        listed = near.listed if near else Listed(
-            [g for e in others for g in e.groups], np.concatenate([e.X for e in others], axis=2)
-        )  # fmt: skip
+        listed = near.listed if near else Listed.together(others)
         known = {**near.candidates, **plain.candidates} if near else plain.candidates
         return cls(rig, groups, labels, tolerance, kinds, np.concatenate(rows, axis=2), listed, apart, known)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -30,7 +30,7 @@ from discrepancy.team.closed_loop import (
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.laws.effects import effects_of
 from discrepancy.team.laws.rows import LawfulRows
-from discrepancy.team.linear.elsewhere import Elsewhere, found_at
+from discrepancy.team.linear.elsewhere import found_at
 from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.start import exact_residual
@@ -40,6 +40,7 @@ from discrepancy.team.undecidable import statements
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.recording.model import Recording
+from estimator.rigid_team.residual import Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
 from mocobot_sim.scene.pymjcf import why_not_composed
@@ -50,12 +51,19 @@ class AsFound:
     """What a search found.
 
     Attributes:
-        there: robots and payload.
+        units: the robots.
+        shared: grasps and payload.
         causes: the others with their values.
     """
 
-    there: Elsewhere
+    units: ArmUnit
+    shared: Shared
     causes: list[tuple[Candidate, Array]]
+
+    @classmethod
+    def of(cls, units: ArmUnit, shared: Shared, causes: Iterable[tuple[Candidate, Array]]) -> AsFound:
+        """With those causes that are not the robots' own and not of some trials alone."""
+        return cls(units, shared, [(c, v) for c, v in causes if places_of(c) is None and not c.of_trials])
 
 
 class TeamRig(LawfulRows):
@@ -118,7 +126,7 @@ class TeamRig(LawfulRows):
     def carried(self, candidate: Candidate) -> bool:
         return origin_of(candidate, self.origin) is not None
 
-    def _robots(self, trial: int, healthy: Sequence[tuple[Candidate, Array]]) -> Recording:
+    def robots_of(self, trial: int, healthy: Sequence[tuple[Candidate, Array]]) -> Recording:
         """The recording of a trial with its robots off by as much as they are found beside the causes."""
         recording = self.recordings[trial]
         units = recording.metadata.units
@@ -132,10 +140,10 @@ class TeamRig(LawfulRows):
         known = replace(recording.metadata, units=ArmUnit(units.design, x))
         return replace(recording, metadata=known)
 
-    def _of_healthy(
+    def of_healthy(
         self, trial: int, causes: Sequence[Candidate], healthy: Sequence[tuple[Candidate, Array]]
     ) -> list[Effect]:
-        """What healthy parts are as effects, beside causes: those that ``_robots`` does not have."""
+        """What healthy parts are as effects, beside causes: those that ``robots_of`` does not have."""
         there = {candidate.key for candidate in causes}
         as_designed = self.recordings[trial].metadata.units is None
         effects: list[Effect] = []
@@ -161,10 +169,10 @@ class TeamRig(LawfulRows):
             if own is None:
                 return impossible
             effects += own
-        effects += self._of_healthy(trial, [candidate for candidate, _ in active], healthy)
+        effects += self.of_healthy(trial, [candidate for candidate, _ in active], healthy)
         return partial(
             resimulation_errors,
-            self._robots(trial, healthy),
+            self.robots_of(trial, healthy),
             linear.shared.moved(shared),
             linear.bases.moved(local),
             effects,
@@ -179,10 +187,8 @@ class TeamRig(LawfulRows):
             InputError: there are no such robots.
         """
         there = found_at(self.linear, self.whitening, explanation.hypothesis, self.origin)
-        causes = [(found.candidate, found.values) for found in explanation.found]
-        return AsFound(
-            there, [pair for pair in causes if places_of(pair[0]) is None and not pair[0].of_trials]
-        )
+        causes = ((found.candidate, found.values) for found in explanation.found)
+        return AsFound.of(there.units, there.shared, causes)
 
     def left_in(self, recording: Recording, found: AsFound) -> tuple[Reduction, Array]:
         """Rows that another recording of the team leaves, shape (n, C), its bases where they leave the least.
@@ -191,7 +197,7 @@ class TeamRig(LawfulRows):
             recording: of the same payload, its units as they were believed to be.
             found: robots, payload, and causes that are not of one trial alone.
         """
-        units, shared = found.there.units, found.there.shared
+        units, shared = found.units, found.shared
         known = replace(recording, metadata=replace(recording.metadata, units=units))
         trial = trial_at(known, shared, self.sensed.noise, full=False)
         own = replace(self, recordings=(known,), linear=(trial,), kept={})
@@ -228,10 +234,10 @@ class TeamRig(LawfulRows):
             effects += named_effects(found.candidate, self.effects(found.candidate, found.values))
         fit, healthy = fit_to_simulate(self, explanation.problem, explanation.fit.free, whole=whole)
         causes = [found.candidate for found in explanation.found]
-        parts = self._of_healthy(0, causes, healthy) if whole else []
+        parts = self.of_healthy(0, causes, healthy) if whole else []
         shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
-        scene = team_of(shared, bases, [*effects, *parts], *posture(self._robots(0, healthy)))
+        scene = team_of(shared, bases, [*effects, *parts], *posture(self.robots_of(0, healthy)))
         told = {"recordings": list(self.trials), "causes": [cause.label for cause in causes]}
         write_extended(scene, effects, folder, told, parts)
 

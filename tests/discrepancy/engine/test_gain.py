@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from discrepancy.engine.gain import Gain, Response, mean_chi2, responses, with_all_as_found
+from discrepancy.engine.gain import responses, with_all_as_found
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
+from discrepancy.team.gain import Gain, Response, mean_chi2
 from estimator.errors import InputError
 from fake_rig import FakeRig
 

@@ -11,7 +11,6 @@ import mocobot
 from discrepancy import rules
 from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.linear.elsewhere import Elsewhere
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
@@ -188,10 +187,10 @@ def test_what_was_found_is_out_of_what_another_part_leaves(cause, parameters, pl
     (candidate,) = (c for c in rig.candidates() if c.key == (cause, robot, joint))
     values = np.array([parameters.get(p.name, 0.0) for p in candidate.parameters])
     units = ArmUnit(rig.linear[0].design, np.zeros((3, COUNT)))
-    there = Elsewhere(units, units, rig.linear[0].shared, 0.0)
-    healthy = rms_of(rig.left_in(clean, AsFound(there, [])))
-    with_it = rms_of(rig.left_in(other, AsFound(there, [(candidate, values)])))
-    without = rms_of(rig.left_in(other, AsFound(there, [])))
+    there = units, rig.linear[0].shared
+    healthy = rms_of(rig.left_in(clean, AsFound(*there, [])))
+    with_it = rms_of(rig.left_in(other, AsFound(*there, [(candidate, values)])))
+    without = rms_of(rig.left_in(other, AsFound(*there, [])))
     assert np.all(with_it < 1.5 * healthy)
     assert np.any(without > 5.0 * healthy)
 

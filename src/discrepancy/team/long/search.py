@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from discrepancy import rules
-from discrepancy.engine.explanation import explain
-from discrepancy.inference.search import Searched, search
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.left import Left, more_left, times_as_much
-from discrepancy.team.rig import TeamRig
+from discrepancy.team.rig import AsFound, TeamRig
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 
+T = TypeVar("T")
+
 
 @dataclass(frozen=True, eq=False)
-class SearchedParts:
+class SearchedParts(Generic[T]):
     """What a search of some parts found.
 
     Attributes:
@@ -26,27 +27,30 @@ class SearchedParts:
     """
 
     choice: Choice
-    searched: Searched
+    searched: T
     notes: tuple[str, ...]
 
 
 def search_parts(
-    choice: Choice, rig_of: Callable[[list[Recording]], TeamRig], odds: float, say: Callable[[str], object]
-) -> SearchedParts:
+    choice: Choice,
+    search: Callable[[list[Recording]], T],
+    found: Callable[[T], tuple[TeamRig, AsFound]],
+    say: Callable[[str], object],
+) -> SearchedParts[T]:
     """Search the parts that are taken, and those in which more is left than in these, too, until there are none.
 
     Args:
         choice: the parts, not all of which are taken.
-        rig_of: makes the rig of some.
-        odds: of any cause being there before the data are seen.
+        search: of some.
+        found: the rig of a result, and what is found; it raises an ``InputError`` where there are no such robots.
         say: takes the name of the stage that begins.
     """
     most = 2 * len(choice.taken)
     while True:
-        searched = search(rig_of(choice.searched), progress=say, odds=odds)
+        searched = search(choice.searched)
         say("hold against the other parts")
         try:
-            odd, ratio = _against(choice, searched)
+            odd, ratio = _against(choice, *found(searched))
         except InputError:  # no such robots
             note = "What was found is no team that can be, so it was not held against the other parts."
             return SearchedParts(choice, searched, (note,))
@@ -56,18 +60,11 @@ def search_parts(
         worst = sorted(odd, key=lambda k: -odd[k])[:room]
         choice = choice.beside(worst)
         if not choice.others:
-            return SearchedParts(choice, search(rig_of(choice.searched), progress=say, odds=odds), ())
+            return SearchedParts(choice, search(choice.searched), ())
 
 
-def _against(choice: Choice, searched: Searched) -> tuple[dict[int, float], float | None]:
-    """Parts in which more is left than in any that was searched, by number, and by how much all others leave more.
-
-    Raises:
-        InputError: there are no such robots.
-    """
-    rig = searched.rig
-    assert isinstance(rig, TeamRig)
-    found = rig.as_found(explain(searched))
+def _against(choice: Choice, rig: TeamRig, found: AsFound) -> tuple[dict[int, float], float | None]:
+    """Parts in which more is left than in any that was searched, by number, and by how much all others leave more."""
     left = {k: Left.of(*rig.left_in(part, found)) for k, part in enumerate(choice.parts)}
     known = [left[k] for k in choice.taken]
     others = {k: left[k] for k in choice.others}

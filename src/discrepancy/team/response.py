@@ -1,0 +1,422 @@
+"""Causes in the closed loop: recorded commands simulated again, a test that the rows know nothing of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from discrepancy.candidate import Candidate
+from discrepancy.digits import three_digits
+from discrepancy.evidence.odds import Odds, Rival
+from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.search import Chosen, Key, Search, State
+from discrepancy.team.around import found_in, robots_at
+from discrepancy.team.closed_loop import named_effects, posture, team_of
+from discrepancy.team.diagnose import TeamOutcome
+from discrepancy.team.gain import MARGIN_SHARE, Gain, Response, is_worse, mean_chi2
+from discrepancy.team.problem import TeamProblem
+from discrepancy.team.rig import AsFound, TeamRig
+from estimator.arrays import Array
+from estimator.processes import ends_with_this
+from mocobot_sim.extended.extended import write_extended
+
+TOLD_NATS = 5.0
+"""By which the closed loop at least prefers what responds better by the margin. Chosen."""
+CONTRADICTED = 0.5
+"""By which causes lose probability that make the response worse. Chosen: as likely wrong as not."""
+VISIBLE_CHI2_PER_N = 3.0
+"""Of the closed loop, from which healthy parts are simulated as they are found, too. Chosen."""
+Active = list[tuple[Candidate, Array]]
+"""Candidates and the values of their parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What some trials tell, as a simulation of one of them takes it.
+
+    Attributes:
+        shared, local: displacements of the unknowns of all trials and of this one.
+        active: causes.
+        healthy: other parts, and by how much they are off.
+    """
+
+    shared: Array
+    local: Array
+    active: Active
+    healthy: Active
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of causes in a linear problem.
+
+    Attributes:
+        problem: with the columns of the set.
+        state: the set.
+        whole: whether a simulation has every healthy part as it is found, within its tolerance, too; otherwise only
+            those that are not as designed where all is linear.
+    """
+
+    problem: TeamProblem
+    state: State
+    whole: bool = False
+
+    @property
+    def rig(self) -> TeamRig:
+        """The recordings."""
+        assert isinstance(self.problem.rig, TeamRig)
+        return self.problem.rig
+
+    @cached_property
+    def causes(self) -> list[tuple[Candidate, Group]]:
+        """Those of the set that a simulation can have: what no table lists has no effect."""
+        known = self.problem.candidates
+        groups = [c.group for c in self.state.chosen if c.group.identity in known]
+        return [(known[g.identity], g) for g in groups]
+
+    @property
+    def of_trials(self) -> bool:
+        """Whether a cause is there in some trials only: the others say nothing of it."""
+        return any(candidate.of_trials for candidate, _ in self.causes)
+
+    @cached_property
+    def carried(self) -> dict[int, list[int]]:
+        """Columns of each healthy part that a simulation has, by the identity of its candidate."""
+        there = {candidate.key for candidate, _ in self.causes}
+        out: dict[int, list[int]] = {}
+        for k, label in enumerate(self.problem.labels):
+            if label and label[0].key not in there and (self.whole or self.rig.carried(label[0])):
+                out.setdefault(id(label[0]), []).append(k)
+        return out
+
+    @cached_property
+    def alone(self) -> NDArray[np.intp]:
+        """Columns of unknowns and causes."""
+        p = self.problem
+        own = [k for _, group in self.causes for k in group.columns]
+        return np.array([*p.shared, *(k for local in p.local for k in local), *own], dtype=np.intp)
+
+    @cached_property
+    def columns(self) -> NDArray[np.intp]:
+        """Columns that a fit needs: where healthy parts are carried, of all that is in the model."""
+        return np.flatnonzero(self.state.posterior.prior) if self.carried else np.sort(self.alone)
+
+    @cached_property
+    def _all(self) -> tuple[Array, Array]:
+        """Information matrix and score vector of the columns."""
+        G, b, _ = self.problem.cells.only(self.columns).weighted(self.state.posterior.variance)
+        return G, b
+
+    def _of_trial(self, trial: int) -> tuple[Array, Array]:
+        """The same of one trial's rows."""
+        cells, n = self.problem.cells, len(self.columns)
+        lengths = [len(cells.bands.of_trial(t)) for t in range(len(self.problem.local))]
+        here = np.repeat(np.arange(len(lengths)), lengths)[cells.order] == trial
+        G, b = np.zeros((n, n)), np.zeros(n)
+        for channel, variance in zip(cells.channels, self.state.posterior.variance, strict=True):
+            seen = np.flatnonzero(np.isin(channel.columns, self.columns))
+            at = np.searchsorted(self.columns, channel.columns[seen])
+            weight = np.repeat(1.0 / variance, np.diff(channel.starts))[here]
+            X = channel.X[np.ix_(here, seen)]
+            WX = weight[:, None] * X
+            G[np.ix_(at, at)] += X.T @ WX
+            b[at] += WX.T @ channel.y[here]
+        return G, b
+
+    def told(self, trial: int | None) -> Told:
+        """What a simulation of a trial takes: all from the other trials, but the unknowns of its own; None: of all.
+
+        With a single trial, or a cause that is there in some trials only, all trials tell.
+        """
+        G, b = self._all
+        own = None if trial is None else self._of_trial(trial)
+        if own and len(self.problem.local) > 1 and not self.of_trials:
+            G, b = G - own[0], b - own[1]
+        prior = self.state.posterior.prior[self.columns]
+        x, carried = (
+            np.zeros(len(self.columns)),
+            self._at([k for part in self.carried.values() for k in part]),
+        )
+        if self.carried:
+            x[carried] = _mean(G, b, prior)[carried]
+        # Causes are what they are beside that: what else may be off has no share of what they do.
+        prior = np.where(np.isin(self.columns, self.alone), prior, 0.0)
+        x += _mean(G, b - G @ x, prior)
+        t = trial or 0
+        if own is not None:
+            local = self._at(self.problem.local[t])
+            x[local] = 0.0
+            mine = np.zeros(len(x))
+            mine[local] = prior[local]
+            x += _mean(own[0], own[1] - own[0] @ x, mine)
+        every = np.zeros(self.problem.cells.count)
+        every[self.columns] = x
+        p = self.problem
+        active = [(candidate, p.values_of(group, every)) for candidate, group in self.causes]
+        return Told(
+            -every[p.shared], -every[p.local[t]][: self.rig.local_unknowns], active, self._healthy(every)
+        )
+
+    def _healthy(self, x: Array) -> Active:
+        out = []
+        for columns in self.carried.values():
+            labels = [label for label in (self.problem.labels[k] for k in columns) if label]
+            values = np.zeros(len(labels[0][0].parameters))
+            values[[n for _, n in labels]] = x[columns]
+            out.append((labels[0][0], values))
+        return out
+
+    def _at(self, columns: Sequence[int]) -> NDArray[np.intp]:
+        return np.searchsorted(self.columns, columns)
+
+
+def _mean(G: Array, b: Array, prior: Array) -> Array:
+    """Posterior mean of columns with prior variances; those with none are not in the model."""
+    x, k = np.zeros(len(b)), np.flatnonzero(prior)
+    s = np.sqrt(prior[k])
+    A = s[:, None] * G[np.ix_(k, k)] * s
+    A[np.diag_indices(len(k))] += 1.0
+    x[k] = s * cho_solve(cho_factor(A), s * b[k])
+    return x
+
+
+def responses(
+    hypotheses: Sequence[Hypothesis], jobs: int = 1, simulated: Callable[[int], object] | None = None
+) -> list[tuple[Response | None, ...]]:
+    """Simulate every trial under every hypothesis, with unknowns and causes fitted to the other trials.
+
+    Args:
+        hypotheses: of the same recordings.
+        jobs: parallel processes.
+        simulated: called with 1 for every simulated trial.
+    """
+    tasks = [(h.rig, t, h.told(t)) for h in hypotheses for t in h.rig.resimulated]
+    run = Parallel(n_jobs=jobs, return_as="generator", **ends_with_this())
+    simulations = (
+        delayed(rig.simulation(t, told.shared, told.local, told.active, told.healthy))()
+        for rig, t, told in tasks
+    )
+    done = []
+    for errors, (rig, t, _) in zip(run(simulations), tasks, strict=True):
+        done.append(None if errors is None else Response.of(errors, rig.response_scale(t)))
+        if simulated:
+            simulated(1)
+    each = iter(done)
+    return [tuple(next(each) for _ in h.rig.resimulated) for h in hypotheses]
+
+
+@dataclass(frozen=True, eq=False)
+class Confirmed:
+    """What the closed loop made of a set of causes.
+
+    Attributes:
+        outcome: with what responds best, where the rows could not tell.
+        odds: of its causes, with what the closed loop says of their rivals.
+        gain: responses without and with the causes.
+        tried: mean chi-square per number with a rival in a cause's place, by both their causes and places.
+        contradicted: whether the causes make the response worse.
+        notes: sentences about what was exchanged or is contradicted.
+    """
+
+    outcome: TeamOutcome
+    odds: tuple[Odds, ...]
+    gain: Gain
+    tried: Mapping[tuple[Key, Key], float]
+    contradicted: bool
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Swap:
+    """A rival in the place of a cause.
+
+    Attributes:
+        odds: of the cause.
+        rival: the other.
+    """
+
+    odds: Odds
+    rival: Group
+
+    @property
+    def own(self) -> Group:
+        """The cause."""
+        return self.odds.chosen.group
+
+    def state(self, search: Search, near: State) -> State:
+        """A set with the rival, whose columns are added where they are not in the problem."""
+        rest = [c for c in near.chosen if c is not self.odds.chosen]
+        return search.with_one(rest, Chosen(self.rival, self.odds.chosen.scale), near.posterior)
+
+
+def confirm(
+    outcome: TeamOutcome,
+    odds: Sequence[Odds],
+    jobs: int = 1,
+    simulated: Callable[[int], object] | None = None,
+) -> Confirmed:
+    """Simulate without causes, with them, and with each rival in a cause's place that the rows cannot tell from it.
+
+    Args:
+        outcome: of a search; its rig can simulate.
+        odds: of the causes that are named; other causes of the set, and what no table lists, are not simulated.
+        jobs: parallel processes.
+        simulated: called with 1 for every simulated trial.
+    """
+    search, problem = outcome.search, outcome.problem
+    others = tuple(o for o in odds if o.chosen.group.identity not in problem.candidates)
+    odds = [o for o in odds if o not in others]
+    chosen = [o.chosen for o in odds]
+    plain = outcome.nothing[0].problem
+    assert isinstance(plain, TeamProblem)
+    nothing = Hypothesis(plain, outcome.nothing[1])
+    trials = len(problem.local)
+    if not chosen:
+        (before,) = responses([nothing], jobs, simulated)
+        gain = _with_all_as_found(Gain(before, before, trials > 1), nothing, jobs, simulated)
+        return Confirmed(outcome, others, gain, {}, contradicted=False, notes=())
+    state, count, swaps = _only(outcome, chosen), problem.cells.count, list(_swaps(outcome, odds))
+    named = Hypothesis(problem, state)
+    swapped = [Hypothesis(problem, swap.state(search, state)) for swap in swaps]
+    before, after, *each = responses([nothing, named, *swapped], jobs, simulated)
+    problem.cells.truncate(count)
+    values = {(swap.own.key, swap.rival.key): mean_chi2(r) for swap, r in zip(swaps, each, strict=True)}
+    first, tried, notes = mean_chi2(after), dict(values), []
+    winner = min(swaps, key=lambda swap: values[swap.own.key, swap.rival.key], default=None)
+    best = first if winner is None else values[winner.own.key, winner.rival.key]
+    if winner and best < first * (1.0 - MARGIN_SHARE):
+        cause, rival = (problem.candidates[g.identity].label for g in (winner.own, winner.rival))
+        notes.append(
+            f"The rows alone could not tell {cause} from {rival}; in closed loop the latter does better "
+            f"(chi2/n {three_digits(best)} against {three_digits(first)})."
+        )
+        after = each[swaps.index(winner)]
+        outcome, odds = _exchanged(outcome, odds, winner)
+        now = winner.rival.key
+        tried = {(now if a == winner.own.key else a, b): x for (a, b), x in values.items() if b != now}
+        tried[now, winner.own.key] = first
+        state = _only(outcome, [o.chosen for o in odds])
+    else:
+        best = first
+    none = mean_chi2(before)
+    contradicted = is_worse(best, none)
+    if contradicted:
+        loop = (
+            f"makes the response to the commands worse (chi2/n {three_digits(none)} to {three_digits(best)})"
+            if np.isfinite(best)
+            else "cannot be simulated with the recorded commands"
+        )
+        labels = ", ".join(problem.candidates[o.chosen.group.identity].label for o in odds)
+        notes.append(f"{labels[:1].upper()}{labels[1:]}: {loop}, which speaks against it.")
+    worse = {pair for pair, x in tried.items() if x > best * (1.0 + MARGIN_SHARE)}
+    odds = [_revised(o, worse, CONTRADICTED if contradicted else 1.0) for o in odds]
+    final = Hypothesis(problem, state)
+    gain = Gain(before, after, trials > 1 and not final.of_trials)
+    gain = _with_all_as_found(gain, final, jobs, simulated)
+    return Confirmed(outcome, (*odds, *others), gain, tried, contradicted, tuple(notes))
+
+
+def _only(outcome: TeamOutcome, chosen: Sequence[Chosen]) -> State:
+    """The set with some of its causes."""
+    state = outcome.state
+    return state if len(chosen) == len(state.chosen) else outcome.search.value(chosen, state.posterior)
+
+
+def _swaps(outcome: TeamOutcome, odds: Sequence[Odds]) -> Iterator[_Swap]:
+    """Rivals that the rows do not tell from a cause, each in its place; events are of one trial alone."""
+    there = {o.chosen.group.key for o in odds}
+    for o in odds:
+        for group in o.told():
+            if (
+                group
+                and group.identity in outcome.problem.candidates
+                and not group.event
+                and group.key not in there
+            ):
+                yield _Swap(o, group)
+
+
+def _exchanged(outcome: TeamOutcome, odds: Sequence[Odds], swap: _Swap) -> tuple[TeamOutcome, list[Odds]]:
+    """The outcome with the rival in the cause's place, and the odds; what both had, it has."""
+    search = outcome.search
+    state = search.settled(search.formed(swap.state(search, outcome.state)))
+    out = []
+    for o in odds:
+        own = next(
+            c for c in state.chosen if c.group.key == (swap.rival if o is swap.odds else o.chosen.group).key
+        )
+        if o is swap.odds:
+            rivals = tuple(r for r in o.rivals if r.group is None or r.group.key != swap.rival.key)
+            least = math.exp(-TOLD_NATS)
+            both = 1.0 - sum(r.probability for r in rivals)
+            rivals += (Rival(swap.own, both * least / (1.0 + least)),)
+            rivals = tuple(sorted(rivals, key=lambda r: -r.probability))
+            o = replace(o, probability=both / (1.0 + least), rivals=rivals)
+        out.append(replace(o, chosen=own))
+    return replace(outcome, state=state), out
+
+
+def _revised(odds: Odds, worse: set[tuple[Key, Key]], weight: float) -> Odds:
+    """The odds of a cause once rivals respond worse: these are no look-alikes."""
+    most, rivals = math.exp(-TOLD_NATS) * odds.probability, []
+    for r in odds.rivals:
+        out = r.group is not None and (odds.chosen.group.key, r.group.key) in worse
+        rivals.append(replace(r, probability=min(r.probability, most)) if out else r)
+    freed = sum(r.probability for r in odds.rivals) - sum(r.probability for r in rivals)
+    rivals.sort(key=lambda r: -r.probability)
+    return replace(odds, probability=weight * (odds.probability + freed), rivals=tuple(rivals))
+
+
+def _with_all_as_found(
+    gain: Gain, found: Hypothesis, jobs: int, simulated: Callable[[int], object] | None
+) -> Gain:
+    """The gain with responses of healthy parts as they are found, where more than noise is left without."""
+    left = [b.chi2_per_n for _, b in gain.pairs]
+    if not left or np.mean(left) <= VISIBLE_CHI2_PER_N:
+        return gain
+    return replace(gain, as_found=responses([replace(found, whole=True)], jobs, simulated)[0])
+
+
+def as_found(outcome: TeamOutcome) -> tuple[TeamRig, AsFound]:
+    """The recordings; robots, payload and causes as a search found them.
+
+    Raises:
+        InputError: there are no such robots.
+    """
+    rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
+    assert isinstance(rig, TeamRig)
+    units, _, shared = robots_at(rig, found)
+    return rig, AsFound.of(units, shared, found.active)
+
+
+def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *, whole: bool = False) -> None:
+    """Write the estimated team with causes in it as an extended model; ``mocobot simulate --model`` takes it.
+
+    Args:
+        outcome: of a search.
+        chosen: those of its causes that are named.
+        folder: to be written.
+        whole: whether every healthy part is in it as it is found, within its tolerance, too.
+
+    Raises:
+        InputError: the folder cannot be written, or a cause has values that no effect can have.
+    """
+    found = Hypothesis(outcome.problem, _only(outcome, chosen), whole)
+    rig, told = found.rig, found.told(None)
+    effects, causes = [], [cause for cause, _ in found.causes]
+    for cause, group in found.causes:  # as large as they are told, beside what is healthy
+        values = outcome.problem.values_of(group, found.state.posterior.mean)
+        effects += named_effects(cause, rig.effects(cause, values))
+    parts = rig.of_healthy(0, causes, told.healthy) if whole else []
+    shared, bases = rig.linear[0].shared.moved(told.shared), rig.linear[0].bases.moved(told.local)
+    scene = team_of(shared, bases, [*effects, *parts], *posture(rig.robots_of(0, told.healthy)))
+    extra = {"recordings": list(rig.trials), "causes": [cause.label for cause in causes]}
+    write_extended(scene, effects, folder, extra, parts)

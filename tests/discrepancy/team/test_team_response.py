@@ -1,0 +1,134 @@
+"""What a search of a team found: in closed loop, as a model to take away, and held against other parts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import mocobot
+from discrepancy import rules
+from discrepancy.evidence.odds import Odds, Rival
+from discrepancy.evidence.search import Chosen
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.diagnose import TeamOutcome, search_team
+from discrepancy.team.gain import mean_chi2
+from discrepancy.team.long.choice import Choice
+from discrepancy.team.long.search import search_parts
+from discrepancy.team.response import as_found, confirm, write_model
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.tolerances import read_tolerances
+from estimator.estimate.payload import estimate_payload
+from hidden_quick import generated, quick_set
+from mocobot_sim.extended.extended import load_extended
+
+
+def searched(recordings, *causes: str) -> TeamOutcome:
+    """A search for some causes only, to save time."""
+    left_out = [name for name in CAUSES if name not in causes]
+    estimate = estimate_payload(recordings, compare_masses=False, withhold=False)
+    return search_team(TeamRig.of(recordings, estimate, read_tolerances(None), left_out))
+
+
+@cache
+def hidden() -> tuple[TeamOutcome, dict]:
+    """A torque that is off by a constant, twelve tolerances large, among healthy parts; and the truth."""
+    recordings, sealed = generated(quick_set("single", 2, "sea_bias", payload="b"))
+    outcome = searched(recordings, "sea_bias", "phi_zero")
+    (truth,) = sealed.open({"found": []})["effects"]
+    return outcome, truth
+
+
+def group_at(outcome: TeamOutcome, robot: int, joint: int):
+    """The constant error of a torque."""
+    (own,) = (g for g in outcome.problem.groups if g.key == ("sea_bias", f"robot {robot}, joint {joint}"))
+    return own
+
+
+def odds_with(chosen: Chosen, rival) -> list[Odds]:
+    """As if the rows could not tell two causes."""
+    return [Odds(chosen, 0.6, 30.0, (Rival(rival, 0.4), Rival(None, 0.0)))]
+
+
+def test_the_true_cause_responds_better_than_none_and_than_another() -> None:
+    """Fitted to the other trial; the other cause is no look-alike any more."""
+    outcome, truth = hidden()
+    (chosen,) = outcome.state.chosen
+    place = truth["robot"], truth["joint"]
+    assert chosen.group is group_at(outcome, *place)
+    other = group_at(outcome, truth["robot"] % 3 + 1, truth["joint"])
+    found = confirm(outcome, odds_with(chosen, other))
+    assert found.gain.held_out
+    assert len(found.gain.pairs) == 2
+    assert all(after.chi2_per_n < before.chi2_per_n for before, after in found.gain.pairs)
+    assert not found.contradicted
+    assert found.notes == ()
+    assert found.outcome is outcome
+    assert found.tried[chosen.group.key, other.key] > mean_chi2(found.gain.after)
+    (odds,) = found.odds
+    assert odds.told() == (chosen.group,)
+    assert odds.probability + sum(r.probability for r in odds.rivals) == pytest.approx(1.0)
+
+
+def test_a_rival_that_responds_better_takes_the_place() -> None:
+    outcome, truth = hidden()
+    (chosen,) = outcome.state.chosen
+    wrong = group_at(outcome, truth["robot"] % 3 + 1, truth["joint"])
+    state = outcome.search.value([Chosen(wrong, chosen.scale)], outcome.state.posterior)
+    found = confirm(replace(outcome, state=state), odds_with(state.chosen[0], chosen.group))
+    assert [c.group for c in found.outcome.state.chosen] == [chosen.group]
+    (odds,) = found.odds
+    assert odds.chosen is found.outcome.state.chosen[0]
+    assert odds.told() == (chosen.group,)
+    assert odds.rivals[0].group is wrong
+    (note,) = found.notes
+    assert "in closed loop the latter does better" in note
+
+
+def test_a_cause_that_responds_worse_is_contradicted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One whose effect no simulation can have."""
+    outcome, _ = hidden()
+    (chosen,) = outcome.state.chosen
+    monkeypatch.setattr(TeamRig, "effects", lambda self, candidate, values: None)
+    found = confirm(outcome, [Odds(chosen, 1.0, 30.0, ())])
+    assert found.contradicted
+    assert found.odds[0].probability == 0.5
+    assert found.odds[0].told() == (chosen.group,)
+    assert "cannot be simulated with the recorded commands, which speaks against it." in found.notes[0]
+
+
+def test_models_to_take_away(tmp_path) -> None:
+    """Both have the cause; the one as found has healthy parts besides."""
+    outcome, truth = hidden()
+    for whole in (False, True):
+        write_model(outcome, outcome.state.chosen, tmp_path / f"{whole}", whole=whole)
+        scene = load_extended(tmp_path / f"{whole}")
+        off = scene.units[truth["robot"] - 1].tau_zero_Nm[truth["joint"] - 1]
+        assert off == pytest.approx(truth["parameters"]["bias_Nm"], rel=0.1)
+        causes = [effect.cause for effect in scene.effects]
+        assert causes[0] == "sea_bias"
+        assert ("phi_zero" in causes) == whole
+
+
+def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A torque is wrong in the last part only, which was not searched at first."""
+    for name, value in (("SEARCHED_S", 16.0), ("SHORTEST_PART_S", 8.0), ("ODD_WINDOW_S", 2.0)):
+        monkeypatch.setattr(rules, name, value)
+    recording = mocobot.simulate("b", "random", vias=16, seed=6)
+    choice = Choice.of([recording])
+    odd = choice.others[-1]
+    tau = recording.tau.copy()
+    tau[np.searchsorted(recording.time, choice.parts[odd].time[300]) :, 1, 0] += 0.5
+    choice = Choice.of([replace(recording, tau=tau)])
+    said: list[str] = []
+    parts = search_parts(
+        choice,
+        lambda some: searched(some, "phi_zero"),
+        as_found,
+        said.append,
+    )
+    assert odd not in choice.taken
+    assert odd in parts.choice.taken
+    assert choice.parts[odd].name in parts.searched.problem.rig.trials
