@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,6 +12,7 @@ from discrepancy.evidence.parts import PLAIN
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.evidence.until import Until
 from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import JointProblem, joint_problem
@@ -46,32 +45,6 @@ class Outcome:
     state: State
     nothing: Search | None = None
     finished: bool = True
-
-
-@dataclass
-class Until:
-    """When a search ends with what it has: after some time, or when the user breaks it off.
-
-    Attributes:
-        end_s: on the monotonic clock [s].
-        broken: whether it has been broken off.
-    """
-
-    end_s: float = math.inf
-    broken: bool = False
-
-    def __call__(self) -> bool:
-        """Whether to end."""
-        self.broken = self.broken or time.monotonic() > self.end_s
-        return self.broken
-
-    def run(self, search: Search, state: State, early: Collection[str] = ()) -> State:
-        """The likeliest set; the best so far where it is broken off."""
-        try:
-            return search.run(state, early)
-        except KeyboardInterrupt:
-            self.broken = True
-            return search.best or state
 
 
 def diagnose(

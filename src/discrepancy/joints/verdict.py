@@ -18,8 +18,9 @@ from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.evidence.until import Until
 from discrepancy.joints.causes import LINKS
-from discrepancy.joints.diagnose import Outcome, Until, diagnose
+from discrepancy.joints.diagnose import Outcome, diagnose
 from discrepancy.joints.findings import Foretold, JointVerdict
 from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel

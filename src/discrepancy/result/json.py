@@ -1,7 +1,7 @@
 """JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
 
 format, version     "mocobot-diagnosis", 3; version 2 has no ``machine``, ``finished`` and ``members``
-machine             "team", or "joints" of one robot of hinges and slides. A verdict of ``discrepancy.evidence`` on either
+machine             "team", or "joints" of one robot of hinges and slides. A verdict of ``discrepancy.evidence`` on it
                     (``discrepancy.result.told``) has ``told``, ``event``, ``at``, ``reference`` and a limit's ``place``
                     besides. In it ``prior_odds``, ``share_left``, ``law``, ``foretold``, ``unlisted_nats``, ``nats`` of
                     ``scatter`` and ``chi2_per_n`` of alternatives are null

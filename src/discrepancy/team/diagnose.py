@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 from discrepancy import rules
 from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.evidence.until import Until
 from discrepancy.team.around import around, exact, opened_by, placed
 from discrepancy.team.problem import TeamProblem, team_problem
+from discrepancy.team.rig import TeamRig
 from discrepancy.team.rows import TeamRows
 from estimator.errors import InputError
 
@@ -35,14 +37,21 @@ class TeamOutcome:
     nothing: tuple[Search, State]
     finished: bool = True
 
+    @property
+    def rig(self) -> TeamRig:
+        """The recordings, linear around what was found, and their simulator."""
+        assert isinstance(self.problem.rig, TeamRig)
+        return self.problem.rig
+
 
 def search_team(
     rig: TeamRows, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
-    stop: Callable[[], bool] = lambda: False,
+    until: Until | None = None,
 ) -> TeamOutcome:  # fmt: skip
     """The likeliest causes of what a team's model leaves of its recordings."""
+    until = until or Until()
     problem = team_problem(rig)
-    search = Search(problem, problem.sensors, settings, say, stop)
+    search = Search(problem, problem.sensors, settings, say, until)
     state = search.fixed(())
     for _ in range(settings.rounds):
         moved = _moved(problem, state)
@@ -53,18 +62,18 @@ def search_team(
         search = replace(search, problem=problem)
         state = search.fixed(())
     nothing = search, state
-    state = search.run(state, LEAVE_OPEN)
+    state = until.run(search, state, LEAVE_OPEN)
     for _ in range(2 * settings.rounds):
-        if not state.chosen or stop():
+        if not state.chosen or until():
             break
         before = state.keys
         problem, search, state, same = _beside(problem, search, state)
         if same:
             break
-        state = search.run(state, LEAVE_OPEN)
+        state = until.run(search, state, LEAVE_OPEN)
         if state.keys == before:
             break
-    return TeamOutcome(problem, search, state, nothing, not stop())
+    return TeamOutcome(problem, search, state, nothing, not until.broken)
 
 
 def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:

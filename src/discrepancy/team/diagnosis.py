@@ -1,25 +1,28 @@
 """Diagnose recordings of one payload that a team carries."""
 
+from __future__ import annotations
+
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
-from discrepancy import rules
-from discrepancy.engine.diagnose import When, diagnose
-from discrepancy.engine.explanation import explain
-from discrepancy.inference.odds import check_odds
-from discrepancy.inference.search import Searched, search
-from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.evidence.judge import is_named
+from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.settings import SETTINGS
+from discrepancy.evidence.until import Until
 from discrepancy.team.chattering import chattering
 from discrepancy.team.checks import check_estimate, check_recordings
-from discrepancy.team.estimates import errors, estimates, seen_by
+from discrepancy.team.diagnose import TeamOutcome, search_team
+from discrepancy.team.estimates import errors, seen_by
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
-from discrepancy.team.rig import AsFound, TeamRig
+from discrepancy.team.response import as_found, confirm
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.told import TeamDiagnosed
 from discrepancy.team.tolerances import read_tolerances
-from discrepancy.team.traces import traces
-from discrepancy.team.words import TeamWords
+from discrepancy.team.verdict import judged_team
 from estimator.errors import InputError
 from estimator.estimate.frames import ENCODERS, in_encoder_frames
 from estimator.estimate.payload import estimate_payload
@@ -32,23 +35,21 @@ def diagnose_team(
     excluded: Sequence[str] = (),
     *,
     closed_loop: bool = True,
-    laws: When = "auto",
-    odds: float = rules.PRIOR_ODDS,
     whole: bool = False,
+    seconds: float | None = None,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
-) -> Diagnosed:
-    """Check and estimate recordings, and find out what the simulation gets wrong.
+) -> TeamDiagnosed:
+    """Check and estimate recordings of one payload, and find out what the simulation gets wrong.
 
     Args:
         recordings: trials of one payload; several, so that what is named can be validated.
         tolerances: standard deviations by cause and parameter (``read_tolerances``); None for the defaults.
         excluded: causes left out of the catalogue.
         closed_loop: whether to run the recorded commands again.
-        laws: whether to look for laws that the catalogue lacks.
-        odds: of any cause being there before the data are seen, at all its places together.
         whole: whether to search all of long recordings, not a choice of their parts.
+        seconds: after which the search ends with what it has.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
         simulated: called with 1 for every simulated trial.
@@ -68,52 +69,48 @@ def diagnose_team(
         estimate_payload(recordings, compare_masses=True, withhold=False)
         raise
     known = read_tolerances(None) if tolerances is None else tolerances
+    until = Until(math.inf if seconds is None else time.monotonic() + seconds)
 
-    def rig_of(parts: list[Recording]) -> TeamRig:
+    def search(parts: list[Recording]) -> TeamOutcome:
         say("linearise")
-        return TeamRig.of(parts, estimate, known, excluded, jobs)
+        return search_team(TeamRig.of(parts, estimate, known, excluded, jobs), SETTINGS, say, until)
 
-    choice, searched, notes = Choice.of(recordings, whole=whole), None, ()
+    choice, notes = Choice.of(recordings, whole=whole), ()
     if choice.others:
-        prior = check_odds(odds)
-        parts = search_parts(
-            choice,
-            lambda some: search(rig_of(some), progress=say, odds=prior),
-            _as_found,
-            say,
-        )
-        choice, searched, notes = parts.choice, parts.searched, parts.notes
-    found = diagnose(
-        searched.rig if searched else rig_of(choice.searched), closed_loop=closed_loop, laws=laws, odds=odds,
-        searched=searched, jobs=jobs, say=say, simulated=simulated,
-    )  # fmt: skip
-    assert isinstance(found.rig, TeamRig)
-    payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
-    loops = chattering([linear.signals for linear in found.rig.linear])
+        parts = search_parts(choice, search, as_found, say)
+        choice, outcome, notes = parts.choice, parts.searched, parts.notes
+    else:
+        outcome = search(choice.searched)
+    say("weighing what else each cause may be")
+    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
+    odds = odds_of(outcome.search, outcome.state)
+    rig = outcome.rig
+    why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
+    gain, contradicted = None, False
+    if why_not is None:
+        say("simulate")
+        confirmed = confirm(outcome, [o for o in odds if is_named(o)], jobs, simulated)
+        others = [o for o in odds if not is_named(o)]
+        outcome, odds, gain = confirmed.outcome, [*confirmed.odds, *others], confirmed.gain
+        notes, contradicted = (*notes, *confirmed.notes), confirmed.contradicted
+    loops = chattering([linear.signals for linear in rig.linear])
     units = recordings[0].metadata.units
     if units is not None and in_encoder_frames(units):
         loops = (*loops, f"The payload's centre of mass and grasps are in {ENCODERS}.")
-    found = replace(found, notes=(*found.notes, *choice.notes, *notes, *loops))
-    return Diagnosed(found.rig, found, TeamWords(), own, payload)
+    verdict = judged_team(outcome, odds, (*notes, *choice.notes, *loops), contradicted=contradicted)
+    return TeamDiagnosed(verdict, outcome, gain, why_not)
 
 
-def _as_found(searched: Searched) -> tuple[TeamRig, AsFound]:
-    assert isinstance(searched.rig, TeamRig)
-    return searched.rig, searched.rig.as_found(explain(searched))
-
-
-def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:
+def against_truth(found: TeamDiagnosed, truth: Mapping[str, Any]) -> TeamDiagnosed:
     """The same with the errors of its estimates.
 
     Args:
         found: of ``diagnose_team``.
         truth: the payload, in the form of ``GroundTruth.to_dict``; where it is of something else there are no errors.
     """
-    known = dict(found.estimates or {})
+    known = found.verdict.estimates
     try:
-        assert isinstance(found.rig, TeamRig)
-        truth = seen_by(found.rig.recordings[0].metadata.units, truth)
-        known["errors"] = {name: errors(known[name], truth) for name in ("before", "after")}
+        truth = seen_by(found.verdict.rig.recordings[0].metadata.units, truth)
+        return replace(found, errors={name: errors(known[name], truth) for name in ("before", "after")})
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         return found
-    return replace(found, estimates=known)

@@ -105,7 +105,10 @@ class Listed:
     def together(cls, each: list[Listed]) -> Listed:
         """All of some, which are taken out of their list one by one: both at once would take twice the memory."""
         widths = [e.X.shape[2] for e in each]
-        groups, X = [g for e in each for g in e.groups], np.empty((*each[0].X.shape[:2], sum(widths)), np.float32)
+        groups, X = (
+            [g for e in each for g in e.groups],
+            np.empty((*each[0].X.shape[:2], sum(widths)), np.float32),
+        )
         for first, width in zip(np.cumsum([0, *widths]), widths, strict=False):
             X[..., first : first + width] = each.pop(0).X
         return cls(groups, X)
@@ -402,7 +405,11 @@ class TeamProblem:
         ]
         numbers = np.array([candidate.shape[n] for n in names])
         size = [max(abs(v), width) * STEP_SHARE for v, (_, _, width) in zip(numbers, steps, strict=True)]
-        return self.add([np.stack(each, axis=2) for each in zip(*slopes, strict=True)]), numbers, np.array(size)
+        return (
+            self.add([np.stack(each, axis=2) for each in zip(*slopes, strict=True)]),
+            numbers,
+            np.array(size),
+        )
 
     def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
         """The cause with the numbers of its shape a Gauss-Newton step further."""

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from discrepancy.evidence.findings import Finding
 from discrepancy.result.diagnosed import REPORT, draw
 from discrepancy.result.evidence_list import place_of
-from discrepancy.result.read import EXTENDED, NAME
+from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
+from discrepancy.result.remains import remains
 from discrepancy.result.report import format_verdict
 from discrepancy.result.signature import signature
 from discrepancy.result.told import Told, Values
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.diagnose import TeamOutcome
+from discrepancy.team.gain import Gain, Response
+from discrepancy.team.response import write_model
+from discrepancy.team.rig import TeamRig
 from discrepancy.team.verdict import TeamVerdict
 from discrepancy.team.words import TeamWords
 from estimator.errors import InputError
@@ -68,24 +75,26 @@ class TeamDiagnosed:
 
     Attributes:
         verdict: of the engine.
-        gain: what a comparison in closed loop says, as ``gain`` of the JSON; None where there was none.
-        not_simulated: why there was none.
+        outcome: of the search.
+        gain: responses in closed loop; None where there were none.
+        not_simulated: why there were none.
         errors: of the payload's estimates ``before`` and ``after``, where the truth is known.
-        write_extended: writes a model with the findings in it into a new folder.
     """
 
     verdict: TeamVerdict
-    gain: Mapping[str, Any] | None = None
+    outcome: TeamOutcome
+    gain: Gain | None = None
     not_simulated: str | None = None
     errors: Mapping[str, Any] | None = None
-    write_extended: Callable[[Path], object] | None = None
 
     @cached_property
     def _values(self) -> Values:
-        gain: Values = {**(self.gain or NOT_SIMULATED), "estimates": dict(self.verdict.estimates)}
+        gain = gain_to_dict(self.gain, self.verdict.rig) if self.gain else NOT_SIMULATED
+        gain = gain | {"estimates": dict(self.verdict.estimates)}
         if self.errors is not None:
             gain["errors"] = dict(self.errors)
-        return TeamTold(self.verdict).values(gain, not_simulated=self.not_simulated)
+        values = TeamTold(self.verdict).values(gain, not_simulated=self.not_simulated)
+        return values | {"remains": remains(values)}
 
     def to_dict(self) -> Values:
         """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
@@ -100,7 +109,7 @@ class TeamDiagnosed:
         return format_verdict(self._values, verbose=True)
 
     def write_into(self, folder: Path, **more: Any) -> None:
-        """Write extended model, residuals, pictures, JSON and report into an existing folder.
+        """Write models to take away, residuals, pictures, JSON and report into an existing folder.
 
         Args:
             folder: where.
@@ -109,13 +118,56 @@ class TeamDiagnosed:
         Raises:
             InputError: something cannot be written.
         """
-        values = self._values
-        if self.verdict.findings and self.write_extended is not None:
+        values, found = self._values, {(f.cause, f.place) for f in self.verdict.findings}
+        chosen = [c for c in self.outcome.state.chosen if c.group.key in found and not c.group.late]
+        models = [(EXTENDED, False)] if chosen else []
+        if self.gain is not None and self.gain.is_better_as_found:
+            models.append((AS_FOUND, True))
+        for name, whole in models:
             try:
-                self.write_extended(folder / EXTENDED)
+                write_model(self.outcome, chosen, folder / name, whole=whole)
             except InputError as error:  # values that no effect can have, such as a negative friction
-                note = f"There is no extended model: {error}."
+                note = f"There is no {'model as found' if whole else 'extended model'}: {error}."
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
         draw(values, self.verdict.traces(), self.verdict.rig.channels, TeamWords().unit, folder)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self.verbose_text()}\n")
+
+
+def gain_to_dict(gain: Gain, rig: TeamRig) -> Values:
+    """``gain`` of the JSON."""
+    channels, removed = list(next((a.rms for a, _ in gain.pairs), {})), gain.removed()
+    both = zip((rig.trials[t] for t in rig.resimulated), gain.before, gain.after, strict=True)
+    told = {"before": gain.before, "after": gain.after, "as_found": gain.as_found}
+    share = removed and {
+        "share": removed[0],
+        "interval": [x if np.isfinite(x) else None for x in removed[1:]],
+    }
+    return {
+        "held_out": {name: _mean(each) for name, each in told.items()},
+        "units": {name: TeamWords().unit(name) for name in channels},
+        "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
+        "removed": share,
+        "validated": gain.held_out,
+        "trials": [{"name": name, "before": _response(a), "after": _response(b)} for name, a, b in both],
+    }
+
+
+def _noise(rig: TeamRig, channel: str) -> float:
+    squares = [np.mean(rig.response_scale(t)[channel][0] ** 2) for t in range(len(rig.trials))]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _response(response: Response | None) -> dict[str, float] | None:
+    if response is None:
+        return None
+    sizes = {f"{name}_nrmse": float(v) for name, v in response.nrmse.items()}
+    sizes |= {f"{name}_rms": float(v) for name, v in response.rms.items()}
+    return sizes | {"chi2_per_n": float(response.chi2_per_n)}
+
+
+def _mean(responses: Sequence[Response | None]) -> dict[str, float] | None:
+    """That of some trials is not to be held against that of all."""
+    each = [values for values in map(_response, responses) if values is not None]
+    whole = each and len(each) == len(responses)
+    return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if whole else None

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
 from discrepancy.evidence.judge import Judge, Side
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.least_squares.whitening import Whitening
@@ -46,14 +46,21 @@ class TeamVerdict(Verdict):
     estimates: Mapping[str, Estimate]
 
 
-def judged_team(outcome: TeamOutcome, notes: Sequence[str] = ()) -> TeamVerdict:
+def judged_team(
+    outcome: TeamOutcome, odds: Sequence[Odds], notes: Sequence[str] = (), *, contradicted: bool = False
+) -> TeamVerdict:
     """What a search found, told.
 
     Args:
         outcome: of the search.
+        odds: of its causes.
         notes: sentences on the recordings.
+        contradicted: whether the causes make the response to the commands worse.
     """
-    return _TeamJudge(outcome).verdict(outcome, notes)
+    verdict = _TeamJudge(outcome, odds).verdict(outcome, notes)
+    if contradicted and verdict.verdict == "explained":
+        return replace(verdict, verdict="partly_explained")
+    return verdict
 
 
 class _TeamJudge(Judge):
@@ -62,10 +69,8 @@ class _TeamJudge(Judge):
     problem: TeamProblem
     tolerated = True
 
-    def __init__(self, outcome: TeamOutcome) -> None:
-        assert isinstance(outcome.problem.rig, TeamRig)
-        self.rig, plain = outcome.problem.rig, outcome.nothing
-        odds = odds_of(outcome.search, outcome.state)
+    def __init__(self, outcome: TeamOutcome, odds: Sequence[Odds]) -> None:
+        self.rig, plain = outcome.rig, outcome.nothing
         parts = parts_of(outcome.problem, outcome.state)
         super().__init__(outcome.problem, (outcome.search, outcome.state), plain, parts, odds)
 
