@@ -49,7 +49,7 @@ def remains(values: Values) -> list[str]:
             f"What remains is small (chi2/n {three_digits(residual['chi2_per_n'])}), but no noise (by "
             f"{residual['unlisted_nats']:.0f} nats): {residual['signature']['sentence'].rstrip('.')}."
         )
-    return [*out, *of_scatter(values), *_of_response(values)]
+    return [*out, *of_scatter(values), *of_response(values)]
 
 
 def of_scatter(values: Values) -> list[str]:
@@ -60,7 +60,8 @@ def of_scatter(values: Values) -> list[str]:
     return [f"Besides, all places alike are off by more than their tolerances: {kinds}. {remedy(values)}"]
 
 
-def _of_response(values: Values) -> list[str]:
+def of_response(values: Values) -> list[str]:
+    """A sentence on what the simulated response to the commands still is off by."""
     gain = values["gain"]
     told = gain and (gain["held_out"]["after"] or gain["held_out"]["before"])
     if not told or told["chi2_per_n"] <= rules.VISIBLE_CHI2_PER_N:

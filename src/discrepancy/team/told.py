@@ -14,7 +14,7 @@ from discrepancy.evidence.findings import Finding
 from discrepancy.result.diagnosed import REPORT, draw
 from discrepancy.result.evidence_list import place_of
 from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
-from discrepancy.result.remains import remains
+from discrepancy.result.remains import of_response
 from discrepancy.result.report import format_verdict
 from discrepancy.result.signature import signature
 from discrepancy.result.told import Told, Values
@@ -94,7 +94,7 @@ class TeamDiagnosed:
         if self.errors is not None:
             gain["errors"] = dict(self.errors)
         values = TeamTold(self.verdict).values(gain, not_simulated=self.not_simulated)
-        return values | {"remains": remains(values)}
+        return values | {"remains": [*values["remains"], *of_response(values)]}
 
     def to_dict(self) -> Values:
         """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
