@@ -10,7 +10,6 @@ from typing import get_args
 
 from discrepancy.cause_names import serial, team
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
 from estimator.files import check_place, holds
 from estimator.strict import read_json
@@ -154,8 +153,7 @@ def check_diagnose(options: opt.Diagnose) -> None:
         return
     if options.reference:
         raise InputError("--reference goes with --model: a healthy log of the same robot")
-    if options.seconds is not None:
-        raise InputError("--seconds goes with --model; the diagnosis of a team runs to its end")
+    check_seconds(options.seconds, "--seconds")
     if options.out is not None:
         inputs = [*options.rec, *_given(options.tolerances), *map_file(options.map)]
         inputs += calibration_file(options.calibration)
@@ -165,6 +163,15 @@ def check_diagnose(options: opt.Diagnose) -> None:
     check_formats(options.rec)
     for path in filter(Path.exists, map(truth_path, options.rec)):
         read_json(path, TRUTH)  # what it says, nobody asks before the verdict
+
+
+MOST_ODDS = 1000.0
+
+
+def check_odds(odds: float) -> None:
+    """Odds of a cause beforehand."""
+    if not 0.0 < odds <= MOST_ODDS:
+        raise InputError(f"odds is {odds:g}; it must be greater than 0 and at most {MOST_ODDS:g}")
 
 
 def check_seconds(seconds: float | None, name: str = "seconds") -> None:

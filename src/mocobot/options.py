@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from discrepancy.rules.inference import PRIOR_ODDS
+from discrepancy.evidence.settings import ODDS
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 Force = Annotated[Flag, tyro.conf.arg(help="Replace what exists there; nothing is overwritten without it.")]
@@ -128,7 +128,7 @@ class Diagnose:
     """Run the recorded commands again, without and with what is found."""
     laws: Literal["auto", "always", "never"] = "auto"
     """Look for laws that the catalogue lacks: where something unlisted is left or a cause is unsure, always, never."""
-    odds: float = PRIOR_ODDS
+    odds: float = ODDS
     """Odds of any cause being there before the data are seen; more where a fault is suspected."""
     whole: bool = False
     """Search all of a team's long recordings, not a choice of their parts."""

@@ -64,3 +64,5 @@ class Settings:
 
 
 SETTINGS = Settings()
+ODDS = 0.05
+"""Odds of any cause being there before the data are seen. Derived: exp(-``cause_nats``)."""

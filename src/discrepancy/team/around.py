@@ -143,6 +143,7 @@ def around(problem: TeamProblem, state: State) -> TeamProblem | None:
         active = [pair for pair in found.active]
         moved = rig._at(recordings, shared, rig.tolerances, rig.excluded, origin, resting, rig.jobs, sensed,
                         explained_by(active, origin))  # fmt: skip
+    moved = replace(moved, laws=rig.laws)
     return team_problem(moved, problem.opened, problem.catalogue if same else None)
 
 

@@ -6,11 +6,11 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 from discrepancy.evidence.judge import is_named
 from discrepancy.evidence.odds import borne_out, odds_of
-from discrepancy.evidence.settings import SETTINGS
+from discrepancy.evidence.settings import ODDS, SETTINGS
 from discrepancy.evidence.until import Until
 from discrepancy.team.chattering import chattering
 from discrepancy.team.checks import check_estimate, check_recordings
@@ -28,6 +28,8 @@ from estimator.estimate.frames import ENCODERS, in_encoder_frames
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 
+When = Literal["auto", "always", "never"]
+
 
 def diagnose_team(
     recordings: Sequence[Recording],
@@ -35,6 +37,8 @@ def diagnose_team(
     excluded: Sequence[str] = (),
     *,
     closed_loop: bool = True,
+    laws: When = "auto",
+    odds: float = ODDS,
     whole: bool = False,
     seconds: float | None = None,
     jobs: int = 1,
@@ -48,6 +52,9 @@ def diagnose_team(
         tolerances: standard deviations by cause and parameter (``read_tolerances``); None for the defaults.
         excluded: causes left out of the catalogue.
         closed_loop: whether to run the recorded commands again.
+        laws: whether to look for what no table lists: where the noise is louder than the sensors' (``auto``), always,
+            or never.
+        odds: of any cause being there before the data are seen, at all its places together.
         whole: whether to search all of long recordings, not a choice of their parts.
         seconds: after which the search ends with what it has.
         jobs: parallel processes.
@@ -69,11 +76,13 @@ def diagnose_team(
         estimate_payload(recordings, compare_masses=True, withhold=False)
         raise
     known = read_tolerances(None) if tolerances is None else tolerances
+    settings = SETTINGS if odds == ODDS else replace(SETTINGS, cause_nats=-math.log(odds))
     until = Until(math.inf if seconds is None else time.monotonic() + seconds)
 
     def search(parts: list[Recording]) -> TeamOutcome:
         say("linearise")
-        return search_team(TeamRig.of(parts, estimate, known, excluded, jobs), SETTINGS, say, until)
+        rig = replace(TeamRig.of(parts, estimate, known, excluded, jobs), laws=laws)
+        return search_team(rig, settings, say, until)
 
     choice, notes = Choice.of(recordings, whole=whole), ()
     if choice.others:
@@ -83,21 +92,21 @@ def diagnose_team(
         outcome = search(choice.searched)
     say("weighing what else each cause may be")
     outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
-    odds = odds_of(outcome.search, outcome.state)
+    weighed = odds_of(outcome.search, outcome.state)
     rig = outcome.rig
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     gain, contradicted = None, False
     if why_not is None:
         say("simulate")
-        confirmed = confirm(outcome, [o for o in odds if is_named(o)], jobs, simulated)
-        others = [o for o in odds if not is_named(o)]
-        outcome, odds, gain = confirmed.outcome, [*confirmed.odds, *others], confirmed.gain
+        confirmed = confirm(outcome, [o for o in weighed if is_named(o)], jobs, simulated)
+        others = [o for o in weighed if not is_named(o)]
+        outcome, weighed, gain = confirmed.outcome, [*confirmed.odds, *others], confirmed.gain
         notes, contradicted = (*notes, *confirmed.notes), confirmed.contradicted
     loops = chattering([linear.signals for linear in rig.linear])
     units = recordings[0].metadata.units
     if units is not None and in_encoder_frames(units):
         loops = (*loops, f"The payload's centre of mass and grasps are in {ENCODERS}.")
-    verdict = judged_team(outcome, odds, (*notes, *choice.notes, *loops), contradicted=contradicted)
+    verdict = judged_team(outcome, weighed, (*notes, *choice.notes, *loops), contradicted=contradicted)
     return TeamDiagnosed(verdict, outcome, gain, why_not)
 
 

@@ -259,7 +259,8 @@ class TeamProblem:
         if late:
             v = posterior.variance
             noise = 0.5 * float(np.sum(self.cells.rows * (v - 1.0 - np.log(v))))
-            return self.laws_of.proposed(self.left(posterior), self._white) if noise > OPEN_NATS else []
+            least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
+            return self.laws_of.proposed(self.left(posterior), self._white) if noise > least else []
         out: list[Group] = []
         if self.listed is not None:
             gains = self.gains(posterior, self.listed)

@@ -60,6 +60,7 @@ class TeamRows(Rig):
         resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
         jobs: parallel processes.
         missed, beside, rewhitened: as of ``Rig``.
+        laws: whether to look for what no table lists: where noise is loud (``auto``), ``always`` or ``never``.
         kept: whitened columns that are asked for again and again.
     """
 
@@ -74,6 +75,7 @@ class TeamRows(Rig):
     missed: float = 0.0
     beside: bool = False
     rewhitened: bool = False
+    laws: str = "auto"
     kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     @classmethod

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy import rules
-from discrepancy.engine.diagnose import Verdict, When
+from discrepancy.evidence.findings import Word
+from discrepancy.evidence.settings import ODDS
 from discrepancy.joints.diagnosed import JointDiagnosed
-from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.result.read import name_of
-from discrepancy.team.diagnosis import against_truth, diagnose_team
+from discrepancy.team.diagnosis import When, against_truth, diagnose_team
+from discrepancy.team.told import TeamDiagnosed
 from discrepancy.team.tolerances import read_tolerances
 from estimator.files import holds, whole_folder
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
@@ -76,14 +76,14 @@ class Diagnosis:
         found: of a team, or of one robot of joints.
     """
 
-    found: Diagnosed | JointDiagnosed
+    found: TeamDiagnosed | JointDiagnosed
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
         return self.found.to_dict()
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Word:
         """``"consistent"``, ``"miscalibrated"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
         return self.to_dict()["verdict"]
 
@@ -138,7 +138,7 @@ def diagnose(
     exclude: Iterable[str] = (),
     closed_loop: bool = True,
     laws: When = "auto",
-    odds: float = rules.PRIOR_ODDS,
+    odds: float = ODDS,
     whole: bool = False,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,

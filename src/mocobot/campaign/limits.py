@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.candidate import Candidate, Transient
-from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.problem import Problem
+from discrepancy.evidence.posterior import Posterior
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
 
@@ -28,25 +27,6 @@ NEEDED = {"slosh": {"mass_kg"}, "tether": TETHER, "payload_tether": TETHER, "pay
 Json = dict[str, Any]
 
 
-def sizes_of(fit: Fit, gain: float) -> list[Array]:
-    """Size of every candidate's parameters, each alone, whose expected gain of chi-square is ``gain``.
-
-    The gain is that of leaving the tolerance. In the parameters' own units, one array (k,) per candidate; infinite
-    where the data say nothing.
-    """
-    out = []
-    for index, candidate in enumerate(fit.problem.candidates):
-        lam, vectors = np.linalg.eigh(fit.told(index)[0])
-        keep = lam > rules.LEAST_INFORMATION
-        lam, vectors = lam[keep], vectors[:, keep]
-        within = all(parameter.tolerance > 0 for parameter in candidate.parameters)  # pushes, too
-        weight = lam / (1.0 + lam) if within else lam
-        power = vectors**2 @ weight
-        size = np.sqrt(gain / np.maximum(power, 1e-300))
-        out.append(np.where(power > 0, candidate.units * size, np.inf))
-    return out
-
-
 def pushes(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Candidate]:
     """A push of a second every five seconds of all trials.
 
@@ -62,21 +42,21 @@ def pushes(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Candidate]:
     ]
 
 
-def push_limits(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Json]:
+def push_limits(outcome: TeamOutcome, tolerance: Mapping[str, float]) -> list[Json]:
     """Detection limit of a push of a second in every trial, the median over its instants.
-
-    Everything else is taken to be within its tolerance, which hardly matters to what lasts a second.
 
     Returns:
         {trial, parameters: {name: size or None}} for every trial that is long enough; trials count from 1.
     """
-    events = pushes(rig, tolerance)
-    candidates = [*rig.candidates(), *events]
-    sizes = sizes_of(Fit.of(Problem.of(rig.rows(candidates), candidates)), GAIN)[-len(events) :]
-    found: dict[int, list[Array]] = {}
-    for event, size in zip(events, sizes, strict=True):
+    problem, p = outcome.problem, outcome.state.posterior
+    cells, events = problem.cells, pushes(outcome.rig, tolerance)
+    count, found = cells.count, dict[int, list[Array]]()
+    placed = [problem.place(problem.group_of(event, 0.0)) for event in events]
+    wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
+    for event, group in zip(events, placed, strict=True):
         assert event.transient is not None
-        found.setdefault(event.transient.trial + 1, []).append(size)
+        found.setdefault(event.transient.trial + 1, []).append(np.sqrt(GAIN) * wider.errors_of(group.columns))
+    cells.truncate(count)
     names = [parameter.name for parameter in events[0].parameters] if events else []
     return [
         {"trial": trial, "parameters": dict(zip(names, _medians(values), strict=True))}

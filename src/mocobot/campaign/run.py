@@ -11,10 +11,8 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
-from discrepancy.result.diagnosed import Diagnosed
-from discrepancy.result.sensitivity import detection_limits
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.rig import TeamRig
+from discrepancy.team.told import TeamDiagnosed
 from estimator.errors import InputError
 from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
@@ -206,7 +204,7 @@ def run_set(task: tuple[CampaignPlan, CampaignSet, Json | None]) -> Json:
     return result
 
 
-def _diagnosed(plan: CampaignPlan, recordings: Sequence[Recording]) -> Diagnosed:
+def _diagnosed(plan: CampaignPlan, recordings: Sequence[Recording]) -> TeamDiagnosed:
     robots = Robots(plan.calibration)
     return diagnose_team(
         [robots.of(recording) for recording in recordings], plan.tolerances, plan.exclude,
@@ -214,9 +212,8 @@ def _diagnosed(plan: CampaignPlan, recordings: Sequence[Recording]) -> Diagnosed
     )  # fmt: skip
 
 
-def _limits(plan: CampaignPlan, found: Diagnosed) -> Json:
-    assert isinstance(found.rig, TeamRig)
+def _limits(plan: CampaignPlan, found: TeamDiagnosed) -> Json:
     return {
-        "places": detection_limits(found.diagnosis.explanation),
-        "pushes": [] if "push" in plan.exclude else push_limits(found.rig, plan.tolerances["push"]),
+        "places": found.to_dict()["detection_limits"],
+        "pushes": [] if "push" in plan.exclude else push_limits(found.outcome, plan.tolerances["push"]),
     }

@@ -47,21 +47,23 @@ def run(options: Diagnose) -> None:
             found = diagnose_team(
                 data, tolerances, options.exclude,
                 closed_loop=options.closed_loop, laws=options.laws, odds=options.odds, jobs=options.jobs, say=say,
-                simulated=simulated, whole=options.whole,
+                simulated=simulated, whole=options.whole, seconds=options.seconds,
             )  # fmt: skip
             if (truth := _truth(options.rec)) is not None:
                 found = against_truth(found, truth)
             if folder is not None:
                 say("write")
-                if found.estimates and "errors" in found.estimates:
+                if found.errors is not None:
                     made_with["files"] += [file_facts(truth_path(path)) for path in options.rec]
                 found.write_into(folder, provenance=made_with)
     for path, converted in logs.converted.items():
         print(format_on_the_fly(converted, str(path)))
-    print(found)  # after the folder is in place: whoever reads may close the pipe
+    print(
+        found.verbose_text() if options.verbose else found
+    )  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
-    verdict = found.diagnosis.verdict
+    verdict = found.to_dict()["verdict"]
     if options.strict and verdict not in ("consistent", "explained"):
         raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
 
