@@ -34,7 +34,7 @@ def remains(values: Values) -> list[str]:
     Args:
         values: a diagnosis as ``discrepancy.result.json`` documents it.
     """
-    if is_of_joints(values):
+    if is_of_joints(values) or values["residual"]["unlisted_nats"] is None:
         return list(values["remains"])
     residual = values["residual"]
     out = []
