@@ -204,7 +204,8 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
         raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
     parse_diagnosis(values, path)
     with complete(path, "not a complete diagnosis"):
-        if values.get("machine") == "joints" or values["prior_odds"] is None:  # the text touches most keys that a report has to show
+        # The text touches most keys that a report has to show.
+        if values.get("machine") == "joints" or values["prior_odds"] is None:
             format_verdict(values, verbose=True)
         else:
             format_diagnosis(values)
