@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from discrepancy.evidence.parts import PLAIN
 from discrepancy.evidence.posterior import Posterior
+from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints import problem
 from discrepancy.joints.causes import Span
 from discrepancy.joints.diagnose import MOVED, Outcome, diagnose
@@ -143,7 +143,7 @@ def left(outcome: Outcome, model: SerialModel, last: Signals) -> np.ndarray:
     for c in state.chosen:
         prior[list(c.forms)] = 0.0
         k = list(c.group.columns)
-        prior[k] = np.maximum(prior[k], (PLAIN * np.array(c.group.slab)) ** 2)
+        prior[k] = np.maximum(prior[k], (SETTINGS.plain * np.array(c.group.slab)) ** 2)
     x = Posterior(solved.cells, prior, state.posterior.variance).mean
     found = {label: float(x[k]) for k, label in enumerate(solved.labels) if prior[k]}
     found = {n: v for n, v in found.items() if " rest " not in n and " turning " not in n}

@@ -11,7 +11,6 @@ import numpy as np
 from arm import machine
 from arm.forms import Form
 from discrepancy.evidence.cells import Cells
-from discrepancy.evidence.judge import NOTICED
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Search, floor_of
 from discrepancy.joints.given import Given
@@ -104,7 +103,10 @@ class Shown:
 
     def limit(self, form: Form) -> float:
         """Size from which a form is noticed nine times in ten, as the diagnosis says it of its causes."""
-        need = np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats)) + NOTICED
+        need = (
+            np.sqrt(2.0 * (self.search.against + self.search.settings.need_nats))
+            + self.search.settings.noticed
+        )
         return float(form.size * need / np.sqrt(self.by(form)))
 
     def by(self, form: Form) -> float:

@@ -17,7 +17,8 @@ from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
 from hidden.generator import PAYLOADS, HiddenSet, generate
 from hidden.limits import PENDULUM_LENGTHS_M
-from mocobot.campaign.limits import GAIN, PUSH_S, sizes_of
+from hidden.sizes import sizes_of
+from mocobot.campaign.limits import GAIN, PUSH_S
 
 
 def measure_limits(jobs: int) -> tuple[dict[str, dict[str, float]], dict[float, float]]:

@@ -13,7 +13,8 @@ from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from hidden.limits import LIMITS
-from mocobot.campaign.limits import GAIN, pushes, sizes_of
+from hidden.sizes import sizes_of
+from mocobot.campaign.limits import GAIN, pushes
 
 Place = tuple[str, int | None, int | None, int | None]
 """Cause, robot, joint and trial (from 1), where it has them."""

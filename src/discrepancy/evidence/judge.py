@@ -14,16 +14,9 @@ from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Parts, Values
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Linear, Search, State
+from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array
 
-NAMED = 0.5
-"""Least probability of the told set of a cause that is named."""
-SIGNIFICANT_SE = 3.0
-"""Standard errors from which a member of a kind counts as off."""
-SCATTER = 3.0
-"""Tolerances (root mean square over a kind) from which a machine is miscalibrated."""
-NOTICED = 1.28
-"""Standard errors beyond the threshold at which nine in ten are noticed. Derived: the normal quantile of 90 %."""
 OFFERS, RIVALS = 12, 6
 Side = tuple[Search, State]
 
@@ -147,7 +140,7 @@ class Judge(ABC):
         at, (mean, covariance) = self.parts.columns_of(list(columns)), self.whole
         usual = np.array([self.problem.tolerance[k] for k in columns])
         size = np.sqrt(np.diag(covariance)[at] + usual**2)
-        return bool(np.any(np.abs(mean[at]) > SIGNIFICANT_SE * size))
+        return bool(np.any(np.abs(mean[at]) > SETTINGS.apart * size))
 
     def _word(
         self, findings: Sequence[Finding], doubtful: Sequence[Finding], scatter: Sequence[Scatter],
@@ -157,7 +150,7 @@ class Judge(ABC):
         listed = [f for f in findings if f.cause != "unlisted"]
         if listed:
             return "explained" if clean and len(listed) == len(findings) else "partly_explained"
-        if findings or not clean or any(f.nothing < 1.0 - NAMED for f in doubtful):
+        if findings or not clean or any(f.nothing < 1.0 - SETTINGS.named for f in doubtful):
             return "unexplained"
         return "miscalibrated" if scatter else "consistent"
 
@@ -235,7 +228,7 @@ class Judge(ABC):
                 kinds.setdefault(g.cause, []).append((g, off))
         for cause, each in kinds.items():
             factor = float(np.sqrt(np.mean([off for _, off in each])))
-            if factor > SCATTER:
+            if factor > SETTINGS.scatter:
                 far, values = (
                     sorted(each, key=lambda pair: -pair[1]),
                     self.parts.values(p.prior[self.parts.active]),
@@ -261,7 +254,7 @@ class Judge(ABC):
         """Sizes that would be noticed nine times in ten, with everything else as it was found."""
         taken, s = {c.group.key for c in self.state.chosen}, self.search.settings
         open_ = s.open_nats if taken else 0.0
-        need = np.sqrt(2.0 * (self.search.against + s.need_nats + open_)) + NOTICED
+        need = np.sqrt(2.0 * (self.search.against + s.need_nats + open_)) + s.noticed
         p = self.state.posterior
         groups = [
             g for g in self.problem.groups if not (g.members or g.cause == "unlisted" or self._shaped(g))
@@ -286,7 +279,7 @@ def is_named(o: Odds) -> bool:
     own = o.chosen.group
     told = [g for g in o.told() if g]
     kin = [g for g in told if g.key == own.key or (own.family and g.family == own.family)]
-    return nothing < 1.0 - NAMED and bool(kin or [g for g in told[:1] if g.cause == "unlisted"])
+    return nothing < 1.0 - SETTINGS.named and bool(kin or [g for g in told[:1] if g.cause == "unlisted"])
 
 
 def _share(left: Sequence[float], k: int, rows: float) -> float:

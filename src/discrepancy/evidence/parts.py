@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from discrepancy.evidence.search import State
+from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array
 
-PLAIN = 3.0
-"""Values are fitted with so many times their prior standard deviation, so that it shrinks nothing."""
 Values = tuple[Array, Array]
 """Of the active columns, and their covariance, shapes (K,) and (K, K)."""
 
@@ -73,7 +72,7 @@ class Parts:
         wide = self.state.posterior.prior.copy()
         for c in self.state.chosen:
             k = list(c.group.columns)
-            wide[k] = np.maximum(wide[k], (PLAIN * np.array(c.group.slab)) ** 2)
+            wide[k] = np.maximum(wide[k], (SETTINGS.plain * np.array(c.group.slab)) ** 2)
         return wide[self.active]
 
     def columns_of(self, chosen: Sequence[int]) -> list[int]:

@@ -33,6 +33,10 @@ class Settings:
         apart: standard errors from which a member of a kind stands out.
         within_nats: linear gain below that of a cause beyond which a rival is not weighed (15: 3e-7 of its odds).
         most_rivals: rivals that are weighed exactly.
+        named: least probability of the told set of a cause that is named.
+        scatter: tolerances (root mean square over a kind) from which a machine is miscalibrated.
+        noticed: standard errors beyond the threshold at which nine in ten are noticed: the normal quantile of 90 %.
+        plain: values are fitted with so many times their prior standard deviation, so that it shrinks nothing.
         clean_chi2: squares left over the floor's variance, per row, up to which nothing is left to explain.
         least_floor: least noise variance over the power of the quietest band, where the sensors' noise is not known.
     """
@@ -59,6 +63,10 @@ class Settings:
     apart: float = 3.0
     within_nats: float = 15.0
     most_rivals: int = 8
+    named: float = 0.5
+    scatter: float = 3.0
+    noticed: float = 1.28
+    plain: float = 3.0
     clean_chi2: float = 1.5
     least_floor: float = 1e-3
 

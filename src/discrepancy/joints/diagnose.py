@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 
-from discrepancy.evidence.parts import PLAIN
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
@@ -119,7 +118,7 @@ def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
     prior = state.posterior.prior.copy()
     for c in state.chosen:
         k = list(c.group.columns)
-        prior[k] = np.maximum(prior[k], (PLAIN * np.array(c.group.slab)) ** 2)
+        prior[k] = np.maximum(prior[k], (SETTINGS.plain * np.array(c.group.slab)) ** 2)
     p = Posterior(outcome.problem.cells, prior, state.posterior.variance)
     se = np.sqrt(p.variances)
     return {
