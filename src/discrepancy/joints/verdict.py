@@ -170,7 +170,8 @@ class _Judge:
             c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
-        kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
+        listed = [r for r in o.rivals if r.group and r.group.cause != "unlisted"]
+        kin = sum(r.probability for r in listed if r.group and c.family and r.group.family == c.family)
         unlisted = c.cause == "unlisted"
         rivals = tuple(
             Rival(r.group.cause, r.group.place, self._joint(*r.group.key), r.probability,
