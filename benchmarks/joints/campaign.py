@@ -39,14 +39,8 @@ from mocobot_logs.joints.joint_log import JointLog
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
         "load_friction", "quadratic_drag")  # fmt: skip
-ALIKE = (
-    ("torque_offset", "asymmetric_coulomb"),
-    ("spring", "counterbalance", "ripple"),
-    ("link_mass", "payload"),
-    RUBS,
-)
-"""Names of one thing at one joint or link: no log without rests parts the first, what a rigid load and its link weigh
-is one, terms of one friction are the last."""
+ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
+"""Names of one thing at one joint: no log without rests parts the first, terms of one friction are the last."""
 SURE = 0.9
 Item = dict[str, Any]
 

@@ -35,7 +35,7 @@ class Bands:
     kept: Sequence[Array] = ()
 
     def share(self, channel: int) -> float:
-        """Of a channel's rows that the samples kept are worth."""
+        """Share of a channel's rows that is left where samples are weighted."""
         return float(np.mean(np.concatenate([w[:, channel] for w in self.kept]) ** 2)) if self.kept else 1.0
 
     def faded(self, x: Array, trial: int) -> Array:

@@ -111,7 +111,8 @@ class Judge(ABC):
             c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
-        kin = sum(r.probability for r in o.rivals if r.group and c.family and r.group.family == c.family)
+        listed = [r for r in o.rivals if r.group and r.group.cause != "unlisted"]
+        kin = sum(r.probability for r in listed if r.group and c.family and r.group.family == c.family)
         rivals = tuple(
             Rival(*r.group.key, self.joint(*r.group.key), r.probability,
                   float(np.log(max(o.probability, 1e-12) / max(r.probability, 1e-12))))

@@ -57,10 +57,10 @@ def borne_out(search: Search, state: State) -> State:
     """The set without causes that are likelier what the other causes' laws leave, the weakest taken out first."""
     while len(state.chosen) > 1:
         shorter = [_without(search, state, c) for c in state.chosen]
-        best = max(shorter, key=lambda s: s.evidence)
-        if best.evidence + _left(search, best) < state.evidence:
+        k = int(np.argmax([s.evidence for s in shorter]))
+        if _nothing(search, state, state.chosen[k], shorter[k]) < state.evidence:
             break
-        state = best
+        state = shorter[k]
     return state
 
 
@@ -73,17 +73,21 @@ def _without(search: Search, state: State, own: Chosen) -> State:
     return search.settled(search.value([c for c in state.chosen if c is not own], state.posterior))
 
 
-def _left(search: Search, state: State) -> float:
-    """Log odds over nothing of what a set's laws leave, which looks like a cause; not more than the set is worth."""
-    empty = search.settled(search.value((), state.posterior))
-    return float(np.clip(state.evidence - empty.evidence, 0.0, search.settings.open_nats))
+def _nothing(search: Search, state: State, own: Chosen, without: State) -> float:
+    """Log evidence of nothing in a cause's place: it is within its tolerance, or laws of the others leave it.
+
+    They leave nothing that is worth more than they are, be that taken up by its tolerance.
+    """
+    empty = search.settled(search.value((), without.posterior))
+    worth = without.evidence - empty.evidence - search.tolerated(state, own)
+    return without.evidence + float(np.clip(worth, 0.0, search.settings.open_nats))
 
 
 def _odds(search: Search, state: State, own: Chosen) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
     without = _without(search, state, own)
-    weighed: list[tuple[float, Group | None]] = [(without.evidence + _left(search, without), None)]
+    weighed: list[tuple[float, Group | None]] = [(_nothing(search, state, own, without), None)]
     for chosen in search.rivals(without, own.group)[: search.settings.most_rivals]:
         count = cells.count
         rival = search.with_one(rest, chosen, without.posterior)

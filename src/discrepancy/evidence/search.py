@@ -390,6 +390,17 @@ class Search:
             state = best
         return state
 
+    def tolerated(self, state: State, own: Chosen) -> float:
+        """Log evidence that a tolerance adds in place of its cause, at the noise with that."""
+        columns = sorted(own.group.columns)
+        healthy = self.prior([c for c in state.chosen if c is not own], None)[columns]
+        worth = state.posterior.worth
+        return (
+            max(worth(columns, np.zeros(len(columns))) - worth(columns, healthy), 0.0)
+            if healthy.any()
+            else 0.0
+        )
+
     def _worth(self, state: State, out: Collection[Chosen]) -> float:
         """Log evidence of causes beyond their odds, at the noise with them."""
         kept = self.prior([c for c in state.chosen if c not in out], None)

@@ -417,7 +417,9 @@ class _Builder:
         self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float] | Array, **more: Any
     ) -> None:
         # Between two days a link carries more or less, and is what it was.
-        same = self.more.changed is not None and more.get("family") and cause != "payload"
+        same = (
+            self.more.changed is not None and more.get("family", "").startswith("load") and cause != "payload"
+        )
         if same or not any(j in self.channel for k in columns for j in self.out.series[k]):
             return
         groups = self.out.withheld if cause in self.more.excluded else self.out.groups
@@ -532,6 +534,7 @@ class _Builder:
         for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
             if signal == "neighbour's torque" and not j:
                 continue
+            # What gives way to gravity is off by a function of the position, too: that spans elasticity.
             read, slab = signal == "reading", READ_RAD if signal == "reading" else self.spans[j].torque
             index = [
                 self.add(f"{n} unlisted {signal} {k}", 0.0, self.out.displaced(j, x) if read else {j: x})
@@ -539,7 +542,7 @@ class _Builder:
             ]
             self.group(
                 "unlisted", n, index, slab * SIZES, log_prior=-UNLISTED_NATS - math.log(len(SIGNALS)),
-                shape=(("signal", float(number)),), late=True,
+                shape=(("signal", float(number)),), late=True, family=f"angle of {n}" if read else "",
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
             forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
@@ -594,7 +597,7 @@ class _Builder:
             return along(s, j, -low_pass(s.inverse[:, j], s.rate_hz, min(7.0, 0.2 * s.rate_hz)))
 
         k = self.add(f"{self.names[j]} compliance", 0.0, self.wide(series))
-        self.group("elasticity", self.names[j], [k], [1e-3], least=(0.0,))
+        self.group("elasticity", self.names[j], [k], [1e-3], least=(0.0,), family=f"angle of {self.names[j]}")
 
     def _braking(self, j: int) -> None:
         by = [np.where(s.enabled, s.dq[:, j], 0.0)[c] for s, c in zip(self.parts, self.cut, strict=True)]

@@ -26,7 +26,7 @@ CUTOFF_HZ = 20.0
 CUTOFF_SHARE = 0.15
 """The same over the sampling rate, at most. Chosen."""
 SLOW_SHARE = 0.01
-"""Of a joint's typical speed, below which the direction of friction fades. Chosen."""
+"""Share of a joint's typical speed below which the direction of friction fades. Chosen."""
 SLOW_ROUNDINGS = 2.0
 """The same, at least, over what rounding of the positions makes of a velocity. Chosen: two standard deviations; a joint
 that creeps through the steps of a coarse encoder has no direction."""

@@ -11,6 +11,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.search import Chosen, State
 from discrepancy.team.candidates import explained_by
+from discrepancy.team.linear.elsewhere import HEALTHY, as_read
 from discrepancy.team.linear.origin import beyond, places_of
 from discrepancy.team.linear.rest import limits_of
 from discrepancy.team.linear.signals import Signals
@@ -22,8 +23,6 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.rigid_team.residual import Shared
 
-HEALTHY = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
-"""Kinds that leave something open even where they are within their tolerances."""
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal number. Derived."""
 
@@ -86,7 +85,7 @@ def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, 
     x[moved] = state.posterior.mean[moved]
     exact = []
     for trial, white, local in zip(problem.rig.linear, problem.rig.whitening, found.local, strict=True):
-        signals = Signals(trial.signals.time, *true_joints(units, *_as_read(trial)), trial.signals.rate_hz,
+        signals = Signals(trial.signals.time, *true_joints(units, *as_read(trial)), trial.signals.rate_hz,
                           trial.signals.sampling)  # fmt: skip
         exact.append(white(exact_residual(signals, shared, trial.bases.moved(local), units, trial.reduction)))
     exact, total = problem.rows_of(exact), 0.0
@@ -95,16 +94,6 @@ def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, 
         there = problem.bands.spectrum([r[:, 3 * c : 3 * c + 3] for r in exact])[problem.cells.order]
         total += float(np.sum((there - straight) ** 2))
     return total / sum(len(channel.y) for channel in problem.cells.channels)
-
-
-def _as_read(trial) -> tuple[Array, Array, Array]:
-    """phi, theta, tau as the sensors read them, shape (Q, N, 3) each."""
-    s = trial.signals
-    if not isinstance(trial.arms, ArmUnit):
-        return s.phi, s.theta, s.tau
-    arms = trial.arms
-    tau = s.tau / (1.0 + arms.of("stiffness_ratio")) + arms.of("tau_zero")
-    return s.phi + arms.of("phi_zero"), s.theta + arms.of("theta_zero"), tau
 
 
 def resting_of(found: Found) -> dict[str, float]:
@@ -140,9 +129,8 @@ def around(problem: TeamProblem, state: State) -> TeamProblem | None:
         moved = replace(rig, sensed=sensed, resting=resting, kept={})
     else:
         recordings = [replace(r, metadata=replace(r.metadata, units=units)) for r in rig.recordings]
-        active = [pair for pair in found.active]
         moved = rig._at(recordings, shared, rig.tolerances, rig.excluded, origin, resting, rig.jobs, sensed,
-                        explained_by(active, origin))  # fmt: skip
+                        explained_by(found.active, origin))  # fmt: skip
     moved = replace(moved, laws=rig.laws)
     return team_problem(moved, problem.opened, problem.catalogue if same else None)
 

@@ -40,17 +40,9 @@ BLOCK = 64
 STEP_SHARE = 1.0
 """Standard deviation of a step of a number of a shape, in that number."""
 EXACT = (
-    "phi_zero",
-    "theta_zero",
-    "link_length",
-    "base_tilt",
-    "sea_bias",
-    "payload_mass",
-    "clock_delay",
-    "torque_skew",
-)
+    "phi_zero", "theta_zero", "link_length", "base_tilt", "sea_bias", "payload_mass", "clock_delay", "torque_skew",
+)  # fmt: skip
 """Causes whose law is geometry or arithmetic."""
-Values = Mapping[tuple[object, ...], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +146,7 @@ class TeamProblem:
 
     @property
     def bands(self) -> RowBands:
-        """Of the rows."""
+        """Bands of the rows."""
         return cast("RowBands", self.cells.bands)
 
     @property

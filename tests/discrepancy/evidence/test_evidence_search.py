@@ -169,3 +169,26 @@ def test_of_two_causes_that_are_nearly_alike_one_stays() -> None:
     (only,) = odds_of(search, state)
     assert only.over_nothing > 100.0
     assert sum(r.probability for r in only.rivals if r.group is None) < 1e-6
+
+
+def test_laws_of_other_causes_leave_nothing_that_is_larger_than_they_are() -> None:
+    """A tolerance takes it up nearly as well, so little speaks for the cause, but what is there is no law's error."""
+    rng = np.random.default_rng(8)
+    columns = [wave(rng), wave(rng)]
+    y = 0.2 * columns[0] + 2.0 * columns[1] + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]} for x in columns])
+
+    class Tolerated(Machine):
+        def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+            return np.array([0.0, 0.5**2])
+
+    machine = Tolerated(
+        cells, [Group(name, "joint", (k,), (1.0,)) for k, name in enumerate(("one", "other"))]
+    )
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    state = search.settled(search.value([Chosen(g, 1.0) for g in machine.groups], None))
+    small = odds_of(search, state)[1]
+    assert 0.0 < small.over_nothing < 9.5
+    assert small.probability > 0.7
+    assert len(borne_out(search, state).chosen) == 2

@@ -200,7 +200,7 @@ def test_rates_do_not_change_the_verdict(bare: SerialModel, every: int) -> None:
 
 
 def test_noise_is_that_of_the_sensors(model: SerialModel) -> None:
-    """Of a torque whose noise is large beside what rounded positions make of accelerations."""
+    """A torque whose noise is large beside what rounded positions make of accelerations."""
     rng = np.random.default_rng(1)
     log = arm_log(NAMED, 21)
     loud = replace(log, torque=log.torque + 0.3 * rng.standard_normal(log.torque.shape))

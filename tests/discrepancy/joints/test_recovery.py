@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.evidence.search import Search, floor_of
+from discrepancy.evidence.search import Chosen, Search, floor_of
 from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import load_model
@@ -201,7 +201,7 @@ def test_what_no_table_lists_goes_with_its_signal(tmp_path: Path) -> None:
     model, logs = load_model(path), [log_of(mujoco.MjSpec.from_string(ARM), seed) for seed in (1, 2)]
 
     def signal(change: Callable[[np.ndarray, np.ndarray], None]) -> tuple[str, str]:
-        """Of the likeliest unlisted function."""
+        """Place and signal of the likeliest unlisted function."""
         read = [replace(log, q=log.q.copy(), torque=np.array(log.torque)) for log in logs]
         for log in read:
             change(log.q, np.asarray(log.torque))
@@ -228,3 +228,18 @@ def test_tolerances_of_a_cause_that_is_left_out_swallow_nothing(tmp_path: Path) 
     verdict = judged(load_model(path), [log_of(spec, 1), log_of(spec, 2)], excluded=("gravity_direction",))
     assert verdict.verdict == "miscalibrated"
     assert [s.cause for s in verdict.scatter] == ["gravity_direction"]
+
+
+def test_what_gives_way_to_gravity_is_no_error_of_a_reading_besides(tmp_path: Path) -> None:
+    """An elastic joint is off by a function of its position, too: one excludes the other in a set."""
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM, encoding="utf-8")
+    model, log = load_model(path), log_of(mujoco.MjSpec.from_string(ARM), 1)
+    problem = joint_problem(model, trials_of(model, [log]).runs)
+    search = Search(problem, floor_of(problem, problem.slabs()))
+    (elastic, *_) = [g for g in problem.groups if g.cause == "elasticity"]
+    state = search.value([Chosen(elastic, 1.0)], None)
+    offered = {(g.place, list(SIGNALS)[int(dict(g.shape)["signal"])])
+               for _, c in search.offers(state) if (g := c.group).cause == "unlisted"}  # fmt: skip
+    assert (elastic.place, "reading") not in offered
+    assert (elastic.place, "position") in offered

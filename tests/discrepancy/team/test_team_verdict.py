@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from diagnosed import check_finite
+from discrepancy.evidence.odds import odds_of
 from discrepancy.joints.json import verdict_to_dict
 from discrepancy.result.read import read_diagnosis
 from discrepancy.result.report import format_verdict
@@ -38,16 +39,20 @@ def searched(request: HiddenSet) -> tuple[TeamOutcome, dict[str, Any]]:
     return outcome, sealed.open({"found": []})
 
 
+def told(outcome: TeamOutcome) -> TeamDiagnosed:
+    return TeamDiagnosed(judged_team(outcome, odds_of(outcome.search, outcome.state)), outcome)
+
+
 @pytest.fixture(scope="module")
 def faulty() -> tuple[TeamDiagnosed, dict[str, Any]]:
     """Of a torque's zero that is off."""
     outcome, truth = searched(quick_set("single", 2, "sea_bias", payload="b"))
-    return TeamDiagnosed(judged_team(outcome)), truth
+    return told(outcome), truth
 
 
 @pytest.fixture(scope="module")
 def healthy() -> TeamDiagnosed:
-    return TeamDiagnosed(judged_team(searched(quick_set("clean", 6, payload="b"))[0]))
+    return told(searched(quick_set("clean", 6, payload="b"))[0])
 
 
 def keys_of(values: Any) -> Any:

@@ -74,12 +74,11 @@ def found_at(
 def _exact(trial: TrialLinear, units: ArmUnit, shared: Shared, local: Array) -> Array:
     """Rows of a trial with other robots and unknowns, shape (n, C)."""
     s = trial.signals
-    as_read = _as_read(trial)
-    signals = Signals(s.time, *true_joints(units, *as_read), s.rate_hz, s.sampling)
+    signals = Signals(s.time, *true_joints(units, *as_read(trial)), s.rate_hz, s.sampling)
     return exact_residual(signals, shared, trial.bases.moved(-local), units, trial.reduction)
 
 
-def _as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
+def as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
     """phi, theta, tau as the sensors read them, shape (Q, N, 3) each."""
     s = trial.signals
     if not isinstance(trial.arms, ArmUnit):
