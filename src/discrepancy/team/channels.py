@@ -1,6 +1,6 @@
 """The channels of a team's rows: every robot's loop closed with robot 1's, then the payload's balance."""
 
-from discrepancy.rig import Channel
+from discrepancy.channel import Channel
 
 
 def channels_of(robots: int) -> list[Channel]:
@@ -11,8 +11,3 @@ def channels_of(robots: int) -> list[Channel]:
         out += [Channel(f"grasp {i} position {a}", "kinematic", i, "m") for a in "xyz"]
     out += [Channel(f"force {a}", "balance", None, "N") for a in "xyz"]
     return out + [Channel(f"moment {a}", "balance", None, "N m") for a in "xyz"]
-
-
-def groups_of(robots: int) -> list[int]:
-    """Group of every channel: every robot's loop is one, and so are the forces and the moments, shape (6 N,)."""
-    return [k // 6 for k in range(6 * (robots - 1))] + [robots - 1] * 3 + [robots] * 3

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discrepancy import rules
+from discrepancy.team import constants
 from discrepancy.team.linear.chatter import Fast
 from discrepancy.team.linear.signals import Signals
 
@@ -24,7 +24,7 @@ def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
     robot, joint = np.unravel_index(int(np.argmax(lines)), lines.shape)
     return (
         f"The torque of driven joint {joint + 1} of robot {robot + 1} oscillates faster than "
-        f"{rules.NOISE_ABOVE_HZ:g} Hz, with {lines[robot, joint]:.2g} N m rms, as if its loop were unstable "
+        f"{constants.NOISE_ABOVE_HZ:g} Hz, with {lines[robot, joint]:.2g} N m rms, as if its loop were unstable "
         "(mocobot inspect says at what frequency). The mean of what that does to torques and friction is in the model, "
         "as far as the samples tell it; what it does to readings that are not linear is in no cause.",
     )

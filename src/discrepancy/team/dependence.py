@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.linear.whitening import Whitening
 from estimator.arrays import Array
 from estimator.rigid_team.slots import PHI, TAU, THETA
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from discrepancy import rules
 from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.evidence.until import Until
+from discrepancy.team import constants
 from discrepancy.team.around import around, exact, opened_by, placed
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
@@ -96,7 +96,7 @@ def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem
         problem, miss = exact(problem, state)
         search = replace(search, problem=problem, best=None)
         state = search.settled(search.value(state.chosen, state.posterior))
-        if miss < rules.STRAIGHT_CHI2_PER_N:
+        if miss < constants.STRAIGHT_CHI2_PER_N:
             break
-        same = same and miss < rules.STRAIGHT_BESIDE_CHI2_PER_N
+        same = same and miss < constants.STRAIGHT_BESIDE_CHI2_PER_N
     return problem, search, state, same

@@ -2,52 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.least_squares.patches import Patches
-from discrepancy.least_squares.stored import stored
-from discrepancy.least_squares.whitening import Whitening, whitened
-from discrepancy.rig import Channel, Rig, Rows
+from discrepancy.channel import Channel
 from discrepancy.team.candidates import (
     every_candidate,
-    explained_by,
     further_shapes,
     indices,
     is_adjusted,
     is_kept,
     other_shapes,
     shape_steps,
-    worst_events,
 )
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.channels import channels_of, groups_of
-from discrepancy.team.imitators import wrong_torques
+from discrepancy.team.channels import channels_of
 from discrepancy.team.linear.adjust import as_loud, noise_of
-from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.filed import OneByOne, is_filed, rested
-from discrepancy.team.linear.origin import beyond, origin_of
-from discrepancy.team.linear.rest import limits_of
+from discrepancy.team.linear.origin import beyond
+from discrepancy.team.linear.patches import Patches
+from discrepancy.team.linear.rest import HEALTHY, limits_of
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, sensed_in, start_shared
+from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.stored import stored
 from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.linear.whitening import Whitening, whitened
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
-from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared
 
 
 @dataclass(frozen=True, eq=False)
-class TeamRows(Rig):
+class Rows:
+    """One trial's whitened residual and the columns of its unknowns, n rows of C channels.
+
+    Attributes:
+        residual: shape (n, C); unit variance and independent if nothing is wrong.
+        local: columns of the trial's own unknowns, shape (n, C, l).
+        shared: columns of the unknowns of all trials, shape (n, C, s).
+    """
+
+    residual: Array
+    local: Array
+    shared: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TeamRows:
     """Recordings of one payload, linearised around the best unknowns without any cause.
 
     Attributes:
@@ -59,7 +67,6 @@ class TeamRows(Rig):
         origin: how far from the robots as they were believed to be all is linear; None for not at all.
         resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
         jobs: parallel processes.
-        missed, beside, rewhitened: as of ``Rig``.
         laws: whether to look for what no table lists: where noise is loud (``auto``), ``always`` or ``never``.
         kept: whitened columns that are asked for again and again.
     """
@@ -72,9 +79,6 @@ class TeamRows(Rig):
     origin: ArmUnit | None = None
     resting: Mapping[str, float] = field(default_factory=dict)
     jobs: int = 1
-    missed: float = 0.0
-    beside: bool = False
-    rewhitened: bool = False
     laws: str = "auto"
     kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
@@ -117,31 +121,6 @@ class TeamRows(Rig):
     def whitening(self) -> tuple[Whitening, ...]:
         """Of every trial."""
         return self.sensed.whitening
-
-    def relinearised(self, found: Hypothesis) -> Self | None:
-        """The rig at the robots as a fit finds them, with its causes, where straight columns do not reach that far."""
-        try:
-            there = found_at(self.linear, self.whitening, found, self.origin)
-        except InputError:  # no such robots: what acts on these is something else
-            return None
-        resting = resting_of(found)
-        same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
-        near = rules.STRAIGHT_BESIDE_CHI2_PER_N if found.free else rules.STRAIGHT_CHI2_PER_N
-        straight = there.curvature < near
-        if straight and same:
-            return None
-        sensed, limits = self.sensed, limits_of(self.tolerances, resting)
-        if not same:  # what noise leaves where what rests scatters so; the sensors are the same
-            sensed = sensed_in(self.linear, self.sensed.noise, limits, self.jobs, sensed)
-        resting = self.resting if same else resting
-        if straight:  # robots and unknowns stay
-            return replace(
-                self, sensed=sensed, resting=resting, kept={}, missed=there.curvature, rewhitened=True
-            )
-        moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
-        known = there.origin, resting, self.jobs, sensed, explained_by(found.fit.active, there.origin)
-        rig = self._at(moved, there.shared, self.tolerances, self.excluded, *known)
-        return replace(rig, missed=there.curvature, beside=bool(found.free), rewhitened=not same)
 
     @property
     def trials(self) -> Sequence[str]:
@@ -216,11 +195,6 @@ class TeamRows(Rig):
                 signals = signals.minus(seen.phi - true.phi, seen.theta - true.theta, seen.tau - true.tau)
         return signals, others
 
-    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
-        """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
-        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return CAUSES[candidate.cause].possible(values, se, candidate.shape)
-
     def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
         if (key := ("open", *candidate.trace)) in self.kept:
             return self.kept[key]
@@ -230,47 +204,9 @@ class TeamRows(Rig):
             self.kept[key] = own
         return own
 
-    def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
-        for t, linear in enumerate(self.linear):
-            causes = self._each(lambda k, t=t: self._columns(t, candidates[k]), len(candidates))
-            residual = self.whitening[t](linear.residual)
-            for k, candidate in enumerate(candidates):
-                there = origin_of(candidate, self.origin)
-                residual += 0.0 if there is None else causes[k] @ there
-            local = np.concatenate([linear.by_bases, linear.by_clocks], axis=2)
-            yield Rows(
-                self.recordings[t].name, residual, self.whitening[t](local), self.whitening[t](linear.by_shared),
-                causes, linear.reduction.time, linear.reduction.moving, groups_of(self.robots),
-            )  # fmt: skip
-
-    def _at_origin(self, trial: int, candidate: Candidate) -> Array | float:
-        """What the robots, as they were found, have of it: out of the residual, for values count from the design."""
-        there = origin_of(candidate, self.origin)
-        return 0.0 if there is None else self._columns(trial, candidate) @ there
-
-    def _all_at_origin(self, trial: int) -> Array:
-        """The same of all candidates, shape (n, C)."""
-        key = (trial, "origin")
-        if key not in self.kept:
-            self.kept[key] = np.zeros(self.linear[trial].residual.shape)
-            self.kept[key] += sum(self._at_origin(trial, c) for c in self.candidates())
-        return self.kept[key]
-
     def beyond(self, candidate: Candidate, values: Array) -> Array:
         """Values beyond what the robots, as they were found, have already."""
         return beyond(candidate, values, self.origin)
-
-    def residual(
-        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
-    ) -> list[Array]:
-        there = {candidate.key for candidate, _ in active}
-        left = self.residual_there(shared, local, active)
-        return [
-            x
-            + self._all_at_origin(t)
-            - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there)
-            for t, x in enumerate(left)
-        ]
 
     def residual_there(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
@@ -299,14 +235,13 @@ class TeamRows(Rig):
     def further(self, candidate: Candidate) -> list[Candidate]:
         return further_shapes(candidate, len(self.linear))
 
-    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
-        """Pushes at the intervals where the wrench balance is worst."""
-        reductions = [linear.reduction for linear in self.linear]
-        return worst_events(reductions, remaining, self.tolerances, self.excluded)
-
-    def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:
-        """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""
-        return wrong_torques(self.linear, self.whitening, candidate)
-
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         return shape_steps(candidate)
+
+    def rows(self) -> list[Rows]:
+        """Whitened rows of every trial where all is linear."""
+        out = []
+        for linear, white in zip(self.linear, self.whitening, strict=True):
+            local = np.concatenate([linear.by_bases, linear.by_clocks], axis=2)
+            out.append(Rows(white(linear.residual), white(local), white(linear.by_shared)))
+        return out

@@ -11,7 +11,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate, Parameter
 from discrepancy.inference.learn import learnt, worth_spreads
 from discrepancy.inference.twins import twins
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rows
 from linear_problem import cosines, random_rows, with_residuals

@@ -9,7 +9,7 @@ from discrepancy.inference.offer.propose import proposals
 from discrepancy.inference.scan import scan
 from discrepancy.inference.search import search
 from discrepancy.inference.shape.sharpen import sharpened
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.evidence_list import evidence_list
 from fake_rig import CHANNELS, ROWS, FakeRig, cause, found_in, names

@@ -11,7 +11,7 @@ from discrepancy.inference.base import based
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.search import search
 from discrepancy.inference.straightened import Beside, straightened
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, CHANNELS, ROWS, FakeRig
 

@@ -9,7 +9,7 @@ from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.inference.learn import learnt
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.sensitivity import detection_limits
 from fake_rig import CHANNELS, ROWS, FakeRig, cause

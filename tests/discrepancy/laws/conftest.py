@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.laws.bench import TeamBench
 from team_case import exact
 

@@ -7,7 +7,7 @@ import pytest
 
 from discrepancy.laws.candidate import candidate_of
 from discrepancy.laws.term import Term
-from discrepancy.laws.variable import TIME, Variable
+from discrepancy.team.laws.variable import TIME, Variable
 from discrepancy.team.laws.places import places_of, twin_of
 from estimator.estimate.principal import inertia_parameters
 from estimator.rigid_team.residual import Bases

@@ -6,9 +6,9 @@ import pytest
 from discrepancy.laws.candidate import candidate_of, law_steps, refined
 from discrepancy.laws.dictionary import nearby, of_own, terms_at
 from discrepancy.laws.functions import FUNCTIONS, knots_of
-from discrepancy.laws.place import Place
+from discrepancy.team.laws.place import Place
 from discrepancy.laws.term import Term
-from discrepancy.laws.variable import TIME, Variable
+from discrepancy.team.laws.variable import TIME, Variable
 from mocobot_sim.laws.functions import FUNCTIONS as SIMULATED
 from mocobot_sim.laws.functions import Inside
 

@@ -8,7 +8,7 @@ import pytest
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.laws.candidate import LawCandidate, candidate_of
 from discrepancy.laws.term import Term
-from discrepancy.laws.variable import TIME
+from discrepancy.team.laws.variable import TIME
 from discrepancy.rules import LAW_READING_LEAST
 from discrepancy.team.causes.base import one_joint, one_robot
 from discrepancy.team.laws.misreading import Misreading

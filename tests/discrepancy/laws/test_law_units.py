@@ -10,7 +10,7 @@ from discrepancy.laws.dictionary import of_own, of_time, terms_at
 from discrepancy.laws.said.numbers import physical
 from discrepancy.laws.said.units import units_of
 from discrepancy.laws.term import Term
-from discrepancy.laws.variable import TIME
+from discrepancy.team.laws.variable import TIME
 from discrepancy.team.laws.places import places_of
 from discrepancy.team.laws.variables import joint_variable, payload_variable, variables_of
 

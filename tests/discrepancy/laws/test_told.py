@@ -7,7 +7,7 @@ from scipy.linalg import block_diag
 from discrepancy.laws.told import Beside
 from discrepancy.least_squares.columns import Columns
 from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, noise_covariance, random_rows
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discrepancy.least_squares.cell_grams import CellGrams
-from discrepancy.least_squares.stored import is_stored
+from discrepancy.team.linear.stored import is_stored
 
 K, ROWS, W = 3, 30, 6
 

@@ -10,7 +10,7 @@ from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held, portions
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.gram import orthonormal, project
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, random_rows
 

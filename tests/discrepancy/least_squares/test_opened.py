@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.gram import orthonormal
 from discrepancy.least_squares.opened import Opened, through
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, brute, random_rows
 from test_problem import same_fit, same_problem

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discrepancy.least_squares.gram import gram_of, orthonormal
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.least_squares.span import Span
 from patchwork import patchwork
 

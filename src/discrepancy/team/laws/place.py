@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from discrepancy.laws.variable import Variable
+from discrepancy.team.laws.variable import Variable
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from discrepancy import rules
+LAW_SLOW_RAD_PER_S = 4e-3
+"""Below which a direction of motion fades. Chosen: as in the friction of the catalogue."""
 
 Kind = Literal[
     "time", "angle", "travel", "rate", "acceleration", "torque", "direction", "position", "velocity", "tilt", "vector"
@@ -34,7 +35,7 @@ class Variable:
     symbol: str
     unit: str
     kind: Kind
-    slow: float = rules.LAW_SLOW_RAD_PER_S
+    slow: float = LAW_SLOW_RAD_PER_S
     wave: float = 1.0
     parts: tuple[Variable, ...] = ()
     turns: tuple[Variable, ...] = ()

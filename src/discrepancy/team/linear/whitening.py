@@ -9,9 +9,21 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_toeplitz, solve_triangular
 
-from discrepancy import rules
-from discrepancy.least_squares.patches import Patch, Patches
+from discrepancy.team.linear.patches import Patch, Patches
 from estimator.arrays import Array
+
+SHRINKAGE_SHARE = 0.05
+"""By which the channels' covariance is drawn to its diagonal at least. Chosen."""
+
+LOUD_POWER = 2.25
+"""Noise of a row, in squares of that of the others, above which it has a weight of its own. Derived: four standard
+deviations of a mean square of 24 draws (a team's ``NOISE_DRAWS``), sqrt(2/24) = 0.29, above 1."""
+
+ROWS_PER_COEFFICIENT = 10
+"""A series must have more rows than so many for each coefficient, or stays as it is. Chosen."""
+
+AR_ORDER = 2
+"""Autoregression of whitened channels, unless a rig says otherwise. Chosen: rows are nearly white already."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +47,7 @@ class Whitening:
     loudness: Array
 
     @classmethod
-    def of(cls, draws: Array, moving: int, order: int = rules.AR_ORDER, *, uneven: bool = False) -> Whitening:
+    def of(cls, draws: Array, moving: int, order: int = AR_ORDER, *, uneven: bool = False) -> Whitening:
         """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series.
 
         Args:
@@ -51,11 +63,11 @@ class Whitening:
         if uneven and moving:
             power = np.mean(draws[:, :moving] ** 2, axis=0)
             power /= np.maximum(np.median(power, axis=0), 1e-300)
-            loudness = np.where(power > rules.LOUD_POWER, np.sqrt(power), 1.0)
+            loudness = np.where(power > LOUD_POWER, np.sqrt(power), 1.0)
         even = draws[:, :moving] / loudness
         chol_moving, chol_alone = _cholesky(even), _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, order)), np.ones(channels)
-        if order and moving > rules.ROWS_PER_COEFFICIENT * order:
+        if order and moving > ROWS_PER_COEFFICIENT * order:
             flat = _per_row(_inverse(chol_moving), even.reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
             lag = np.array(
@@ -129,7 +141,7 @@ def _cholesky(draws: Array) -> Array:
     if not len(rows):
         return np.eye(channels)
     covariance = rows.T @ rows / len(rows)
-    weight = rules.SHRINKAGE_SHARE + (1.0 - rules.SHRINKAGE_SHARE) * min(1.0, channels / len(rows))
+    weight = SHRINKAGE_SHARE + (1.0 - SHRINKAGE_SHARE) * min(1.0, channels / len(rows))
     diagonal = np.diag(np.diag(covariance) + 1e-30)
     factor = np.linalg.cholesky((1.0 - weight) * covariance + weight * diagonal)
     return np.array(factor, dtype=np.float64)

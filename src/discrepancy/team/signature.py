@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from discrepancy.digits import three_digits
-from discrepancy.rig import Rig
+from discrepancy.team.rows import TeamRows
 from estimator.arrays import Array
 
 
-def signature(rig: Rig, z: Sequence[Array]) -> dict[str, Any]:
+def signature(rig: TeamRows, z: Sequence[Array]) -> dict[str, Any]:
     """Describe what is left of the whitened residual beyond noise, shape (n, C) a trial, as plain numbers.
 
     Returns:
@@ -46,7 +46,7 @@ def signature(rig: Rig, z: Sequence[Array]) -> dict[str, Any]:
     return out
 
 
-def _median_frequency(rig: Rig, z: Sequence[Array], channel: int) -> float:
+def _median_frequency(rig: TeamRows, z: Sequence[Array], channel: int) -> float:
     power, at = 0.0, None
     for t, x in enumerate(z):
         rate = rig.row_rate_hz(t)
@@ -57,7 +57,7 @@ def _median_frequency(rig: Rig, z: Sequence[Array], channel: int) -> float:
     return float(at[np.searchsorted(total, 0.5 * total[-1])]) if at is not None else 0.0
 
 
-def _along(rig: Rig, z: Sequence[Array]) -> dict[str, float]:
+def _along(rig: TeamRows, z: Sequence[Array]) -> dict[str, float]:
     """Share of the squared residual along each source's own direction (one of C dimensions, or a few)."""
     shares: dict[str, list[float]] = {}
     total = sum(float(np.sum(x**2)) for x in z)
