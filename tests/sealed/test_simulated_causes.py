@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from sealed.measure import Bench
 
 from hidden.schedule import Schedule
 from mocobot_sim.effects import make_effect
-from sealed.measure import Bench
 
 pytestmark = pytest.mark.slow
 HOME_M = np.array([0.0, 0.0, 0.355])
