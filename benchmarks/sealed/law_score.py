@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,11 +142,12 @@ def _place(cause: Item, effect: Item, truth: Item) -> bool:
 
 def _variable(cause: Item, effect: Item) -> bool:
     """Whether it is a function of the signals of the truth; those of a parallel axis are the same."""
-    law, here = cause["law"] or {}, effect["law"]["place"]
+    law = cause["law"] or {}
     found = {name for name in (law.get("of") or signal_of(cause), law.get("times")) if name}
-    own = {"_".join(name.split("_")[:-2]) if here.get("joint") and name != "time" else name for name in found}
+    joint = re.search(r"(\d+) of robot (\d+)", cause["place"])
+    own = {name.removesuffix(f"_{joint[2]}_{joint[1]}") if joint else name for name in found}
     if effect["cause"] == "cross_talk":
-        return found == {f"tau_{here['robot']}_{int(effect['parameters']['neighbour'])}"}
+        return found == {f"tau_{effect['law']['place']['robot']}_{int(effect['parameters']['neighbour'])}"}
     if effect["cause"] == "shifting_load":
         return all(name.startswith(("payload_felt", "payload_up", "payload_acceleration")) for name in found)
     return own in VARIABLES.get(effect["cause"], (own,))  # of an event any

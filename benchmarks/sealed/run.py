@@ -5,8 +5,8 @@
     python benchmarks/sealed/run.py --tables                                # or --misses
 
 Parts are ``single``, ``pairs``, ``clean``, ``triples``, ``forms`` (other than the catalogue's), ``unlisted``,
-``sliding`` (stiction and play), ``uncalibrated`` (one fault in a team that nobody calibrated), ``logs`` (healthy, by any
-lab's logger and ``mocobot convert``), ``long`` (an hour), and those of ``sealed.sets``.
+``sliding`` (stiction and play), ``uncalibrated`` (one fault in a team that nobody calibrated), ``logs`` (healthy, by
+any lab's logger and ``mocobot convert``), ``long`` (an hour), and those of ``sealed.sets``.
 
 Sets and results are kept in the output folder, and skipped when the command is given again. Recordings and truth
 stay, so that engines can be compared on the same ones: give each a ``--label``. Simulations and diagnoses are steps of

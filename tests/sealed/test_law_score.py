@@ -11,6 +11,7 @@ from team_case import exact
 
 NAMES = {form.cause for form in (*UNLISTED, *OUTSIDE)}
 TORQUE = "reading of the torque sensor of driven joint {} of robot 2"
+TORQUE_1 = TORQUE.format(1)
 EFFECT = {
     "cause": "quadratic_reading",
     "parameters": {"per_Nm": 0.002},
@@ -34,7 +35,7 @@ def test_places_are_called_as_verdicts_call_them():
             assert any(name.startswith(plain) for name in known), word
 
 
-def unlisted(place=TORQUE.format(1), signal="tau_2_1", law=None):
+def unlisted(place=TORQUE_1, signal="tau_2_1", law=None):
     kind = f"something unlisted by its {signal}"
     return {"cause": "unlisted", "kind": kind, "place": place, "law": law}
 
