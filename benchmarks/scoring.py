@@ -15,6 +15,8 @@ LEAST = 1e-3
 """Least probability that a score takes: the engine's own numbers are not good to more."""
 CHANGED = 10
 """Settings that are changed for a set."""
+AS_THEY_ARE = "as they are"
+"""Settings of which none is changed, in words."""
 
 
 def log_score(stated: Sequence[tuple[float, bool]]) -> float:

@@ -19,7 +19,7 @@ import discrepancy
 import mocobot
 from discrepancy.team import diagnosis
 from mocobot_sim.errors import TrialError
-from scoring import changed_settings
+from scoring import AS_THEY_ARE, changed_settings
 from sealed import store
 from sealed.law_score import score_laws
 from sealed.sets import SealedSet
@@ -88,7 +88,7 @@ def change_settings(requests: Sequence[SealedSet], how: How) -> None:
         changes: Iterator[tuple[str, Any]] = changed_settings(
             requests[0].seed, 2.0 if request.seed % 2 else 0.5
         )
-        for words, settings in [("as they are", None), *changes]:
+        for words, settings in [(AS_THEY_ARE, None), *changes]:
             key = f"{request.key}, {words}"
             if key not in done:
                 apart([request], lambda one: _changed(one, how, key, words, settings), 1)  # noqa: B023

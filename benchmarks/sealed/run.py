@@ -1,8 +1,8 @@
 """The sealed campaign: simulate sets, diagnose them blind, print the tables.
 
     python benchmarks/sealed/run.py --part PART --first SEED --draws N
-    python benchmarks/sealed/run.py --settings --draws 20 --label settings  # of the engine, halved and doubled
-    python benchmarks/sealed/run.py --tables                                # or --misses
+    python benchmarks/sealed/run.py --settings --draws 20                   # of the engine, halved and doubled
+    python benchmarks/sealed/run.py --tables                                # or --misses; with --settings
 
 Parts are ``single``, ``pairs``, ``clean``, ``triples``, ``forms`` (other than the catalogue's), ``unlisted``,
 ``sliding`` (stiction and play), ``uncalibrated`` (one fault in a team that nobody calibrated), ``logs`` (healthy, by
@@ -55,7 +55,7 @@ class Options:
         jobs: processes.
         only: simulate or diagnose only.
         kept: diagnose every set that is in the folder, whatever its seed.
-        label: name of the results.
+        label: name of the results; ``results`` or ``settings`` if not given.
         background: the robots; drawn if not given.
         factors: sizes over the limit, in turn; drawn if none is given.
         names: causes or forms, in turn; drawn if none is given.
@@ -76,7 +76,7 @@ class Options:
     jobs: int = 1
     only: Literal["both", "simulate", "diagnose"] = "both"
     kept: bool = False
-    label: str = "results"
+    label: str = ""
     background: Background | None = None
     factors: tuple[float, ...] = ()
     names: tuple[str, ...] = ()
@@ -111,7 +111,8 @@ def planned(options: Options) -> Sequence[SealedSet]:
 
 def main(options: Options) -> None:
     """Run, or print what was run."""
-    how = How(options.out, options.label, options.jobs, options.cpu_s, options.closed_loop, options.keep)
+    label = options.label or ("settings" if options.settings else "results")
+    how = How(options.out, label, options.jobs, options.cpu_s, options.closed_loop, options.keep)
     if options.tables or options.misses:
         print((tables if options.tables else misses)(store.read(how.path)))
         return

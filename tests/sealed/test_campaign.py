@@ -10,7 +10,7 @@ from discrepancy.team.causes import CAUSES
 from hidden.schedule import Schedule
 from mocobot.campaign.summary import interval
 from mocobot_sim.effects import EFFECTS
-from scoring import log_score
+from scoring import AS_THEY_ARE, log_score
 from sealed import campaign, store
 from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
 from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
@@ -349,6 +349,19 @@ def test_tables_and_misses_of_a_small_campaign():
     assert "| 50 to 70 % | 2 | 55.0 % | 1 (1 .. 99 %) |" in text
     assert "1 x ValueError: no" in text
     assert len(misses(results).splitlines()) == 3
+
+
+def test_verdicts_that_a_setting_changes_are_counted():
+    named = [_named() | {"place": "robot 2, joint 1"}]
+    results = [
+        _result([_effect()], causes) | {"key": f"{key}, {words}", "change": words}
+        for key, words, causes in (
+            ("1", AS_THEY_ARE, named), ("1", "apart 3 -> 6", []), ("2", AS_THEY_ARE, []), ("2", "apart 3 -> 6", [])
+        )
+    ]  # fmt: skip
+    text = tables(results)
+    assert "apart 3 -> 6: 1 of 2 verdicts change" in text
+    assert "| apart 3 -> 6 | 2 | 0 of 2 |" in text
 
 
 def test_what_is_wrong_with_certainty_costs_no_more_than_a_thousandth():
