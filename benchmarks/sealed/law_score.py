@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +26,21 @@ class LawScore:
     """How well an unlisted effect was told.
 
     Attributes:
-        which: of the verdict's unlisted ones, from 0; None where there is none.
+        which: of the verdict's unlisted ones, from 0, those that are located: a vector has one for each axis.
         place, variable, formula: whether these are right; ``formula`` also of a curve that is like it.
         size: error of the law's size, as a share; None without a law at the right place.
     """
 
-    which: int | None = None
+    which: tuple[int, ...] = ()
     place: bool = False
     variable: bool = False
     formula: bool = False
     size: float | None = None
-    located: bool = False
+
+    @property
+    def located(self) -> bool:
+        """Whether place and signal are right."""
+        return bool(self.which)
 
 
 def score_laws(result: Item, trials: Sequence[Path]) -> list[LawScore]:
@@ -47,23 +51,25 @@ def score_laws(result: Item, trials: Sequence[Path]) -> list[LawScore]:
     for effect in result["truth"]["effects"]:
         if not effect.get("law"):
             continue
-        taken = {one.which for one in out if one.located}
+        taken = {k for one in out for k in one.which}
         each = [
             _score(k, cause, effect, result["truth"], recordings)
             for k, cause in enumerate(told) if k not in taken
         ]  # fmt: skip
-        out.append(max(each, key=lambda one: (one.place, one.variable, one.formula), default=LawScore()))
+        best = max(each, key=lambda one: (one.place, one.variable, one.formula), default=LawScore())
+        out.append(replace(best, which=tuple(k for one in each for k in one.which)))
     return out
 
 
 def _score(which: int, cause: Item, effect: Item, truth: Item, recordings: Sequence[Recording]) -> LawScore:
     place = _place(cause, effect, truth)
     variable, law = place and _variable(cause, effect), cause["law"]
+    here = (which,) if variable else ()
     if not (place and law):
-        return LawScore(which, place, variable, located=variable)
+        return LawScore(here, place, variable)
     share, size = _alike(law, effect, recordings)
     named = law["function"] in FORMULAS.get(effect["cause"], ()) and _inside(law["numbers"], effect)
-    return LawScore(which, place, variable, named or share < LIKE, size, located=variable)
+    return LawScore(here, place, variable, named or share < LIKE, size)
 
 
 PLACES: dict[str, tuple[str, ...]] = {
@@ -173,11 +179,12 @@ def _alike(law: Item, effect: Item, recordings: Sequence[Recording]) -> tuple[fl
     found, wanted = (np.concatenate([pair[k] for pair in pairs], axis=1) for k in (0, 1))
     if effect["law"]["of"] == "torque in driven joint" and law["place"] == "tau reading":
         wanted = -wanted
-    found = found[: len(wanted)]  # a force beside its moment
+    if len(wanted) > 1:  # a law is of one axis
+        wanted = wanted[["xyz".index(law["targets"][0][-1])]]
+    if not wanted.any():
+        return math.inf, None
     if np.ptp(wanted) > 1e-9 * np.abs(wanted).max():
         found, wanted = (x - x.mean(axis=1, keepdims=True) for x in (found, wanted))
-    if len(found) != len(wanted):
-        return math.inf, None
     slope = float(np.sum(found * wanted) / np.sum(wanted**2))
     if effect["law"]["of"] == "torque in gimbal axis":  # a parallel axis may turn the other way
         found, slope = math.copysign(1.0, slope) * found, abs(slope)

@@ -57,7 +57,7 @@ class Scored:
     @property
     def right(self) -> int:
         """How many of the hidden effects are told right."""
-        listed = sum(one.right for one in self.scores) + sum(one["located"] for one in self.laws)
+        listed = sum(one.right for one in self.scores) + sum(bool(one["which"]) for one in self.laws)
         open_ = self.verdict in ("unexplained", "partly_explained") or "unlisted" in self._named
         return listed + (sum(map(_is_nobodys, self.scores)) if open_ else 0)
 
@@ -91,10 +91,11 @@ def score(result: Item) -> Scored:
         [c for c in causes if c not in grounded], truth, _factors(set_, truth["effects"]),
         lambda cause: cause in CAUSES and cause not in excluded,
     )  # fmt: skip
-    located = {law["which"] for law in result["law_scores"] if law["located"]}
-    strangers = [c for k, c in enumerate(unlisted) if k not in located]
-    strangers = [] if any(map(_is_nobodys, found.scores)) else strangers
-    more = [(c, True) for c in grounded] + [(c, c not in strangers) for c in unlisted]
+    located = {k for law in result["law_scores"] for k in law["which"]}
+    loose = any(map(_is_nobodys, found.scores))
+    told = [(c, loose or k in located) for k, c in enumerate(unlisted)]
+    strangers = [c for c, right in told if not right]
+    more = [(c, True) for c in grounded] + told
     there = [(float(c["probability"]), right) for c, right in more if c.get("probability") is not None]
     return Scored(
         result, found.scores, found.extras, tuple(grounded), tuple(strangers), (*found.stated, *there)

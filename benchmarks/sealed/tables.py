@@ -45,7 +45,7 @@ def tables(results: Iterable[Result]) -> str:
     return "\n\n".join(table for table in each if table)
 
 
-def rows_of(results: Iterable[Result]) -> dict[str, list[Result]]:
+def rows_of(results: Sequence[Result]) -> dict[str, list[Result]]:
     """Results by what is hidden, its size and the robots, from the whole to the parts; a set may be in several."""
     out: dict[str, list[Result]] = {}
     for result in sorted(results, key=lambda one: (one.get("change", ""), one["set"]["kind"])):
@@ -59,10 +59,9 @@ def rows_of(results: Iterable[Result]) -> dict[str, list[Result]]:
                 if background == "uncalibrated" and result["set"]["names"]
                 else []
             )
-            names += ["all"]
         for name in names:
             out.setdefault(name, []).append(result)
-    return out
+    return out | {"all": list(results)}
 
 
 def _line(name: str, own: Sequence[Result]) -> list[Any]:
@@ -74,7 +73,7 @@ def _line(name: str, own: Sequence[Result]) -> list[Any]:
     return [
         name, len(own),
         f"{sum(one.right for one in good)} of {hidden}" if hidden else "-",
-        f"{sum(law['located'] and law['formula'] for law in laws)} of {len(laws)}" if laws else "-",
+        f"{sum(bool(law['which'] and law['formula']) for law in laws)} of {len(laws)}" if laws else "-",
         _share(sum(one.whole for one in good), len(own)),
         sum(one.certain for one in good),
         f"{log_score(stated):.3f} ({len(stated)})" if stated else "-",

@@ -301,16 +301,18 @@ UNLISTED_ONE = {"cause": "unlisted", "name": "something unlisted", "probability"
 def test_what_nobody_lists_is_right_where_it_is_located():
     effect = _effect() | {"cause": "cross_talk", "law": {"of": "tau reading"}}
     effect["answer"] = {"cause": None, "robot": 2, "joint": 1, "known": {}}
-    for which, located, named, whole, certain in (
-        (0, True, [UNLISTED_ONE], True, 0),
-        (0, False, [UNLISTED_ONE], False, 1),
-        (None, False, [], False, 0),
-        (None, False, [_named(probability=0.95)], False, 1),
-        (0, True, [UNLISTED_ONE, _named(probability=0.5)], False, 0),
+    for which, named, whole, certain in (
+        ((0,), [UNLISTED_ONE], True, 0),
+        ((), [UNLISTED_ONE], False, 1),
+        ((), [], False, 0),
+        ((), [_named(probability=0.95)], False, 1),
+        ((0,), [UNLISTED_ONE, _named(probability=0.5)], False, 0),
+        ((0, 1), [UNLISTED_ONE, UNLISTED_ONE], True, 0),
+        ((0,), [UNLISTED_ONE, UNLISTED_ONE], False, 1),
     ):
-        law = {"which": which, "located": located, "formula": False}
+        law = {"which": which, "formula": False}
         scored = score(_result([effect], named, "unexplained", "unlisted", laws=[law]))
-        assert (scored.whole, scored.certain, scored.right) == (whole, certain, int(located))
+        assert (scored.whole, scored.certain, scored.right) == (whole, certain, int(bool(which)))
 
 
 def test_something_unlisted_beside_a_listed_cause_is_wrong():

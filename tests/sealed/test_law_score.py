@@ -58,7 +58,7 @@ def scored(monkeypatch, *causes):
 
 def test_what_is_located_without_a_formula(monkeypatch):
     one = scored(monkeypatch, unlisted())
-    assert (one.which, one.located, one.formula, one.size) == (0, True, False, None)
+    assert (one.which, one.located, one.formula, one.size) == ((0,), True, False, None)
     assert not scored(monkeypatch, unlisted(signal="tau_2_2")).located
     assert not scored(monkeypatch, unlisted(place=TORQUE.format(2))).place
     assert not scored(monkeypatch).located
@@ -66,7 +66,33 @@ def test_what_is_located_without_a_formula(monkeypatch):
 
 def test_the_nearest_of_several_counts(monkeypatch):
     one = scored(monkeypatch, unlisted(place=TORQUE.format(3)), unlisted())
-    assert (one.which, one.located) == (1, True)
+    assert (one.which, one.located) == ((1,), True)
+
+
+def test_a_force_is_one_law_for_each_axis(monkeypatch):
+    """Each is held against its own component."""
+    recording = exact().carried.recording
+    monkeypatch.setattr("sealed.law_score.read_recording", lambda path: recording)
+    along = {"along_x_m": 0.6, "along_y_m": 0.0, "along_z_m": -0.8}
+    effect = {
+        "cause": "growing_push", "parameters": {"rate_Nps": 0.05} | along,
+        "law": {"of": "force on the payload, in the world", "place": {}},
+    }  # fmt: skip
+    time = recording.time[::20] - recording.time[0]
+    told = [
+        unlisted(
+            f"force and moment on the payload, in the world force {axis}", "time",
+            {"place": "force on payload", "targets": [f"payload_force_{axis}"], "function": "spline", "of": "time",
+             "times": None, "numbers": {},
+             "traces": [{"time_s": time.tolist(), "law": [(factor * 0.05 * time).tolist()]}]},
+        )
+        for axis, factor in (("x", 0.6), ("z", 0.8))
+    ]  # fmt: skip
+    truth = {"effects": [effect], "gimbal_axes_1": []}
+    scores = [
+        score_laws({"truth": truth, "verdict": {"causes": each}}, ["one"])[0] for each in (told, told[1:])
+    ]
+    assert [(one.which, one.formula) for one in scores] == [((0, 1), True), ((0,), False)]
 
 
 def test_the_hidden_law_itself(monkeypatch):
