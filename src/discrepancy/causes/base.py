@@ -1,19 +1,14 @@
 """What the causes of every rig have in common: names, sizes, words."""
 
 import inspect
-import math
 import re
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-
-from discrepancy import rules
 from discrepancy.candidate import Candidate, Parameter, Transient
 from discrepancy.causes.numbers import Numbers, number
-from estimator.arrays import Array
 
 Shape = Mapping[str, float]
 
@@ -31,9 +26,6 @@ class Cause(ABC):
         scales: their typical sizes, where there are no tolerances.
         positive: parameters that cannot be negative.
         transient: whether it acts for a while in one trial.
-        form_share: of its trace, in amplitude, by which a real one has another form than its law.
-        form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
-        scatters: how far a kind of it can scatter, a standard deviation in the unit of its first parameter.
         where: the part of the machine, of what sits at no robot.
         among: of how many it is one, where its shape says at which of many places it sits; 0 where places are listed.
         separate: what experiment would tell it from its look-alikes.
@@ -47,9 +39,6 @@ class Cause(ABC):
     scales: ClassVar[tuple[float, ...]] = ()
     positive: ClassVar[tuple[str, ...]] = ()
     transient: ClassVar[bool] = False
-    form_share: ClassVar[float] = 0.0
-    form_size: ClassVar[float] = 0.0
-    scatters: ClassVar[float] = math.inf
     where: ClassVar[str] = "payload"
     among: ClassVar[int] = 0
     separate: ClassVar[str] = ""
@@ -71,23 +60,14 @@ class Cause(ABC):
             Parameter(name, given.get(name, 0.0), scale)
             for name, scale in zip(self.parameters, self.tolerances or self.scales, strict=True)
         )
-        tolerance = parameters[0].tolerance
         return Candidate(
             self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title,
-            among=self.among, form_share=self.form_share, form_size=self.form_size,
-            most_spread=max(1.0, self.scatters / tolerance) if tolerance else math.inf,
+            among=self.among,
         )  # fmt: skip
 
     def event(self, given: Mapping[str, float], when: Transient) -> Candidate:
         """A transient cause during an interval."""
         return replace(self.candidate(given, when.shape), transient=when)
-
-    def never_negative(self, values: Array, se: Array) -> bool:
-        """Whether nothing that must be positive is negative beyond chance, or what laws leave of others that must."""
-        positive = [k for k, name in enumerate(self.parameters) if name in self.positive]
-        over_se = values[positive] / np.maximum(se[positive], 1e-300)
-        told = float(np.max(over_se, initial=0.0))
-        return bool(np.all(over_se >= -max(rules.NEGATIVE_SE, rules.LAW_SHARE * told)))
 
     def place(self, candidate: Candidate) -> str:
         """Where it is, as a sentence begins."""

@@ -10,8 +10,16 @@ from typing import cast
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from discrepancy import rules
+from discrepancy.team import constants
 from estimator.arrays import Array
+
+SWING_MOST, SWING_START, SWING_EASED = 0.95, 0.9, 0.6
+"""How far it swings at most, over its length, the same while it is sought, and by which share its restoring force is
+less at most. Chosen: a mass beside its pivot is no pendulum."""
+
+SWING_CALM, SWING_WEIGHT, SWING_LEAST_WEIGHT = 0.5, 0.7, 0.3
+"""Change of a round over that of the last, from which rounds go to and fro; by which a new one counts less then, and
+how much at least. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ def swung(
     turned: Sequence[Array],
     lift: Array,
     pendulums: Sequence[Pendulum],
-    rounds: int = rules.SWING_ROUNDS,
+    rounds: int = constants.SWING_ROUNDS,
 ) -> tuple[list[Array], list[Array], Array]:
     """How 1 kg swings on two level ways whose damper turns with what it hangs in, from rest.
 
@@ -100,11 +108,11 @@ def swung(
         ]
         new = weight * _swing(eased, driven) + (1.0 - weight) * swing
         moved = float(np.sqrt(np.mean((new - swing) ** 2) / max(float(np.mean(new**2)), 1e-300)))
-        if moved > rules.SWING_CALM * min(last, 1.0):  # it goes to and fro
-            weight = max(rules.SWING_WEIGHT * weight, rules.SWING_LEAST_WEIGHT)
+        if moved > SWING_CALM * min(last, 1.0):  # it goes to and fro
+            weight = max(SWING_WEIGHT * weight, SWING_LEAST_WEIGHT)
         new *= _within(pendulums, new)
         swing, last, far = new, moved, Far.of(pendulums, new, turned, lift)
-        if moved < rules.SWING_SETTLED:
+        if moved < constants.SWING_SETTLED:
             break
     swings, damped = [], []
     for own, drive, way, rate in zip(pendulums, drives, swing, far.rates, strict=True):
@@ -126,14 +134,14 @@ def _swing(pendulums: Sequence[Pendulum], driven: Sequence[Array]) -> Array:
 
 def _within(pendulums: Sequence[Pendulum], swing: Array) -> Array:
     """By which share swings are to be lessened to stay within their rods, of each way, shape (2, 1, 1)."""
-    most = np.abs(swing[:, 0]).max(axis=1) / [rules.SWING_START * own.length_m for own in pendulums]
+    most = np.abs(swing[:, 0]).max(axis=1) / [SWING_START * own.length_m for own in pendulums]
     return np.asarray(1.0 / np.maximum(most, 1.0))[:, None, None]
 
 
 def _line(own: Pendulum, x: Array, beyond: Array) -> float:
     """By how much the straight line nearest to the restoring force is steeper than that of small swings [1/s^2]."""
     steeper = float(beyond @ x / max(float(x @ x), 1e-300))
-    return max(steeper, -rules.SWING_EASED * own.gravity / own.length_m)
+    return max(steeper, -SWING_EASED * own.gravity / own.length_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +170,7 @@ class Far:
             turned, lift: as of ``swung``.
         """
         (one, two), ((x, dx, ddx), (y, dy, ddy)) = pendulums, swing
-        L, A, most = one.length_m, two.length_m, rules.SWING_MOST
+        L, A, most = one.length_m, two.length_m, SWING_MOST
         x, y = np.clip(x, -most * L, most * L), np.clip(y, -most * min(A, L), most * min(A, L))
         along = np.sqrt(L**2 - x**2)
         rod = np.maximum(A - L + along, (1.0 - most) * A)

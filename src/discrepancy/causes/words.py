@@ -6,9 +6,6 @@ from typing import ClassVar
 from discrepancy.candidate import Candidate
 from discrepancy.causes.base import Cause
 from discrepancy.causes.numbers import Numbers
-from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.said.guess import experiment
-from discrepancy.laws.said.sentence import sentence
 
 
 class Words:
@@ -24,15 +21,11 @@ class Words:
 
     def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
         """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
-        if isinstance(candidate, LawCandidate):
-            return sentence(candidate, values, se)
         cause = self.causes[candidate.cause]
         return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
 
     def separate(self, candidate: Candidate) -> str:
         """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
-        if isinstance(candidate, LawCandidate):
-            return experiment(candidate.at.name)
         return self.causes[candidate.cause].separate
 
     def unit(self, name: str) -> str:

@@ -12,7 +12,7 @@ from discrepancy.causes.numbers import number
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
-from discrepancy.result.evidence_list import label
+from discrepancy.result.pictures.plots_evidence import label
 from discrepancy.result.read import VERDICTS, is_of_joints
 from discrepancy.result.remains import remedy
 from discrepancy.result.text import (

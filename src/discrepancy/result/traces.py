@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from discrepancy.causes.units import Shown, one_each
-from discrepancy.rig import Channel
+from discrepancy.channel import Channel
 from estimator.arrays import Array
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from discrepancy.result.evidence_list import label
+from discrepancy.result.text import NEAREST, NOTHING_WRONG_HERE, SAID
 from scipy.spatial.transform import Rotation
 
 from discrepancy.causes.units import one_each, parameter
-from discrepancy.result.evidence_list import label
 from discrepancy.result.read import (
     AS_FOUND,
     EXTENDED,
@@ -20,7 +21,6 @@ from discrepancy.result.read import (
     read_diagnosis,
 )
 from discrepancy.result.remains import farthest, remains, remedy, sizes_of
-from discrepancy.result.text import NEAREST, NOTHING_WRONG_HERE, SAID
 from discrepancy.result.text_gain import foretold_torques
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate

@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy.candidate import Candidate
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.design import OmnidDesign
@@ -49,7 +49,6 @@ class Cause(base.Cause):
         joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
         determined: numbers of the shape that the data determine, with what ``slope_step`` makes steps of.
-        inexact: those of them that what the law leaves out puts off by a share, as it does the size.
         clipped: the effect's parameters that are zero where the fit has them below.
         by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
         fleeting: whether it has so many shapes that their columns are made anew whenever they are asked for.
@@ -60,7 +59,6 @@ class Cause(base.Cause):
     joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
     determined: ClassVar[Mapping[str, float]] = {}
-    inexact: ClassVar[tuple[str, ...]] = ()
     clipped: ClassVar[tuple[str, ...]] = ()
     by_clocks: ClassVar[bool] = False
     fleeting: ClassVar[bool] = False
@@ -101,10 +99,6 @@ class Cause(base.Cause):
         """The same shape with a number more that the data determine, nought so far; none where that is all."""
         return []
 
-    def recentred(self, values: Array, shape: Shape) -> Shape:
-        """The shape for columns of such values, where these are straight lines in a part of them only."""
-        return shape
-
     def alike(self, shape: Shape) -> int:
         """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
         return self.among
@@ -116,10 +110,6 @@ class Cause(base.Cause):
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
         """Columns of what the cause leaves open in one trial, such as the friction of a joint at rest."""
         return Patches(trial.residual.shape)
-
-    def possible(self, values: Array, se: Array, shape: Shape) -> bool:
-        """Whether such values (standard errors ``se``) can be: nothing negative beyond two standard errors."""
-        return self.never_negative(values, se)
 
     def place(self, candidate: Candidate) -> str:
         """Robot and joint, of a gimbal its axis, too."""

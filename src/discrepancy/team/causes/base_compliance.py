@@ -4,9 +4,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.team.causes.base import stack
 from discrepancy.team.causes.yielding import Yielding, lagging
+
+BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
+"""Compliance times the mass that moves, over the square of the lag, tried where a base gives way: a quarter is damped
+critically; and shares of it tried next. Chosen."""
 
 
 class BaseCompliance(Yielding):
@@ -33,14 +36,14 @@ class BaseCompliance(Yielding):
         times = super().finer(shape)
         if "inertia_s2" not in shape:
             return times
-        inertias = (shape["inertia_s2"] * share for share in rules.BASE_INERTIA_FINER)
+        inertias = (shape["inertia_s2"] * share for share in BASE_INERTIA_FINER)
         return [*({**shape, **time} for time in times), *({**shape, "inertia_s2": x} for x in inertias)]
 
     def further(self, shape):
         """With the robot's mass on the spring; the same lag where forces are slow."""
         if "inertia_s2" in shape:
             return []
-        shares = rules.BASE_INERTIA_SHARES
+        shares = BASE_INERTIA_SHARES
         return [{**shape, "inertia_s2": share * shape["relaxation_s"] ** 2} for share in shares]
 
     def physical(self, values, context):

@@ -4,8 +4,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.team.causes.base import Cause, stack
+
+CREEP_STARTS = 100
+"""How many of them there are, each as likely as the others. Derived: three bases, by a minute in steps of 2 s."""
+
+CREEP_STEP_S = 0.5
+"""Step of slopes by that time. Chosen: what creeps from half a second sooner or later goes nearly the same way."""
+
+CREEP_FINER_S = (-2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0)
+"""By which such a time is moved next. Chosen."""
+
+CREEP_STARTS_S = tuple(3.0 * k for k in range(1, 31))
+"""Into a trial, at which a base may begin to creep, tried first. Chosen: trials last less than a minute and a half."""
 
 
 class BaseCreep(Cause):
@@ -16,7 +27,7 @@ class BaseCreep(Cause):
     parameters = ("x_mps", "y_mps")
     tolerances = (2e-8, 2e-8)
     at = "robot"
-    determined: ClassVar = {"start_s": rules.CREEP_STEP_S}
+    determined: ClassVar = {"start_s": CREEP_STEP_S}
     separate = "A longer recording at rest."
 
     def sentence(self, n):
@@ -27,14 +38,14 @@ class BaseCreep(Cause):
         )
 
     def further(self, shape):
-        return [] if shape else [{"start_s": start_s} for start_s in rules.CREEP_STARTS_S]
+        return [] if shape else [{"start_s": start_s} for start_s in CREEP_STARTS_S]
 
     def finer(self, shape):
-        starts_s = [shape["start_s"] + x for x in rules.CREEP_FINER_S] if shape else []
+        starts_s = [shape["start_s"] + x for x in CREEP_FINER_S] if shape else []
         return [{"start_s": start_s} for start_s in starts_s if start_s > 0.0]
 
     def alike(self, shape):
-        return rules.CREEP_STARTS if shape else self.among
+        return CREEP_STARTS if shape else self.among
 
     def slope_step(self, name, number):
         return self.determined[name]

@@ -5,10 +5,27 @@ from itertools import product
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.causes.base import Shape
 from discrepancy.causes.numbers import Numbers
+from discrepancy.team import constants
 from estimator.arrays import Array
+
+CABLE_STIFFENS_RANGE_PER_M, CABLE_STIFFENS_STEP_PER_M, STRAPS = (-3.0, 1000.0), 20.0, 20
+"""By which share of its stiffness a strap is stiffer per metre of stretch: at least and most, over which slopes are
+taken, and how many are told apart. Chosen: a webbing twice as stiff at 0.02 m has 50 per m; rubber gets softer, not by
+more than 0.3 in 0.1 m."""
+
+CABLE_NEAR_PER_M, CABLE_NEAR_RANGE_PER_M, CABLE_NEAR_STEP_PER_M = 1.0, (0.05, 5.0), 0.4
+"""One over how far away it is tied: at first, at least and most, and over which slopes are taken. Chosen: a room."""
+
+CABLE_STRETCHES_M, CABLE_STRETCH_STEP_M = (0.03, 0.0, 0.1), 0.015
+"""By how much it is stretched at home. Chosen: a carry moves by 0.05 m, so it is slack at times, half of the time, and
+never; steps as above."""
+
+CABLE_TURNS, CABLE_TURN_STEP = (-0.45, 0.45), 0.15
+"""Where a tether that pulls along itself alone comes from: slopes across each of six axes at which a search begins,
+24 ways in all, no direction further off than 33 deg; and over which slopes are taken. Chosen: as far as a Gauss-Newton
+step goes; with a third of that it stopped beside what it was after."""
 
 TURNS, OFFSETS = ("turn_1", "turn_2"), ("offset_1_m", "offset_2_m")
 """Numbers of its shape: where it comes from, as slopes across an axis; where its line passes the centre of mass, along
@@ -16,10 +33,10 @@ the other two axes."""
 STRETCH, NEAR, STIFFENS = "stretch_m", "near_per_m", "stiffens_per_m"
 """By how much it is stretched at home; one over how far away it is tied; by which share it is stiffer per stretch."""
 SLOPE_STEPS: Mapping[str, float] = (
-    dict.fromkeys(TURNS, rules.CABLE_TURN_STEP)
-    | dict.fromkeys(OFFSETS, rules.TETHER_STEP_M)
-    | {STRETCH: rules.CABLE_STRETCH_STEP_M, NEAR: rules.CABLE_NEAR_STEP_PER_M}
-    | {STIFFENS: rules.CABLE_STIFFENS_STEP_PER_M}
+    dict.fromkeys(TURNS, CABLE_TURN_STEP)
+    | dict.fromkeys(OFFSETS, constants.TETHER_STEP_M)
+    | {STRETCH: CABLE_STRETCH_STEP_M, NEAR: CABLE_NEAR_STEP_PER_M}
+    | {STIFFENS: CABLE_STIFFENS_STEP_PER_M}
 )
 
 
@@ -95,23 +112,23 @@ def slack(n: Numbers) -> str:
     return f", along itself alone, is slack below {below} and stiffens by {n('stiffening_N_per_m2', 'N/m^2')}"
 
 
-def every_way(stretches_m: Sequence[float] = rules.CABLE_STRETCHES_M) -> list[Shape]:
+def every_way(stretches_m: Sequence[float] = CABLE_STRETCHES_M) -> list[Shape]:
     """From every side, stretched by so much each."""
-    ways = product(range(6), rules.CABLE_TURNS, rules.CABLE_TURNS, stretches_m)
+    ways = product(range(6), CABLE_TURNS, CABLE_TURNS, stretches_m)
     return [
-        {"side": float(side), TURNS[0]: one, TURNS[1]: two, STRETCH: e, NEAR: rules.CABLE_NEAR_PER_M}
+        {"side": float(side), TURNS[0]: one, TURNS[1]: two, STRETCH: e, NEAR: CABLE_NEAR_PER_M}
         for side, one, two, e in ways
     ]
 
 
 def first_ways() -> list[Shape]:
     """Those that are tried first."""
-    return every_way(rules.CABLE_STRETCHES_M[:1])
+    return every_way(CABLE_STRETCHES_M[:1])
 
 
 def otherwise_slack(shape: Shape) -> list[Shape]:
     """The same cable, slack at other times: no steps lead from one that never is to one that is."""
-    return [{**shape, STRETCH: e} for e in rules.CABLE_STRETCHES_M] if is_cable(shape) else []
+    return [{**shape, STRETCH: e} for e in CABLE_STRETCHES_M] if is_cable(shape) else []
 
 
 def strap(shape: Shape) -> list[Shape]:
@@ -121,7 +138,7 @@ def strap(shape: Shape) -> list[Shape]:
 
 def alike(shape: Shape) -> int:
     """Of how many cables, told apart by their shapes alone, one is one."""
-    return rules.CABLES * (rules.STRAPS if STIFFENS in shape else 1)
+    return constants.CABLES * (STRAPS if STIFFENS in shape else 1)
 
 
 def through(at: Array, shape: Shape) -> Shape:
@@ -137,8 +154,8 @@ def _axis(shape: Shape) -> int:
 
 def _near(shape: Shape) -> float:
     """Within what a room has: one that the data do not tell must not be behind the point."""
-    return float(np.clip(shape[NEAR], *rules.CABLE_NEAR_RANGE_PER_M))
+    return float(np.clip(shape[NEAR], *CABLE_NEAR_RANGE_PER_M))
 
 
 def _stiffens(shape: Shape) -> float:
-    return float(np.clip(shape.get(STIFFENS, 0.0), *rules.CABLE_STIFFENS_RANGE_PER_M))
+    return float(np.clip(shape.get(STIFFENS, 0.0), *CABLE_STIFFENS_RANGE_PER_M))

@@ -4,13 +4,20 @@ from typing import ClassVar
 
 import numpy as np
 
-from discrepancy import rules
+from discrepancy.team import constants
 from discrepancy.team.causes.base import stack
 from discrepancy.team.causes.yielding import Yielding, lagging
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import rate_matrix
 from estimator.arrays import Array
 from estimator.rigid_team.slots import THETA
+
+GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
+"""Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
+
+GRASP_TURNS_M = (0.05, -0.05)
+"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first. Chosen: a flange's
+thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
 
 
 class GraspFlex(Yielding):
@@ -29,11 +36,8 @@ class GraspFlex(Yielding):
     clipped = ("turning_rad_per_N",)
     at = "grasp"
     shapes = (
-        *({"relaxation_s": time_s} for time_s in sorted(rules.RELAXATIONS_S)),  # no base moves along
-        *(
-            {"relaxation_s": min(rules.RELAXATIONS_S), "offset_m": offset_m}
-            for offset_m in rules.GRASP_TURNS_M
-        ),
+        *({"relaxation_s": time_s} for time_s in sorted(constants.RELAXATIONS_S)),  # no base moves along
+        *({"relaxation_s": min(constants.RELAXATIONS_S), "offset_m": offset_m} for offset_m in GRASP_TURNS_M),
     )
     determined: ClassVar = {**Yielding.determined, "offset_m": 0.1}
     separate = (
@@ -54,8 +58,8 @@ class GraspFlex(Yielding):
         times = super().finer(shape)
         if "offset_m" not in shape:
             return times
-        least_m, most_m = rules.GRASP_TURNS_RANGE_M
-        offsets_m = (shape["offset_m"] * share for share in rules.GRASP_TURNS_FINER)
+        least_m, most_m = GRASP_TURNS_RANGE_M
+        offsets_m = (shape["offset_m"] * share for share in GRASP_TURNS_FINER)
         near = [{**shape, "offset_m": x} for x in offsets_m if least_m <= abs(x) <= most_m]
         return [*({**shape, **time} for time in times), *near]
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.team.causes.base import ReadingError, one_joint
 from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
 
@@ -32,10 +31,6 @@ class LinkLength(ReadingError):
             if n.values.get(name)
         ]
         return "the leg deviates from its design: " + (", ".join(words) or "by nothing that shows")
-
-    def possible(self, values, se, shape):
-        """No leg is built that far from its drawing: such values stand for something else."""
-        return bool(np.all(np.abs(values) < rules.LENGTH_MOST_M))
 
     def errors(self, signals, robot, joint, shape, design):
         angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, design)

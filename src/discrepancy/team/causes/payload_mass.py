@@ -2,11 +2,17 @@
 
 import numpy as np
 
-from discrepancy import rules
+from discrepancy.team import constants
 from discrepancy.team.causes.base import Cause
 from estimator.arrays import Array
 from estimator.inertia import ORDER, inertia_matrix, inertia_parameters
 from estimator.rigid_team.residual import balance
+
+MASS_SPANS = 5
+"""Up to which trial one may be there for some trials only. Chosen: of five, each span; of more, only what stays."""
+
+MASS_TRIALS = 12
+"""With which another mass may begin at most. Chosen: more are no experiment but a log."""
 
 INERTIAS = tuple("xyz"[i] + "xyz"[j] for i, j in ORDER)
 
@@ -28,11 +34,11 @@ class PayloadMass(Cause):
     scales = (0.01, *(0.003,) * 3, *(0.001,) * 6)  # 10 g at 0.3 m
     at = "payload"
     shapes = (
-        {"over_s": rules.MASS_OVER_S},
-        *({"trial": float(first), "last_trial": 0.0} for first in range(2, rules.MASS_TRIALS + 1)),
+        {"over_s": constants.MASS_OVER_S},
+        *({"trial": float(first), "last_trial": 0.0} for first in range(2, MASS_TRIALS + 1)),
         *(
             {"trial": float(first), "last_trial": float(last)}
-            for last in range(2, rules.MASS_SPANS)
+            for last in range(2, MASS_SPANS)
             for first in range(2, last + 1)
         ),
     )
@@ -55,11 +61,6 @@ class PayloadMass(Cause):
             Y = Y * (trial.signals.time / shape["over_s"])[:, None, None]
         Y = Y @ _ten_columns(trial.shared.pi[1:4] / trial.shared.pi[0])
         return trial.of_wrench(-Y[:, :3], -Y[:, 3:])  # the payload pushes back
-
-    def possible(self, values, se, shape):
-        """A mass that is there, within the payload's reach."""
-        within = np.abs(values[1:4]) <= rules.SLOSH_REACH_M * abs(values[0]) + 2.0 * se[1:4]
-        return bool(abs(values[0]) > 2.0 * se[0] and within.all())
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6

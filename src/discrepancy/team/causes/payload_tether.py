@@ -5,11 +5,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.causes.base import Shape
+from discrepancy.team import constants
 from discrepancy.team.causes import cable
 from discrepancy.team.causes.base import Cause
 from estimator.arrays import Array
+
+SLOSH_REACH_M = 1.5
+"""From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+
+TETHER_POINTS = 1000
+"""Points of a payload that are told apart. Derived: every 0.1 m of a metre each way; near the limit they err by 0.05 m.
+Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
 
 LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
 
@@ -31,15 +38,15 @@ class PayloadTether(Cause):
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)
     at = "payload"
-    among = rules.TETHER_POINTS
+    among = TETHER_POINTS
     shapes: ClassVar[tuple[Shape, ...]] = (
         dict.fromkeys(LEVERS, 0.0),
-        *(_at(sign * rules.TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
+        *(_at(sign * constants.TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
         *(cable.through(np.zeros(3), way) for way in cable.first_ways()),
     )
     fleeting = True
     determined: ClassVar[Mapping[str, float]] = {
-        **dict.fromkeys(LEVERS, rules.TETHER_STEP_M),
+        **dict.fromkeys(LEVERS, constants.TETHER_STEP_M),
         **cable.SLOPE_STEPS,
     }
     positive = ("stiffness_N_per_m",)
@@ -73,26 +80,19 @@ class PayloadTether(Cause):
         moved = [
             dict(shape) | {name: shape[name] + step}
             for name in LEVERS
-            for far in rules.TETHER_FINER_M
+            for far in constants.TETHER_FINER_M
             for step in (far, -far)
         ]
-        return [other for other in moved if np.linalg.norm(_lever(other)) <= rules.SLOSH_REACH_M]
+        return [other for other in moved if np.linalg.norm(_lever(other)) <= SLOSH_REACH_M]
 
     def grown(self, shape):
         return cable.strap(shape)
 
     def alike(self, shape):
-        return cable.alike(shape) * rules.CABLE_LINES if cable.is_cable(shape) else self.among
+        return cable.alike(shape) * constants.CABLE_LINES if cable.is_cable(shape) else self.among
 
     def slope_step(self, name, number):
         return self.determined[name]
-
-    def possible(self, values, se, shape):
-        """It must pull the more the farther it is.
-
-        A constant force down is also what the arms' own weight and a scale common to all springs leave open.
-        """
-        return bool(values[3] > rules.PULL_SE * se[3])
 
     def physical(self, values, context):
         point = context.p_1c + _lever(context.shape)

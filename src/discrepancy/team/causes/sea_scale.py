@@ -1,6 +1,5 @@
 """Stiffness of a spring: scale of a torque reading."""
 
-from discrepancy import rules
 from discrepancy.team.causes.base import ReadingError, one_joint
 
 
@@ -14,7 +13,6 @@ class SeaScale(ReadingError):
     family = "sea_torque"
     parameters = ("scale",)
     tolerances = (1e-3,)
-    scatters = rules.SPRINGS_SCATTER
     adjusted = True
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
 

@@ -7,17 +7,40 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy import rules
 from discrepancy.causes.base import Shape
 from discrepancy.causes.free_while import in_parts, pieces_while
 from discrepancy.causes.play import played
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team import constants
 from discrepancy.team.causes.base import Cause, one_joint, one_robot
+from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.filtering import differentiate
 from estimator.rigid_team.slots import TAU
+
+PRESLIDING_OPEN_SHARE = 0.5
+"""Of its limit, by which friction that gives way may differ from Prandtl's law until it slips. Measured on LuGre, Dahl
+and Bouc-Wen friction of 0.15, 0.14 and 0.40 N m: chi2/n 1.43, 1.39 and 9.5 with 0, 1.10, 1.12 and 1.6 with 0.2, 1.05,
+1.07 and 1.35 with this; by evidence 1000, 1000 and 2500 nats likelier, sizes 3, 2 and 6 % off instead of 6, 6, 20."""
+
+PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
+"""Shares of such a torque that are tried next. Chosen."""
+
+PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
+"""The same of a joint's friction, by its angle. Chosen: bristles of 0.2 to 2 mrad are met; a step of 16 bits is 0.1."""
+
+REST_KNOTS_S = 0.05
+"""Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a
+spring, 0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than
+0.15 s left out; 1.12, 1.05 and 1.09 with 0.05 s; 1.07, 1.03 and 1.08 with every rest. Nothing faster passes the filter
+of the rows."""
+
+TURN_RAD_PER_S = 1e-2
+"""Below which friction that is kept may not be reversed yet when a joint turns round. Derived: from a turn at 0.5
+rad/s^2 until then it moves by 0.1 mrad, a step of 16 bits. Measured on four recordings (0.096 N m in a joint that gives
+way by 10 urad): chi2/n 1.72, 1.29, 2.55, 1.23 without, 1.13, 0.99, 1.29, 1.05 with 4e-3, 1.12, 0.98, 1.15, 1.05 with
+this; viscous friction is off by 6.9, 5.4, 14, 0.4 standard errors, by 1.1, 0.9, 2.2, 0.9, and by 0.3, 1.1, 0.7, 1.3."""
 
 KEPT = "kept_below_rad_per_s"
 """Rate of a shape below which friction keeps its direction: so stiff that no encoder shows how it gives way."""
@@ -43,15 +66,14 @@ class Friction(Cause):
     clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
     shapes = (
         {"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3}, {KEPT: 4e-3},
-        *({"presliding_rad": x} for x in rules.PRESLIDINGS_RAD),
+        *({"presliding_rad": x} for x in PRESLIDINGS_RAD),
     )  # fmt: skip
     determined: ClassVar[Mapping[str, float]] = {"presliding_rad": 0.1}
     positive = ("coulomb_Nm",)
-    form_share, form_size = rules.FRICTION_FORM_SHARE, rules.FRICTION_FORM_NM
     moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
     sign: ClassVar[float] = 1.0
     gives: ClassVar[str] = "presliding_rad"
-    gives_range: ClassVar[tuple[float, float]] = rules.PRESLIDING_RANGE_RAD
+    gives_range: ClassVar[tuple[float, float]] = PRESLIDING_RANGE_RAD
 
     def sentence(self, n):
         soft = f", after it has given way by {n(self.gives, 'mrad', 1e3)}" if n.values.get(self.gives) else ""
@@ -62,7 +84,7 @@ class Friction(Cause):
 
     def finer(self, shape):
         least, most = self.gives_range
-        near = (shape[self.gives] * share for share in rules.PRESLIDING_FINER) if self.gives in shape else ()
+        near = (shape[self.gives] * share for share in PRESLIDING_FINER) if self.gives in shape else ()
         return [{self.gives: x} for x in near if least <= x <= most]
 
     def physical(self, values, context):
@@ -94,12 +116,12 @@ class Friction(Cause):
         bent, rate, *_ = (*self._sliding(trial.signals, trial, robot, joint, shape), None)
         state = np.abs(bent)
         open_ = state < 1.0 - 1e-9 if KEPT not in shape else _doubtful(bent, rate)
-        rests = pieces_while(open_, trial.signals.rate_hz, rules.REST_KNOTS_S)
-        rests = in_parts(rests, rules.PATCH_COLUMNS)
+        rests = pieces_while(open_, trial.signals.rate_hz, REST_KNOTS_S)
+        rests = in_parts(rests, constants.PATCH_COLUMNS)
         if self.gives in shape or KEPT in shape:
             slips = np.flatnonzero(state >= 1.0 - 1e-9)
             before = slice(0, slips[0] if len(slips) else len(state))
-            share = rules.PRESLIDING_OPEN_SHARE if self.gives in shape else 1.0
+            share = PRESLIDING_OPEN_SHARE if self.gives in shape else 1.0
             rests = ((at, share * values) for at, values in rests)
             rests = chain([(before, np.ones((before.stop, 1)))] if before.stop else [], rests)
         return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
@@ -146,11 +168,11 @@ def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
     starts, fastest = _motions(rate)
     counts = np.diff([*starts, len(rate)])
     fast = np.concatenate([np.zeros(len(rate) - int(counts.sum())), np.repeat(fastest, counts)])
-    slow = np.abs(rate) < rules.TURN_RAD_PER_S
+    slow = np.abs(rate) < TURN_RAD_PER_S
     stretch = np.cumsum(np.diff(slow, prepend=False))
     turns = np.flatnonzero(np.diff(kept))
     turning = slow & np.isin(stretch, stretch[[turns, turns + 1]])
-    return turning | ((kept * rate < 0.0) & (fast >= rules.REST_RAD_PER_S))
+    return turning | ((kept * rate < 0.0) & (fast >= constants.REST_RAD_PER_S))
 
 
 def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from discrepancy import rules
+from discrepancy.team import constants
 from estimator.recording.model import Recording
 
 
@@ -29,7 +29,7 @@ def parted(recordings: Sequence[Recording], longest_s: float | None = None) -> l
         recordings: whole.
         longest_s: of a part [s]; None for that of the rules.
     """
-    return [part for recording in recordings for part in _parts(recording, longest_s or rules.PART_S)]
+    return [part for recording in recordings for part in _parts(recording, longest_s or constants.PART_S)]
 
 
 def seconds(recordings: Sequence[Recording]) -> float:
@@ -45,7 +45,7 @@ def _edges(recording: Recording, longest_s: float) -> list[int]:
 
 
 def _parts(recording: Recording, longest_s: float) -> list[Recording]:
-    edges, trim = _edges(recording, longest_s), round(rules.TEAM_TRIM_S * recording.metadata.rate_hz)
+    edges, trim = _edges(recording, longest_s), round(constants.TEAM_TRIM_S * recording.metadata.rate_hz)
     if len(edges) == 2:
         return [recording]
     out = []
