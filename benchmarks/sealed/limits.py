@@ -72,7 +72,7 @@ _AT_38 = {
     "fine_interpolation": (2.23e-6, 2.24e-6, 2.24e-6, 2.24e-6),
     "torque_ramp": (1.15e-4,) * 4,
     "torque_walk": (5.4e-4,) * 4,
-    "dead_band": (2e-2,) * 4,
+    "dead_band": (1.35e-3,) * 4,
     "slack_hose": (5.9, 6.0, 6.2, 6.2),
 }
 LIMITS: dict[str, dict[Background, float]] = {

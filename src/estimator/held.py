@@ -16,6 +16,8 @@ from estimator.recording.model import Recording
 
 LEAST = 3
 """Equal readings at least. Derived: two of three steps are needed to tell a jump from a speed."""
+PERIODS = 2
+"""In which a held value is left. Derived: what is taken between two readings is left in two."""
 MOST = 0.5
 """Share of an angle's readings that repeat others, beyond which its encoder is no worse than slow. Chosen."""
 DIES_CYCLES = 4.0
@@ -46,26 +48,30 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     """Spans of readings that repeat one before them while the angle moved on, first and last but one more.
 
     An angle that stays within one step for m periods and has one acceleration all the time has a speed of 4 / m steps
-    per period at most, so that it changes by (1 + 2 / m)^2 steps in the next one. A value that is held is left by all
-    that the angle moved meanwhile: by more than that, and by as much more than in the period after. In an encoder that
-    does so once, what enters or leaves a value by more than such a change is a value held, too.
+    per period at most, so that it changes by (1 + 2 p / m)^2 steps in p periods before or after. A value that is held
+    is entered at speed, by more than that, and left by all that the angle moved meanwhile: by more than that, and by as
+    much more than in the period after. In an encoder that does so once, any value is held that is entered or left by
+    more.
 
     Args:
         x: readings, shape (Q,).
         step: rounding step, greater than 0.
     """
-    change = np.abs(np.diff(x))
-    edges = np.flatnonzero(change) + 1
+    edges = np.flatnonzero(np.diff(x)) + 1
     first, stop = edges[:-1], edges[1:]
-    there = (stop - first >= LEAST) & (stop + 1 < len(x))
+    there = (stop - first >= LEAST) & (first >= PERIODS) & (stop + PERIODS <= len(x))
     first, stop = first[there], stop[there]
-    most = step * (0.5 + (1.0 + 2.0 / (stop - first - 1.0)) ** 2)  # readings change by whole steps
-    into, out, after = change[first - 1], change[stop - 1], change[stop]
-    if not np.any((out > most) & (out - after > most)):
+    sure = held = np.zeros(len(first), dtype=bool)
+    for p in range(1, PERIODS + 1):
+        most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
+        into, out = np.abs(x[first] - x[first - p]), np.abs(x[stop - 1 + p] - x[stop - 1])
+        held = held | (np.maximum(into, out) > most)
+        if p == 1:
+            sure = (into > most) & (out > most + np.abs(x[stop + 1] - x[stop]))
+    if not sure.any():
         return []
-    held = np.maximum(into, out) > most
     # One more at either end: what is taken between two readings has a share of both.
-    return [(int(a), min(int(b) + 1, len(x) - 1)) for a, b in zip(first[held], stop[held], strict=True)]
+    return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
 
 def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Array]:
