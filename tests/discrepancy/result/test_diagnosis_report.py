@@ -11,7 +11,7 @@ import pytest
 
 from diagnosed import small_diagnosis
 from discrepancy.candidate import Candidate
-from discrepancy.causes.numbers import number
+from discrepancy.numbers import number
 from discrepancy.team.linear.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
