@@ -16,7 +16,7 @@ from discrepancy.team.linear.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure
-from discrepancy.result.text import WIDTH, format_diagnosis, probability_words
+from discrepancy.result.lines import WIDTH, format_diagnosis, probability_words
 from discrepancy.result.text_gain import ERRORS, response_units
 from discrepancy.result.traces import Trace, group_units, groups
 from discrepancy.channel import Channel
