@@ -13,6 +13,8 @@ from discrepancy.causes.numbers import number
 from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array
 
+MISSING = 0.2
+"""Share of a formula's power from which on the basis does not hold it. Chosen: what is left shows as another term."""
 KNOTS, TRIED, BEGUN, SAMPLES = 8, 40, 12, 1000
 """Knots of a curve that is told as such; values of a number inside a term that are tried; terms that a second joins;
 samples at which formulas are compared."""
@@ -223,20 +225,37 @@ class Formula:
             out["offset" if self.terms else "amplitude"] = float(self.values[k]), float(se[k])
         return out
 
-    def text(self, symbol: str, *, unit: Callable[[int], str] | None = None) -> str:
-        """The formula in symbols, or with its amplitudes; ``unit``: of an amplitude by the signal's power in it."""
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers inside the terms."""
+        each = (
+            (f"{n}{end}", x)
+            for end, shape, numbers, _, _ in self._each
+            for n, x in zip(shape.inside, numbers, strict=True)
+        )
+        return dict(each)
+
+    def text(self, symbol: str, *, unit: Callable[[int], str] | None = None, scale: float = 1.0) -> str:
+        """The formula in symbols, or with its amplitudes.
+
+        Args:
+            symbol: of the signal.
+            unit: of an amplitude by the signal's power that it multiplies; None: amplitudes are symbols.
+            scale: shown units of the error per own one.
+        """
         known, out = self.parameters, []
+
+        def shown(name: str, power: int) -> str:
+            return number(*known[name], unit(power), scale) if unit else name.replace("amplitude", "a")
+
         for end, shape, numbers, _, _ in self._each:
-            a, phase = f"a{end}", f"+ phase{end}"
-            if unit is not None and shape is not SPLINE:
-                a = number(*known[f"amplitude{end}"], unit(shape.power))
-                angle = known.get(f"phase_rad{end}", (0.0, None))[0]
-                phase = f"{'+' if angle >= 0 else '-'} {abs(angle):.2f}"
+            a = "" if shape is SPLINE else shown(f"amplitude{end}", shape.power)
+            angle = known.get(f"phase_rad{end}", (0.0, None))[0]
+            phase = f"{'+' if angle >= 0 else '-'} {abs(angle):.2f}" if unit else f"+ phase{end}"
             n = f"{numbers[0]:.4g}" if numbers else ""
             out.append(shape.text.format(a=a, x=symbol, n=n, p=phase))
         if self.constant:
-            name = "offset" if out else "amplitude"
-            out.append(name[:1] if unit is None else number(*known[name], unit(0)))
+            out.append(shown("offset" if out else "amplitude", 0))
         return " + ".join(out)
 
     def pieces(self) -> Iterator[Piece]:
@@ -291,7 +310,8 @@ def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
     good = [
         (-f.loss - cost * size, f)
         for f, size in zip(fits, sizes, strict=True)
-        if f.loss <= max(cost * (seen - size), (SETTINGS.form_share**2 + f.missing) * free)
+        if f.missing < MISSING
+        and f.loss <= max(cost * (seen - size), (SETTINGS.form_share**2 + f.missing) * free)
     ]
     most = max((worth for worth, _ in good), default=0.0)
     return next((_settled(curve, f) for worth, f in good if worth > most - 1.0), None)
@@ -330,7 +350,7 @@ def _fitted(curve: Curve, terms: Sequence[tuple[Shape, Numbers]], more: Array | 
     covariance = np.linalg.pinv(P.T @ precision @ P, rcond=1e-9, hermitian=True)
     a = covariance @ (P.T @ score)
     series, held = G @ (scale * a), curve.basis @ (P @ a)
-    missing = float(np.var(series - held) / max(np.var(series), 1e-300))
+    missing = float(np.var(series - held) / np.var(series)) if np.ptp(series) else 0.0
     loss = max(free - 0.5 * float(a @ (P.T @ score)), 0.0)
     return Formula(
         tuple(terms), scale * a, covariance * np.outer(scale, scale), curve.constant, loss, missing

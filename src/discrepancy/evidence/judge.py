@@ -122,7 +122,7 @@ class Judge(ABC):
             cause=c.cause,
             place=c.place,
             joint=self.joint(*c.key),
-            members=() if c.cause == "unlisted" else self.members(c, values or self.whole),
+            members=self.members(c, values or self.whole) if c.columns else (),
             probability=probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,

@@ -52,6 +52,8 @@ class TeamTold(Told):
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         candidate = self.verdict.candidates.get((f.cause, f.place))
+        if f.law is not None:
+            return f"{f.law.sentence(place[:1].upper() + place[1:])}."
         if candidate is None or not parameters:
             return f"Something that no table lists acts at {place}."
         numbers = {name: entry["value"] for name, entry in parameters.items()}
