@@ -187,6 +187,13 @@ class Formula:
         columns = _columns(self.terms, x, self.constant)
         return columns @ self.values[: columns.shape[1]]
 
+    def through(self, x: Array, f: Array) -> Formula:
+        """The same terms through values f of a function at x, shape (Q,) each, up to a constant that is not its own."""
+        G = _columns(self.terms, x, constant=True)
+        values = np.linalg.lstsq(G, f, rcond=None)[0]
+        kept = G.shape[1] - (not self.constant)
+        return replace(self, values=np.append(values[:kept], self.values[kept:]))
+
     @property
     def _each(self) -> Iterator[tuple[str, Shape, Numbers, slice, Sequence[int]]]:
         """Ending of a term's names, the term, where its amplitudes and its fitted numbers are."""

@@ -155,7 +155,7 @@ class TeamRig(LawfulRows):
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
-        healthy: Sequence[tuple[Candidate, Array]] = (),
+        healthy: Sequence[tuple[Candidate, Array]] = (), laws: Sequence[Effect] = (),
     ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
@@ -163,7 +163,7 @@ class TeamRig(LawfulRows):
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
-        effects: list[Effect] = []
+        effects = [*laws]
         for candidate, values in active:
             own = self.effects(candidate, values)
             if own is None:

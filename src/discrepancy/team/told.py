@@ -121,7 +121,7 @@ class TeamDiagnosed:
             InputError: something cannot be written.
         """
         values, found = self._values, {(f.cause, f.place) for f in self.verdict.findings}
-        chosen = [c for c in self.outcome.state.chosen if c.group.key in found and not c.group.late]
+        chosen = [c for c in self.outcome.state.chosen if c.group.key in found]
         models = [(EXTENDED, False)] if chosen else []
         if self.gain is not None and self.gain.is_better_as_found:
             models.append((AS_FOUND, True))

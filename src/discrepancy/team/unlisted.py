@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from discrepancy.evidence.formula import Curve, formula_of
+from discrepancy.evidence.formula import Curve, Piece, formula_of
 from discrepancy.evidence.law import Law, Of
 from discrepancy.evidence.posterior import Group
 from discrepancy.laws.place import Place
@@ -203,6 +203,13 @@ class Laws:
         best = sorted(found, key=lambda pair: -pair[0])[:LIKELIEST]
         return [law.group for gain, law in best if gain > 0.0]
 
+    @cached_property
+    def _hums(self) -> tuple[Array, list[NDArray[np.complex64]]]:
+        """Frequencies, four in each that a trial tells from the next, and waves of them at each trial's rows."""
+        time = [s[TIME.name][t.reduction.sample] for s, t in zip(self._signals, self.linear, strict=True)]
+        hz = np.arange(HUM_HZ[0], HUM_HZ[1], 0.25 / max(float(t[-1]) for t in time))
+        return hz, [np.exp(-2j * np.pi * np.outer(hz, t)).astype(np.complex64) for t in time]
+
     def _hum(
         self, law: Unlisted, directions: Sequence[Array], left: Sequence[Array]
     ) -> tuple[float, Unlisted]:
@@ -265,6 +272,23 @@ class Laws:
             formula,
             traces,
         )
+
+    def pieces(self, group: Group, law: Law, mean: Array) -> Iterator[Piece]:
+        """A law, its terms (k,) as other data have them, as functions of one amplitude each, as simulators take it.
+
+        Where the constant is not its own it has none: that is what zeros, biases and places are found beside.
+        """
+        own = self.of(group)
+        x = self.signal(own.variable)
+        formula = law.formula.through(x, self.functions(own) @ mean)
+        yield from replace(law, formula=formula).pieces()
+        if own.first and own.times is None:
+            yield {
+                "target": law.target,
+                "function": "constant",
+                "of": TIME.name,
+                "amplitude": -float(np.mean(formula.at(x))),
+            }
 
 
 def _of(variable: Variable) -> Of:
