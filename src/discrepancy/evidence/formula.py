@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ samples at which formulas are compared."""
 STEP_S = 0.05
 """In which a step is told to rise."""
 Numbers = Sequence[float]
+Kind = Literal["angle", "way", "time", "other"]
 Piece = dict[str, float | str]
 
 
@@ -102,8 +104,8 @@ class Curve:
         basis: functions of it there, shape (Q, K); a constant is the first of them, or is left out of all.
         mean, covariance: of their amplitudes, shapes (K,) and (K, K).
         prior: variances with which these were fitted, shape (K,).
-        turns: whether what comes again does so a whole number of times in a turn: the signal is an angle [rad].
-        time: whether the signal is time [s].
+        kind: of signal. What is a function of an angle [rad] comes again a whole number of times in a turn; on a way or
+            in time [s] it may come again; of others it does not.
     """
 
     x: Array
@@ -111,8 +113,7 @@ class Curve:
     mean: Array
     covariance: Array
     prior: Array
-    turns: bool = False
-    time: bool = False
+    kind: Kind = "other"
 
     @cached_property
     def constant(self) -> bool:
@@ -296,7 +297,7 @@ def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
     """
     if hum_hz is not None:
         return Formula(((HUM, (hum_hz,)),), curve.mean, curve.covariance, constant=False)
-    cost, curve = 0.5 * math.log(len(curve.x)), curve.thinned
+    cost, whole, curve = 0.5 * math.log(len(curve.x)), curve, curve.thinned
     fits: list[Formula] = [_fitted(curve, ())] if curve.constant else []
     singles = [_fitted(curve, (term,)) for term in _terms(curve)]
     fits += singles
@@ -307,7 +308,7 @@ def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
             (a.terms[0], b.terms[0]) for a in begun for b in singles if a.terms[0][0] is not b.terms[0][0]
         ]
         found = _best(curve, [_fitted(curve, pair) for pair in pairs], cost)
-    return found or _knots(curve)
+    return found or _knots(whole)
 
 
 def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
@@ -326,16 +327,20 @@ def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
 
 def _terms(curve: Curve) -> Iterator[tuple[Shape, Numbers]]:
     """Every term with every number inside that is tried."""
-    shapes = [*PLAIN, *(OF_TIME if curve.time else SIGNED if np.min(curve.x) < 0.0 < np.max(curve.x) else ())]
+    shapes = [
+        *PLAIN,
+        *(OF_TIME if curve.kind == "time" else SIGNED if np.min(curve.x) < 0.0 < np.max(curve.x) else ()),
+    ]
     yield from ((shape, numbers) for shape in shapes for numbers in shape.tried(curve.x))
-    most = math.pi * curve.basis.shape[1] / max(float(np.ptp(curve.x)), 1e-300)
-    waves = np.arange(1.0, most + 1.0) if curve.turns else np.linspace(most / TRIED, most, TRIED)
-    yield from ((SINE, (float(w),)) for w in waves)
+    least = math.pi / max(float(np.ptp(curve.x)), 1e-300)  # half a wave
+    most = least * curve.basis.shape[1]
+    waves = np.arange(1.0, most + 1.0) if curve.kind == "angle" else np.linspace(least, most, TRIED)
+    yield from ((SINE, (float(w),)) for w in waves if curve.kind != "other")
 
 
 def _is_fitted(curve: Curve, shape: Shape) -> bool:
     """Whether data tell the number inside: it is no choice of a few."""
-    return shape.name in ("above", "below", "beyond", "warming") or (shape is SINE and not curve.turns)
+    return shape.name in ("above", "below", "beyond", "warming") or (shape is SINE and curve.kind != "angle")
 
 
 def _columns(terms: Sequence[tuple[Shape, Numbers]], x: Array, constant: bool) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from discrepancy.evidence.formula import Curve, Piece, formula_of
+from discrepancy.evidence.formula import Curve, Kind, Piece, formula_of
 from discrepancy.evidence.law import Law, Of
 from discrepancy.evidence.posterior import Group
 from discrepancy.laws.place import Place
@@ -38,6 +38,8 @@ OPEN_NATS = 30.0
 """What the noise must be worth beyond that of the sensors, before something unlisted is looked for."""
 LIKELIEST = 8
 """Places and signals whose exact linear gain is computed."""
+KINDS: dict[str, Kind] = {"angle": "angle", "time": "time", "travel": "way", "position": "way"}
+"""Signals of which something may come again."""
 TRACE_S = 0.3
 """Between points of a law's trace [s]."""
 
@@ -234,10 +236,8 @@ class Laws:
         """
         law = self.of(group)
         place, x, f = law.place, self.signal(law.variable), self.functions(law)
-        curve = Curve(
-            x, f, mean, covariance, prior, law.variable.kind == "angle", law.variable.kind == "time"
-        )
-        formula = formula_of(curve, law.hz)
+        kind = KINDS.get(law.variable.kind, "other")
+        formula = formula_of(Curve(x, f, mean, covariance, prior, kind), law.hz)
         shift = 0.0 if law.first == 0 else float(np.mean(formula.at(x)))
         se = np.sqrt(np.maximum(np.einsum("qk,kl,ql->q", f, covariance, f), 0.0))
         w = np.ones(len(x)) if law.times is None else self.signal(law.times)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from discrepancy.evidence.formula import KNOTS, Curve, Formula, formula_of
+from discrepancy.evidence.formula import KNOTS, Curve, Formula, Kind, formula_of
 from discrepancy.evidence.law import Law, Of
 from estimator.arrays import Array
 from mocobot_sim.laws.functions import FUNCTIONS, Inside
@@ -19,36 +19,36 @@ SIGMAS = 4.0
 Function = Callable[[Array], Array]
 
 
-def fitted(f: Function, *, time: bool = False, turns: bool = False, constant: bool = False) -> Curve:
+def fitted(f: Function, kind: Kind = "other", *, constant: bool = False) -> Curve:
     """What noisy rows at some samples say of a function's cosines; a constant beside is unknown unless it is told."""
     rng = np.random.default_rng(3)
     x = np.sin(np.linspace(0.0, 90.0, SAMPLES)) * rng.uniform(0.5, 1.5) + 0.1 * rng.standard_normal(SAMPLES)
-    x = np.tile(np.linspace(0.0, 30.0, SAMPLES // 4), 4) if time else x
+    x = np.tile(np.linspace(0.0, 30.0, SAMPLES // 4), 4) if kind == "time" else x
     basis = np.cos(np.pi * np.outer((rankdata(x) - 0.5) / SAMPLES, np.arange(TERMS + 1)))
     at = rng.choice(SAMPLES, ROWS)
     X, y = basis[at], f(x[at]) + LOUD * rng.standard_normal(ROWS)
     covariance = np.linalg.inv(X.T @ X / LOUD**2 + np.eye(TERMS + 1) / PRIOR)
     mean, own = covariance @ X.T @ y / LOUD**2, slice(int(not constant), None)
     prior = np.full(TERMS + 1, PRIOR)[own]
-    return Curve(x, basis[:, own], mean[own], covariance[own, own], prior, turns, time)
+    return Curve(x, basis[:, own], mean[own], covariance[own, own], prior, kind)
 
 
 def spring(x: Array) -> Array:
     return -0.8 * x**3
 
 
-LAWS: dict[str, tuple[Function, dict[str, bool], dict[str, float]]] = {
-    "linear": (lambda x: 0.3 * x, {}, {"amplitude": 0.3}),
-    "square": (lambda x: 0.3 * x**2, {}, {"amplitude": 0.3}),
-    "cube": (spring, {}, {"amplitude": -0.8}),
-    "signed_square": (lambda x: 0.43 * x * np.abs(x), {}, {"amplitude": 0.43}),
-    "absolute": (lambda x: -0.5 * np.abs(x), {}, {"amplitude": -0.5}),
-    "sign": (lambda x: 0.2 * np.sign(x), {}, {"amplitude": 0.2}),
-    "above": (lambda x: -0.6 * np.maximum(x - 0.2, 0.0), {}, {"amplitude": -0.6, "knee": 0.2}),
-    "beyond": (lambda x: 0.9 * (x - np.clip(x, -0.4, 0.4)), {}, {"amplitude": 0.9, "knee": 0.4}),
-    "sine": (lambda x: 0.3 * np.sin(5.0 * x + 0.9), {"turns": True}, {"amplitude": 0.3, "phase_rad": 0.9, "times": 5}),
-    "warming": (lambda t: 0.5 * (1.0 - np.exp(-t / 9.0)), {"time": True}, {"amplitude": 0.5, "time_s": 9.0}),
-    "step": (lambda t: 0.4 * (t > 12.0), {"time": True}, {"amplitude": 0.4}),
+LAWS: dict[str, tuple[Function, Kind, dict[str, float]]] = {
+    "linear": (lambda x: 0.3 * x, "other", {"amplitude": 0.3}),
+    "square": (lambda x: 0.3 * x**2, "other", {"amplitude": 0.3}),
+    "cube": (spring, "other", {"amplitude": -0.8}),
+    "signed_square": (lambda x: 0.43 * x * np.abs(x), "other", {"amplitude": 0.43}),
+    "absolute": (lambda x: -0.5 * np.abs(x), "other", {"amplitude": -0.5}),
+    "sign": (lambda x: 0.2 * np.sign(x), "other", {"amplitude": 0.2}),
+    "above": (lambda x: -0.6 * np.maximum(x - 0.2, 0.0), "other", {"amplitude": -0.6, "knee": 0.2}),
+    "beyond": (lambda x: 0.9 * (x - np.clip(x, -0.4, 0.4)), "other", {"amplitude": 0.9, "knee": 0.4}),
+    "sine": (lambda x: 0.3 * np.sin(5.0 * x + 0.9), "angle", {"amplitude": 0.3, "phase_rad": 0.9, "times": 5}),
+    "warming": (lambda t: 0.5 * (1.0 - np.exp(-t / 9.0)), "time", {"amplitude": 0.5, "time_s": 9.0}),
+    "step": (lambda t: 0.4 * (t > 12.0), "time", {"amplitude": 0.4}),
 }  # fmt: skip
 
 
@@ -56,8 +56,8 @@ LAWS: dict[str, tuple[Function, dict[str, bool], dict[str, float]]] = {
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_is_told_with_its_numbers(name: str, constant: bool) -> None:
     """Whether or not the data tell a constant beside it."""
-    f, more, true = LAWS[name]
-    formula = formula_of(fitted(f, constant=constant, **more))
+    f, kind, true = LAWS[name]
+    formula = formula_of(fitted(f, kind, constant=constant))
     assert formula.function == name
     for number, value in true.items():
         found, se = formula.parameters[number]
@@ -92,8 +92,8 @@ def test_a_curve_that_is_no_formula_is_told_by_its_knots() -> None:
 @pytest.mark.parametrize("name", ["cube", "beyond", "sine", "step"])
 def test_pieces_are_the_simulators(name: str) -> None:
     """Functions of one amplitude each add up to the formula."""
-    f, more, _ = LAWS[name]
-    curve = fitted(f, **more)
+    f, kind, _ = LAWS[name]
+    curve = fitted(f, kind)
     formula, x = formula_of(curve), curve.x[:200]
     total = np.zeros(len(x))
     for piece in formula.pieces():
