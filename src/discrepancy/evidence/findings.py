@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from discrepancy.evidence.law import Law
+    from discrepancy.formulas.law import Law
     from discrepancy.result.traces import Trace
 
 Word = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]

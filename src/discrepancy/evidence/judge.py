@@ -136,6 +136,11 @@ class Judge(ABC):
             return [plain]
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
 
+    def fit_of(self, group: Group) -> tuple[Array, Array, Array]:
+        """Mean and covariance of a group's values, and the variances, which shrink nothing, of their prior."""
+        at, (mean, covariance) = self.parts.columns_of(group.columns), self.whole
+        return mean[at], covariance[np.ix_(at, at)], self.parts.prior[at]
+
     def _is_off(self, columns: Sequence[int]) -> bool:
         """Whether a value is beyond its standard error and a healthy machine's tolerance."""
         at, (mean, covariance) = self.parts.columns_of(list(columns)), self.whole

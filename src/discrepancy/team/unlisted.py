@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from discrepancy.evidence.formula import Curve, Kind, Piece, formula_of
-from discrepancy.evidence.law import Law, Of
 from discrepancy.evidence.posterior import Group
+from discrepancy.formulas.formula import Curve, Kind, Piece, formula_of
+from discrepancy.formulas.law import Law, Of, traces
 from discrepancy.laws.place import Place
 from discrepancy.laws.variable import TIME, Variable
 from discrepancy.team.laws.directions import directions_at
@@ -40,8 +40,6 @@ LIKELIEST = 8
 """Places and signals whose exact linear gain is computed."""
 KINDS: dict[str, Kind] = {"angle": "angle", "time": "time", "travel": "way", "position": "way"}
 """Signals of which something may come again."""
-TRACE_S = 0.3
-"""Between points of a law's trace [s]."""
 
 
 OWN_CONSTANT = ("gimbal torque", "force on payload", "payload spin")
@@ -238,27 +236,10 @@ class Laws:
         place, x, f = law.place, self.signal(law.variable), self.functions(law)
         kind = KINDS.get(law.variable.kind, "other")
         formula = formula_of(Curve(x, f, mean, covariance, prior, kind), law.hz)
-        shift = 0.0 if law.first == 0 else float(np.mean(formula.at(x)))
         se = np.sqrt(np.maximum(np.einsum("qk,kl,ql->q", f, covariance, f), 0.0))
         w = np.ones(len(x)) if law.times is None else self.signal(law.times)
-        series = (x, w * (f @ mean), np.abs(w) * se, w * (formula.at(x) - shift))
-        traces = []
-        each = zip(*(self._split(s) for s in series), self._signals, strict=True)
-        for *parts, signals in each:
-            time = signals[TIME.name]
-            few = np.arange(
-                0, len(time), max(1, round(TRACE_S * (len(time) - 1) / max(float(time[-1]), 1e-9)))
-            )
-            signal, error, spread, own = (part[few].tolist() for part in parts)
-            traces.append(
-                {
-                    "time_s": time[few].tolist(),
-                    "signal": signal,
-                    "error": [error],
-                    "se": [spread],
-                    "law": [own],
-                }
-            )
+        time = [s[TIME.name] for s in self._signals]
+        own = traces(time, x, w, f @ mean, se, formula, shift=law.first > 0)
         unit = place.units[law.component] if place.units else place.unit
         of, times = _of(law.variable), law.times and _of(law.times)
         return Law(
@@ -270,7 +251,7 @@ class Laws:
             of,
             times,
             formula,
-            traces,
+            own,
         )
 
     def pieces(self, group: Group, law: Law, mean: Array) -> Iterator[Piece]:

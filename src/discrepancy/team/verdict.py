@@ -13,10 +13,10 @@ from scipy.signal import lfilter
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
 from discrepancy.evidence.judge import Judge, Side
-from discrepancy.evidence.law import Law
 from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.formulas.law import Law
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.traces import Trace
 from discrepancy.team.causes import CAUSES
@@ -122,9 +122,8 @@ class _TeamJudge(Judge):
 
     @cache  # noqa: B019
     def _law(self, group: Group) -> Law:
-        """What no table lists, as fitted with a prior that shrinks nothing."""
-        at, (mean, covariance) = self.parts.columns_of(group.columns), self.whole
-        return self.problem.laws_of.told(group, mean[at], covariance[np.ix_(at, at)], self.parts.prior[at])
+        """What no table lists, with its formula."""
+        return self.problem.laws_of.told(group, *self.fit_of(group))
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
         if group.late:

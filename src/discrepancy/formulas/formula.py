@@ -12,87 +12,30 @@ import numpy as np
 
 from discrepancy.causes.numbers import number
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.formulas.terms import (
+    ABOVE,
+    BELOW,
+    HUM,
+    KNOTS,
+    OF_TIME,
+    PLAIN,
+    SIGNED,
+    SINE,
+    SPLINE,
+    STEP_S,
+    TRIED,
+    TURNING,
+    Numbers,
+    Shape,
+)
 from estimator.arrays import Array
 
 MISSING = 0.2
 """Share of a formula's power from which on the basis does not hold it. Chosen: what is left shows as another term."""
-KNOTS, TRIED, BEGUN, SAMPLES = 8, 40, 12, 1000
-"""Knots of a curve that is told as such; values of a number inside a term that are tried; terms that a second joins;
-samples at which formulas are compared."""
-STEP_S = 0.05
-"""In which a step is told to rise."""
-Numbers = Sequence[float]
+BEGUN, SAMPLES = 12, 1000
+"""Likeliest terms that a second joins; samples at which formulas are compared."""
 Kind = Literal["angle", "way", "time", "other"]
 Piece = dict[str, float | str]
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A term: amplitudes times a function of the signal.
-
-    Attributes:
-        name: as in the JSON and in ``mocobot_sim.laws.functions``, but for ``spline`` and ``step``.
-        of: signal (Q,) and numbers inside -> (Q, k), one amplitude each.
-        text: ``a`` is the amplitude, ``x`` the signal, ``n`` the number inside, ``p`` a phase.
-        power: of the signal in the amplitude's unit.
-        inside: names of the numbers inside.
-        tried: their values for a signal; the first that fits is taken further, if there are several.
-    """
-
-    name: str
-    of: Callable[[Array, Numbers], Array]
-    text: str
-    power: int = 0
-    inside: tuple[str, ...] = ()
-    tried: Callable[[Array], Sequence[Numbers]] = lambda x: [()]
-
-
-def _one(of: Callable[..., Array]) -> Callable[[Array, Numbers], Array]:
-    return lambda x, n: of(x, *n)[:, None]
-
-
-def _wave(x: Array, n: Numbers) -> Array:
-    return np.stack([np.sin(n[0] * x), np.cos(n[0] * x)], axis=1)
-
-
-def _hats(x: Array, n: Numbers) -> Array:
-    knots = n[0] + n[1] * np.arange(KNOTS)
-    return np.maximum(1.0 - np.abs(np.clip(x, knots[0], knots[-1])[:, None] - knots) / n[1], 0.0)
-
-
-def _within(x: Array) -> list[Numbers]:
-    return [(float(q),) for q in np.quantile(x, np.linspace(0.03, 0.97, TRIED))]
-
-
-def _beyond(x: Array, knee: float) -> Array:
-    return np.asarray(np.copysign(np.maximum(np.abs(x) - knee, 0.0), x))
-
-
-PLAIN = (
-    Shape("linear", _one(lambda x: x), "{a} {x}", 1),
-    Shape("square", _one(np.square), "{a} {x}^2", 2),
-    Shape("cube", _one(lambda x: x**3), "{a} {x}^3", 3),
-    Shape("absolute", _one(np.abs), "{a} |{x}|", 1),
-    Shape("signed_square", _one(lambda x: x * np.abs(x)), "{a} {x} |{x}|", 2),
-    Shape("above", _one(lambda x, k: np.maximum(x - k, 0.0)), "{a} max({x} - {n}, 0)", 1, ("knee",), _within),
-    Shape("below", _one(lambda x, k: np.minimum(x - k, 0.0)), "{a} min({x} - {n}, 0)", 1, ("knee",), _within),
-)
-SIGNED = (
-    Shape("sign", _one(lambda x, slow: np.clip(x / slow, -1.0, 1.0)), "{a} sign({x})", 0, ("slow",),
-          lambda x: [(0.03 * float(np.std(x)),)]),
-    Shape("beyond", _one(_beyond), "{a} ({x} beyond +-{n})", 1, ("knee",), lambda x: _within(np.abs(x))),
-)  # fmt: skip
-OF_TIME = (
-    Shape("warming", _one(lambda x, t: -np.expm1(-x / t)), "{a} (1 - exp(-{x} / {n} s))", 0, ("time_s",),
-          lambda x: [(float(t),) for t in np.max(x) * np.geomspace(0.05, 2.0, TRIED)]),
-    Shape("step", _one(lambda x, at: np.clip(1.0 + (x - at) / STEP_S, 0.0, 1.0)), "{a} from {n} s on", 0, ("at_s",),
-          _within),
-)  # fmt: skip
-SINE = Shape("sine", _wave, "{a} sin({n} {x} {p})", 0, ("times",))
-HUM = Shape(
-    "hum", lambda x, n: _wave(2.0 * np.pi * x, n), "{a} sin(2 pi {n} Hz {x} {p})", 0, ("frequency_hz",)
-)
-SPLINE = Shape("spline", _hats, "a curve of {x}", 0, ("low", "step"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,11 +141,11 @@ class Formula:
     @property
     def _each(self) -> Iterator[tuple[str, Shape, Numbers, slice, Sequence[int]]]:
         """Ending of a term's names, the term, where its amplitudes and its fitted numbers are."""
-        k, inside = 0, sum(_width(shape) for shape, _ in self.terms) + self.constant
+        k, inside = 0, sum(shape.width for shape, _ in self.terms) + self.constant
         for n, (shape, numbers) in enumerate(self.terms):
             fitted = list(range(inside, inside + len(numbers))) if inside < len(self.values) else []
-            yield f"_{n + 1}" if n else "", shape, numbers, slice(k, k + _width(shape)), fitted
-            k, inside = k + _width(shape), inside + len(fitted)
+            yield f"_{n + 1}" if n else "", shape, numbers, slice(k, k + shape.width), fitted
+            k, inside = k + shape.width, inside + len(fitted)
 
     @property
     def parameters(self) -> dict[str, tuple[float, float | None]]:
@@ -229,7 +172,7 @@ class Formula:
             for name, x, k in zip(shape.inside, numbers, fitted or [None] * len(numbers), strict=True):
                 out[f"{name}{end}"] = float(x), None if k is None else float(se[k])
         if self.constant:
-            k = sum(_width(shape) for shape, _ in self.terms)
+            k = sum(shape.width for shape, _ in self.terms)
             out["offset" if self.terms else "amplitude"] = float(self.values[k]), float(se[k])
         return out
 
@@ -282,7 +225,7 @@ class Formula:
             else:
                 yield _piece(shape.name, a[0], n[0])
         if self.constant:
-            yield _piece("constant", self.values[sum(_width(shape) for shape, _ in self.terms)])
+            yield _piece("constant", self.values[sum(shape.width for shape, _ in self.terms)])
 
 
 def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
@@ -313,7 +256,7 @@ def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
 
 def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
     """The likeliest that is good enough, the plainest of some that are alike; with its numbers inside fitted."""
-    sizes = [len(f.values) + sum(_is_fitted(curve, shape) for shape, _ in f.terms) for f in fits]
+    sizes = [len(f.values) + sum(shape.fitted for shape, _ in f.terms) for f in fits]
     free, seen = curve.told[2], int(np.linalg.matrix_rank(curve.told[0], hermitian=True))
     good = [
         (-f.loss - cost * size, f)
@@ -327,29 +270,20 @@ def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
 
 def _terms(curve: Curve) -> Iterator[tuple[Shape, Numbers]]:
     """Every term with every number inside that is tried."""
-    shapes = [
-        *PLAIN,
-        *(OF_TIME if curve.kind == "time" else SIGNED if np.min(curve.x) < 0.0 < np.max(curve.x) else ()),
-    ]
+    signed = np.min(curve.x) < 0.0 < np.max(curve.x)
+    shapes = [*PLAIN, *(OF_TIME if curve.kind == "time" else SIGNED if signed else ()), ABOVE, BELOW]
     yield from ((shape, numbers) for shape in shapes for numbers in shape.tried(curve.x))
     least = math.pi / max(float(np.ptp(curve.x)), 1e-300)  # half a wave
     most = least * curve.basis.shape[1]
-    waves = np.arange(1.0, most + 1.0) if curve.kind == "angle" else np.linspace(least, most, TRIED)
-    yield from ((SINE, (float(w),)) for w in waves if curve.kind != "other")
-
-
-def _is_fitted(curve: Curve, shape: Shape) -> bool:
-    """Whether data tell the number inside: it is no choice of a few."""
-    return shape.name in ("above", "below", "beyond", "warming") or (shape is SINE and curve.kind != "angle")
+    if curve.kind == "angle":
+        yield from ((TURNING, (float(w),)) for w in np.arange(1.0, most + 1.0))
+    elif curve.kind != "other":
+        yield from ((SINE, (float(w),)) for w in np.linspace(least, most, TRIED))
 
 
 def _columns(terms: Sequence[tuple[Shape, Numbers]], x: Array, constant: bool) -> Array:
     each = [shape.of(x, numbers) for shape, numbers in terms]
     return np.concatenate([*each, *([np.ones((len(x), 1))] if constant else [])], axis=1)
-
-
-def _width(shape: Shape) -> int:
-    return 2 if shape in (SINE, HUM) else KNOTS if shape is SPLINE else 1
 
 
 def _fitted(curve: Curve, terms: Sequence[tuple[Shape, Numbers]], more: Array | None = None) -> Formula:
@@ -371,7 +305,7 @@ def _fitted(curve: Curve, terms: Sequence[tuple[Shape, Numbers]], more: Array | 
 
 def _settled(curve: Curve, found: Formula, rounds: int = 8) -> Formula:
     """The same with the numbers inside fitted, by Gauss-Newton steps that do not make it less likely."""
-    free = [k for k, (shape, _) in enumerate(found.terms) if _is_fitted(curve, shape)]
+    free = [k for k, (shape, _) in enumerate(found.terms) if shape.fitted]
     for _ in range(rounds if free else 0):
         slopes = [_slope(curve, found, k) for k in free]
         both = _fitted(curve, found.terms, np.stack(slopes, axis=1))
@@ -394,8 +328,8 @@ def _slope(curve: Curve, found: Formula, k: int) -> Array:
         1e-4 * (abs(found.terms[k][1][0]) + 1e-3 * float(np.std(curve.x))),
     )
     ends = [shape.of(curve.x, (numbers[0] + sign * step,)) for sign in (-0.5, 0.5)]
-    first = sum(_width(s) for s, _ in found.terms[:k])
-    return np.asarray((ends[1] - ends[0]) @ found.values[first : first + _width(shape)] / step)
+    first = sum(s.width for s, _ in found.terms[:k])
+    return np.asarray((ends[1] - ends[0]) @ found.values[first : first + shape.width] / step)
 
 
 def _knots(curve: Curve) -> Formula:

@@ -6,9 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from discrepancy.causes.units import SMALL, fitting
 from discrepancy.evidence.findings import Member
-from discrepancy.evidence.formula import Formula, Piece
+from discrepancy.formulas.formula import Formula, Piece
+from estimator.arrays import Array
+
+TRACE_S = 0.3
+"""Between points of a law's trace [s]."""
 
 INSIDE = {"time_s": "s", "at_s": "s", "frequency_hz": "Hz", "times": "rad"}
 """Units of numbers inside a term; others have the signal's, ``times`` this over the signal's."""
@@ -130,6 +136,39 @@ class Law:
         ]
         together = " ".join(powers)
         return f"{above}/{together}" if len(powers) == 1 else f"{above}/({together})"
+
+
+def traces(
+    time: Sequence[Array],
+    x: Array,
+    times: Array,
+    curve: Array,
+    se: Array,
+    formula: Formula,
+    *,
+    shift: bool = True,
+) -> list[dict[str, Any]]:
+    """Traces of a law, a point each ``TRACE_S``.
+
+    Args:
+        time: of each trial [s].
+        x: the signal in all trials one after another, shape (Q,).
+        times: what multiplies the function, shape (Q,).
+        curve, se: the free function and its standard error, shape (Q,).
+        formula: what says it.
+        shift: whether a constant is not the law's own: the formula is shown about its mean, as the curve is.
+    """
+    own = formula.at(x)
+    series = x, times * curve, np.abs(times) * se, times * (own - float(np.mean(own)) * shift)
+    edges, out = np.cumsum([len(t) for t in time])[:-1], []
+    for t, *parts in zip(time, *(np.split(each, edges) for each in series), strict=True):
+        step = TRACE_S * (len(t) - 1) / max(float(t[-1] - t[0]), 1e-9)
+        few = np.arange(0, len(t), max(1, round(step)))
+        signal, error, spread, law = (part[few].tolist() for part in parts)
+        out.append(
+            {"time_s": t[few].tolist(), "signal": signal, "error": [error], "se": [spread], "law": [law]}
+        )
+    return out
 
 
 def _grouped(unit: str) -> str:

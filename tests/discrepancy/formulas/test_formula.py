@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from discrepancy.evidence.formula import KNOTS, Curve, Formula, Kind, formula_of
-from discrepancy.evidence.law import Law, Of
+from discrepancy.formulas.formula import Curve, Formula, Kind, formula_of
+from discrepancy.formulas.law import Law, Of
+from discrepancy.formulas.terms import KNOTS
 from estimator.arrays import Array
 from mocobot_sim.laws.functions import FUNCTIONS, Inside
 
