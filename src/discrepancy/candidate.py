@@ -79,10 +79,6 @@ class Candidate:
         where: the place in words, of what sits at no robot and no joint.
         title: the cause in words (``causes.base.Cause``).
         among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
-        form_share: of its trace, in amplitude, by which a real one has another form than its law.
-        form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
-        most_spread: of its kind over its tolerance that a machine can have.
-        hidden: whether it is never named: it only has its tolerance, as a cause that was left out has.
     """
 
     cause: str
@@ -95,10 +91,6 @@ class Candidate:
     where: str = "payload"
     title: str = ""
     among: int = 0
-    form_share: float = 0.0
-    form_size: float = 0.0
-    most_spread: float = np.inf
-    hidden: bool = False
 
     def in_shape(self, shape: Mapping[str, float]) -> Candidate:
         """The same with other numbers of its shape; an event acts when they say."""

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from discrepancy.channel import Channel
+from discrepancy.result.lines import format_diagnosis
 from discrepancy.result.read import FORMAT as DIAGNOSIS
 from discrepancy.result.read import parse_diagnosis
 from discrepancy.result.report import format_verdict
-from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import load_traces
-from discrepancy.rig import Channel
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.json import FORMAT as CALIBRATION
 from estimator.calibrate.json import calibration_from_dict

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from discrepancy import rules
+from discrepancy.evidence.settings import SETTINGS
 from mocobot_report.blocks.html import Node, el
 
 LEFT_ALONE = {
@@ -39,7 +39,7 @@ TERMS = (
          "has its grasp minus where the others have it."),
     Term("chi²/n, misfit", r"chi²/n|[Cc]hi-square|[Mm]isfit",
          "Differences between recording and model, each divided by what noise alone would make of it, squared; chi² is "
-         f"their sum, and chi²/n their mean. 1 is noise alone; up to {rules.CLEAN_CHI2_PER_N:g} counts as clean."),
+         f"their sum, and chi²/n their mean. 1 is noise alone; up to {SETTINGS.clean_chi2:g} counts as clean."),
     Term("clean data, clean noise", r"[Cc]lean (?:data|noise)|× clean",
          "What these sensors would record if nothing were wrong: their noise and rounding alone."),
     Term("closed loop, response to the commands",
@@ -70,8 +70,7 @@ TERMS = (
          "All places of a kind, such as all encoder zeros, are off by more than the tolerance; no single one stands "
          "out. The robots need a calibration, not a repair."),
     Term("nat", r"\bnats?\b",
-         "A factor of e = 2.7 in likelihood: 5 nats are a factor of 150, 20 nats of 500 million. Rivals closer than "
-         f"{rules.AMBIGUOUS_NATS:g} nats cannot be told apart."),
+         "A factor of e = 2.7 in likelihood: 5 nats are a factor of 150, 20 nats of 500 million."),
     Term("phi, theta, tau", r"\b(?:phi|theta|tau)\b",
          "Angles of the driven joints, angles of the gimbal, torques of the springs between motor and link."),
     Term("pooled", r"\bpooled\b", "From all recordings together."),
@@ -82,8 +81,8 @@ TERMS = (
          "How far robots may be off their design as far as is known before any recording: standard deviations."),
     Term("probability of a cause", r"\b[Pp]robability\b",
          "That this cause is at this place, and not a rival, nothing at all, or something that is not in the catalogue "
-         "and looks like it. It rests on the recordings, on what is as likely as what beforehand, and on how much of "
-         f"its trace the cause leaves. From {100 * rules.LEAST_PROBABILITY:g} % it is named."),
+         "and looks like it. It rests on the recordings and on how likely each was beforehand. A cause is named where "
+         f"something is there with more than {100 * SETTINGS.named:g} %."),
     Term("rank", r"\brank\b", "How many independent directions the data determine."),
     Term("residual", r"\b[Rr]esiduals?\b", "What is left when the model is taken from what was recorded."),
     Term("rms", r"\b[Rr]ms\b", "Root mean square, the usual size of something that varies about zero."),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.least_squares.patches import Patches
+from discrepancy.team.linear.patches import Patches
 
 
 def patchwork(rng, rows, channels, spans, firsts):

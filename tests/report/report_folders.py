@@ -11,7 +11,7 @@ import numpy as np
 from diagnosed import small_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import save_traces
-from discrepancy.rig import Channel
+from discrepancy.channel import Channel
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.parquet import write_recording

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from discrepancy.causes.numbers import number
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.formulas.terms import (
     ABOVE,
@@ -28,6 +27,7 @@ from discrepancy.formulas.terms import (
     Numbers,
     Shape,
 )
+from discrepancy.numbers import number
 from estimator.arrays import Array
 
 MISSING = 0.2

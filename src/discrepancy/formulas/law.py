@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.causes.units import SMALL, fitting
 from discrepancy.evidence.findings import Member
 from discrepancy.formulas.formula import Formula, Piece
+from discrepancy.numbers import SMALL, fitting
 from estimator.arrays import Array
 
 TRACE_S = 0.3
@@ -107,7 +107,8 @@ class Law:
         sizes = [
             abs(x) for name, (x, _) in self.formula.parameters.items() if name.startswith(("ampl", "offset"))
         ]
-        alone = self.unit in SMALL and self.unit not in (self.of.unit, self.times and self.times.unit)
+        power = max((shape.power for shape, _ in self.formula.terms), default=0)
+        alone = self.unit in SMALL and self.unit not in (power and self.of.unit, self.times and self.times.unit)
         return fitting(self.unit, max(sizes)) if alone else (self.unit, 1.0)
 
     def _unit_of(self, name: str) -> str:

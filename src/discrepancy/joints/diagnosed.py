@@ -8,13 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from discrepancy.channel import Channel
 from discrepancy.joints.effects import write_extended
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.json import unit_of, verdict_to_dict
-from discrepancy.result.diagnosed import REPORT, draw
+from discrepancy.result.folder import REPORT, draw
 from discrepancy.result.read import EXTENDED, NAME
 from discrepancy.result.report import format_verdict
-from discrepancy.rig import Channel
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 

@@ -3,11 +3,15 @@
 from collections.abc import Mapping
 from typing import Any
 
-from discrepancy import rules
-from discrepancy.causes.units import one_each, parameter
-from discrepancy.digits import three_digits
-from discrepancy.engine.explanation import Scatter
+from discrepancy.numbers import one_each, parameter, three_digits
 from discrepancy.result.read import is_of_joints, kind_of
+
+VISIBLE_CHI2_PER_N = 3.0
+"""Of the closed loop, from which something is said of it beside the verdict. Chosen."""
+
+RESPONSE_SHARE = 0.8
+"""Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
+Chosen."""
 
 Values = Mapping[str, Any]
 FARTHEST = 3
@@ -28,43 +32,11 @@ def remedy(values: Values) -> str:
     )
 
 
-def remains(values: Values) -> list[str]:
-    """Sentences on the misfit, on what is off everywhere and on the response that is left; none where all is clean.
-
-    Args:
-        values: a diagnosis as ``discrepancy.result.json`` documents it.
-    """
-    if is_of_joints(values) or values["residual"]["unlisted_nats"] is None:
-        return list(values["remains"])
-    residual = values["residual"]
-    out = []
-    if residual["chi2_per_n"] > rules.CLEAN_CHI2_PER_N:
-        before = residual["nominal"]["chi2_per_n"]
-        out.append(
-            f"A misfit of chi2/n {three_digits(residual['chi2_per_n'])} remains of {three_digits(before)}, where up to "
-            f"{rules.CLEAN_CHI2_PER_N:g} is clean: {residual['signature']['sentence'].rstrip('.')}."
-        )
-    elif residual["unlisted_nats"] >= rules.UNLISTED_NATS:
-        out.append(
-            f"What remains is small (chi2/n {three_digits(residual['chi2_per_n'])}), but no noise (by "
-            f"{residual['unlisted_nats']:.0f} nats): {residual['signature']['sentence'].rstrip('.')}."
-        )
-    return [*out, *of_scatter(values), *of_response(values)]
-
-
-def of_scatter(values: Values) -> list[str]:
-    """A sentence on kinds that scatter, unless the verdict says so already."""
-    if not values["scatter"] or values["verdict"] == "miscalibrated":
-        return []
-    kinds = ", ".join(kind_of(entry) for entry in values["scatter"])
-    return [f"Besides, all places alike are off by more than their tolerances: {kinds}. {remedy(values)}"]
-
-
 def of_response(values: Values) -> list[str]:
     """A sentence on what the simulated response to the commands still is off by."""
     gain = values["gain"]
     told = gain and (gain["held_out"]["after"] or gain["held_out"]["before"])
-    if not told or told["chi2_per_n"] <= rules.VISIBLE_CHI2_PER_N:
+    if not told or told["chi2_per_n"] <= VISIBLE_CHI2_PER_N:
         return []
     left = three_digits(told["chi2_per_n"])
     if not values["causes"]:
@@ -77,7 +49,7 @@ def of_response(values: Values) -> list[str]:
         said = f"The simulated response to the commands is off by chi2/n {left}, where noise alone leaves 1: {why}."
         return [said, *(f"It is by {found}." for found in all_as_found(gain))]
     removed = gain["removed"]
-    if removed is not None and removed["share"] >= rules.RESPONSE_SHARE:
+    if removed is not None and removed["share"] >= RESPONSE_SHARE:
         return []
     before = gain["held_out"]["before"]["chi2_per_n"]
     found = "".join(f", by {found}" for found in all_as_found(gain))
@@ -95,34 +67,6 @@ def all_as_found(gain: Values) -> list[str]:
     return [
         f"{three_digits(told['chi2_per_n'])} with every part as far off as it is found, within its tolerance, too"
     ]
-
-
-def scatter_to_dict(item: Scatter) -> dict[str, Any]:
-    """One entry of ``scatter``; see ``discrepancy.result.json``."""
-    tolerance = {p.name: float(p.tolerance) for p in item.candidate.parameters}
-    values: dict[str, Any] = {
-        "cause": item.candidate.cause,
-        "kind": item.candidate.kind,
-        "family": item.candidate.family,
-        "factor": float(item.factor),
-        "places": item.places,
-        "spread": {name: item.factor * size for name, size in tolerance.items()},
-        "tolerance": tolerance,
-        "nats": float(item.nats),
-        "each": [
-            {
-                "robot": place.robot,
-                "joint": place.joint,
-                "place": place.place,
-                "parameters": {
-                    name: {"value": float(value), "se": float(error)}
-                    for name, value, error in zip(tolerance, sizes, errors, strict=True)
-                },
-            }
-            for place, sizes, errors in item.each
-        ],
-    }
-    return values | {"sentence": scatter_sentence(values)}
 
 
 def scatter_sentence(entry: Values) -> str:

@@ -8,14 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from discrepancy.causes.numbers import number
-from discrepancy.causes.units import one_each, parameter
-from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
-from discrepancy.result.evidence_list import label
-from discrepancy.result.read import VERDICTS, is_of_joints
-from discrepancy.result.remains import remedy
-from discrepancy.result.text import (
+from discrepancy.numbers import number, one_each, parameter, three_digits
+from discrepancy.result.lines import (
     NOTHING_WRONG_HERE,
     WIDTH,
     cause_lines,
@@ -23,6 +18,9 @@ from discrepancy.result.text import (
     probability_words,
     wrapped,
 )
+from discrepancy.result.pictures.plots_evidence import label
+from discrepancy.result.read import VERDICTS, is_of_joints
+from discrepancy.result.remains import remedy
 from discrepancy.result.text_gain import gain_lines
 from discrepancy.result.text_rollouts import rollout_lines
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.channel import Channel
 from discrepancy.result.traces import Trace
-from discrepancy.rig import Channel
 from estimator.archive import read_archive, words, write_archive
 from estimator.arrays import Array
 from estimator.errors import InputError

@@ -5,11 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.causes.base import Shape
-from discrepancy.causes.intervals import worst_intervals
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Shape
 from discrepancy.team.linear.origin import beyond, places_of
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.trial_linear import TrialLinear
@@ -83,50 +81,6 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
         less, more = (candidate.in_shape({**candidate.shape, name: x}) for x in ends)
         steps.append((less, more, ends[1] - ends[0]))
     return steps
-
-
-def law_errors(candidate: Candidate, values: Array) -> Array:
-    """What the law's own error puts a cause's values, then the numbers of its shape that the data determine, off.
-
-    Where numbers of one cause have tolerances, what one of them leaves is taken up by all: each is off by the share
-    of the whole, in tolerances.
-
-    Args:
-        candidate: the cause.
-        values: of its parameters, in their own units, shape (k,).
-
-    Returns:
-        Standard deviations in their own units, shape (k + s,).
-    """
-    cause, units = CAUSES[candidate.cause], candidate.units
-    sizes = np.linalg.norm(values / units) * units if all(candidate.tolerant) else np.abs(values)
-    names = (name for name in cause.determined if name in candidate.shape)
-    numbers = [candidate.shape[name] if name in cause.inexact else 0.0 for name in names]
-    share = rules.TEAM_LAW_ERRORS.get(cause.name, rules.LAW_ERROR_SHARE)
-    return np.asarray(share * np.append(sizes, numbers), dtype=np.float64)
-
-
-def worst_events(
-    reductions: Sequence[Reduction],
-    remaining: Sequence[Array],
-    tolerances: Mapping[str, Tolerances],
-    excluded: Collection[str],
-) -> list[Candidate]:
-    """Transient causes at the intervals of every trial where the wrench balance is worst.
-
-    Args:
-        reductions: of every trial.
-        remaining: whitened residual of every trial, shape (n, C); its last six channels are the wrench balance.
-        tolerances: standard deviations by cause and parameter.
-        excluded: causes left out.
-    """
-    out = []
-    causes = [cause for cause in CAUSES.values() if cause.transient and cause.name not in excluded]
-    for t, (reduction, z) in enumerate(zip(reductions, remaining, strict=True) if causes else ()):
-        time, square = reduction.time[: reduction.moving], np.sum(z[: reduction.moving, -6:] ** 2, axis=1)
-        worst = worst_intervals(t, time, square, rules.TEAM_PUSH_S, two_sided=False)
-        out += [cause.event(tolerances.get(cause.name, {}), when) for cause in causes for when in worst]
-    return out
 
 
 def explained_by(

@@ -4,13 +4,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discrepancy import rules
+from discrepancy.team.linear.signals import TEAM_TRIM_S
 from estimator.arm.unit import ArmUnit
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
 from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
+
+GOOD_S = 30.0
+"""With which a diagnosis starts to be of use; only said. Chosen."""
+
+LEAST_S = 5.0
+"""Of all recordings together below which nothing is diagnosed. Chosen."""
 
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
@@ -30,14 +36,12 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
             f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
             "nothing to diagnose"
         )
-    used = [
-        max(0.0, recording.time[-1] - recording.time[0] - 2.0 * rules.TEAM_TRIM_S) for recording in recordings
-    ]
-    if sum(used) < rules.LEAST_S:
+    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TEAM_TRIM_S) for recording in recordings]
+    if sum(used) < LEAST_S:
         names = ", ".join(recording.name for recording in recordings)
         raise InputError(
-            f"{names}: {sum(used):.1f} s are left when {rules.TEAM_TRIM_S:g} s are dropped at both ends; a diagnosis "
-            f"needs at least {rules.LEAST_S:g} s, and {rules.GOOD_S:g} s of motion to be worth much"
+            f"{names}: {sum(used):.1f} s are left when {TEAM_TRIM_S:g} s are dropped at both ends; a "
+            f"diagnosis needs at least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
         )
     for other in recordings[1:]:
         if other.metadata.robots != first.metadata.robots:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
@@ -27,6 +26,15 @@ from mocobot_sim.scene.models import base_height_m, omnid_design
 from mocobot_sim.scene.payload_mjcf import nearest_inertia, payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
+
+LEAST_MOMENT_RATIO = 1e-3
+"""Least principal moment of a simulated payload over the largest: a body needs some. Chosen."""
+
+TEAM_TIMESTEP_S = 1e-3
+"""Of the closed loop's simulation. Measured: with it the integrator's error stays below the sensors' noise (ibid.)."""
+
+PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
+"""Of the closed loop. Measured: integrator at 1 and 0.25 ms; docs/diagnosis/validation-history.md, 'Integration'."""
 
 
 def team_of(
@@ -63,7 +71,7 @@ def team_of(
         down = np.array([0.0, 0.0, base_height_m()])
         p = p + down - R @ down
     mounts = RigidTransform.from_components(p, Rotation.from_matrix(R))
-    scene = build_team(payload, as_built, mounts=mounts, initial=initial, timestep_s=rules.TEAM_TIMESTEP_S)
+    scene = build_team(payload, as_built, mounts=mounts, initial=initial, timestep_s=TEAM_TIMESTEP_S)
     return apply_effects(scene, effects)
 
 
@@ -112,7 +120,7 @@ def posture(recording: Recording) -> tuple[tuple[Array, Array], ArmUnit | None]:
 
 def scale_of_response(noise: Noise, signals: Signals) -> dict[str, tuple[Array, Array]]:
     """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
-    floors = {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM}
+    floors = {"phi": PHI_FLOOR_RAD, "theta": THETA_FLOOR_RAD, "tau": TAU_FLOOR_NM}
     out = {}
     for k, (name, floor) in enumerate(floors.items()):
         sigma = np.sqrt(noise.sigma[k] ** 2 + noise.step[k] ** 2 / 12.0 + floor**2)
@@ -127,7 +135,7 @@ def impossible() -> None:
 
 def physical_inertia(inertia: Array) -> Array:
     """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum."""
-    return nearest_inertia(inertia, rules.LEAST_MOMENT_RATIO)
+    return nearest_inertia(inertia, LEAST_MOMENT_RATIO)
 
 
 def resimulation_errors(
@@ -139,7 +147,7 @@ def resimulation_errors(
     """
     try:
         scene = team_of(shared, bases, effects, *posture(recording))
-        log = resimulate(recording, replace(scene), timestep_s=rules.TEAM_TIMESTEP_S, trial_number=number)
+        log = resimulate(recording, replace(scene), timestep_s=TEAM_TIMESTEP_S, trial_number=number)
     except (TrialError, InputError):
         return None
     simulated = predicted(log)

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from discrepancy import rules
 from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.evidence.until import Until
-from discrepancy.team.around import around, exact, opened_by, placed
+from discrepancy.team.around import (
+    STRAIGHT_BESIDE_CHI2_PER_N,
+    STRAIGHT_CHI2_PER_N,
+    around,
+    exact,
+    opened_by,
+    placed,
+)
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.rows import TeamRows
 from estimator.errors import InputError
 
 LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
@@ -40,12 +45,11 @@ class TeamOutcome:
     @property
     def rig(self) -> TeamRig:
         """The recordings, linear around what was found, and their simulator."""
-        assert isinstance(self.problem.rig, TeamRig)
         return self.problem.rig
 
 
 def search_team(
-    rig: TeamRows, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
+    rig: TeamRig, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
     until: Until | None = None,
 ) -> TeamOutcome:  # fmt: skip
     """The likeliest causes of what a team's model leaves of its recordings."""
@@ -96,7 +100,7 @@ def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem
         problem, miss = exact(problem, state)
         search = replace(search, problem=problem, best=None)
         state = search.settled(search.value(state.chosen, state.posterior))
-        if miss < rules.STRAIGHT_CHI2_PER_N:
+        if miss < STRAIGHT_CHI2_PER_N:
             break
-        same = same and miss < rules.STRAIGHT_BESIDE_CHI2_PER_N
+        same = same and miss < STRAIGHT_BESIDE_CHI2_PER_N
     return problem, search, state, same

@@ -6,9 +6,6 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from discrepancy.engine.explanation import Explanation
-from discrepancy.least_squares.fit import Fit
-from discrepancy.team.rig import TeamRig
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.frames import in_encoder_frames, seen_by_encoders
@@ -16,21 +13,6 @@ from estimator.estimate.principal import inertia_matrix
 from estimator.rigid_team.residual import Shared
 
 Estimate = dict[str, Any]
-
-
-def estimates(rig: TeamRig, explanation: Explanation) -> dict[str, Estimate]:
-    """Payload estimates ``before`` and ``after`` the robots and causes are known.
-
-    Before, by least squares in which nothing is off. After, the most probable: the causes are in it, and all else is as
-    far off as the data say of robots that scatter as these do, in noise as it was found.
-
-    Returns:
-        Two dictionaries ``mass_kg``, ``p_1c_m`` [3], ``principal_inertia_kgm2`` [3] ascending, and ``grasps``: a list
-        of ``p_1i_m`` [3] and ``R_1i_rotvec_deg`` [3].
-    """
-    designed = Fit.of(explanation.nothing.problem.as_whitened, background=False)
-    fits = {"before": designed, "after": explanation.hypothesis.fit}
-    return {name: to_dict(rig.linear[0].shared.moved(-fit.shared)) for name, fit in fits.items()}
 
 
 def to_dict(shared: Shared) -> Estimate:

@@ -7,23 +7,25 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
 from scipy.special import logsumexp
 
-from discrepancy import rules
 from discrepancy.candidate import Candidate, Transient
 from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.origin import origin_of
-from discrepancy.team.rows import TeamRows
+from discrepancy.team.rig import TeamRig
 from discrepancy.team.unlisted import OPEN_NATS, Laws
 from estimator.arrays import Array
+
+TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
+"""Durations searched. Chosen: octaves."""
 
 EDGES_HZ = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
 """Octaves of the noise; rows come 12.5 times a second. What rests is a band of its own."""
@@ -91,7 +93,7 @@ class Listed:
     """
 
     groups: Sequence[Group]
-    X: Array
+    X: NDArray[np.float32]
 
     @classmethod
     def together(cls, each: list[Listed]) -> Listed:
@@ -129,7 +131,7 @@ class TeamProblem:
         there: values where all is linear, shape (K,).
     """
 
-    rig: TeamRows
+    rig: TeamRig
     cells: Cells
     groups: list[Group] = field(default_factory=list)
     families: list[list[int]] = field(default_factory=list)
@@ -183,7 +185,7 @@ class TeamProblem:
         """Append columns (n, 3 C, k), one array a trial."""
         return self.cells.add_rows(self.spectra(columns))
 
-    def beside(self, X: Array) -> Array:
+    def beside(self, X: NDArray[Any]) -> NDArray[Any]:
         """Rows of the cells, shape (C, n, k), beside what chosen causes leave open."""
         if self.opened is None:
             return X
@@ -192,7 +194,7 @@ class TeamProblem:
             out[..., first : first + BLOCK] = self._beside(X[..., first : first + BLOCK])
         return out
 
-    def _beside(self, X: Array) -> Array:
+    def _beside(self, X: NDArray[Any]) -> NDArray[Any]:
         bands, order = self.bands, self.cells.order
         plain = np.empty_like(X)
         plain[:, order] = X
@@ -309,7 +311,7 @@ class TeamProblem:
             R = np.einsum("nck,ncl->nkl", D[:m], D[:m])
             q, r = (np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)]) for x in (Q, R))
             ridge = 1e-6 * np.eye(6) * np.trace(r[-1]) / max(m, 1)
-            for seconds in rules.TEAM_PUSH_S:
+            for seconds in TEAM_PUSH_S:
                 n = max(2, round(seconds * rate))
                 if 2 * n > m:
                     continue
@@ -461,7 +463,7 @@ class Catalogue:
         candidates: by the identity of a group.
     """
 
-    rig: TeamRows
+    rig: TeamRig
     groups: list[Group]
     labels: list[tuple[Candidate, int] | None]
     tolerance: list[float]
@@ -524,7 +526,7 @@ def _apart(first: Array, others: Array, most: int = 2) -> Array:
 
 
 def team_problem(
-    rig: TeamRows, opened: Sequence[Array] | None = None, catalogue: Catalogue | None = None
+    rig: TeamRig, opened: Sequence[Array] | None = None, catalogue: Catalogue | None = None
 ) -> TeamProblem:
     """The linear problem of a rig.
 
@@ -533,8 +535,8 @@ def team_problem(
         opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C).
         catalogue: columns of this rig, or of one with the same whitening nearby; None makes them.
     """
-    rows = list(rig.rows([]))
-    moving = [len(r.residual) if r.moving is None else r.moving for r in rows]
+    rows = rig.rows()
+    moving = [linear.reduction.moving for linear in rig.linear]
     rates = [linear.signals.rate_hz / linear.reduction.step for linear in rig.linear]
     edges = np.append(EDGES_HZ, [np.inf, np.inf])
     bands = RowBands(rates, [len(r.residual) for r in rows], edges, moving=moving)

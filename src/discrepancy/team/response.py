@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from discrepancy.candidate import Candidate
-from discrepancy.digits import three_digits
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Key, Search, State
 from discrepancy.formulas.law import Law
+from discrepancy.numbers import three_digits
 from discrepancy.team.around import found_in, robots_at
 from discrepancy.team.closed_loop import named_effects, posture, team_of
 from discrepancy.team.diagnose import TeamOutcome
@@ -77,7 +77,6 @@ class Hypothesis:
     @property
     def rig(self) -> TeamRig:
         """The recordings."""
-        assert isinstance(self.problem.rig, TeamRig)
         return self.problem.rig
 
     @cached_property
@@ -415,7 +414,6 @@ def as_found(outcome: TeamOutcome) -> tuple[TeamRig, AsFound]:
         InputError: there are no such robots.
     """
     rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
-    assert isinstance(rig, TeamRig)
     units, _, shared = robots_at(rig, found)
     return rig, AsFound.of(units, shared, found.active)
 

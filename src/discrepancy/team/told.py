@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Finding
-from discrepancy.result.diagnosed import REPORT, draw
-from discrepancy.result.evidence_list import place_of
+from discrepancy.result.folder import REPORT, draw
 from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
 from discrepancy.result.remains import of_response
 from discrepancy.result.report import format_verdict
-from discrepancy.result.signature import signature
 from discrepancy.result.told import Told, Values
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.gain import Gain, Response
 from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
+from discrepancy.team.signature import signature
 from discrepancy.team.verdict import TeamVerdict
 from discrepancy.team.words import TeamWords
 from estimator.errors import InputError
@@ -173,3 +173,16 @@ def _mean(responses: Sequence[Response | None]) -> dict[str, float] | None:
     each = [values for values in map(_response, responses) if values is not None]
     whole = each and len(each) == len(responses)
     return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if whole else None
+
+
+def place_of(candidate: Candidate) -> dict[str, Any]:
+    """Cause (its name, in words, in words at its place), family and place of a candidate, as all over the JSON."""
+    return {
+        "cause": candidate.cause,
+        "kind": candidate.kind,
+        "name": candidate.label,
+        "family": candidate.family,
+        "robot": candidate.robot,
+        "joint": candidate.joint,
+        "place": candidate.place,
+    }

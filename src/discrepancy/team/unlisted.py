@@ -14,10 +14,10 @@ from scipy.stats import rankdata
 from discrepancy.evidence.posterior import Group
 from discrepancy.formulas.formula import Curve, Kind, Piece, formula_of
 from discrepancy.formulas.law import Law, Of, traces
-from discrepancy.laws.place import Place
-from discrepancy.laws.variable import TIME, Variable
 from discrepancy.team.laws.directions import directions_at
+from discrepancy.team.laws.place import Place
 from discrepancy.team.laws.places import places_of
+from discrepancy.team.laws.variable import TIME, Variable
 from discrepancy.team.laws.variables import joint_variable, signals_of
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array

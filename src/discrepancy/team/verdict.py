@@ -17,11 +17,11 @@ from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.formulas.law import Law
-from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.traces import Trace
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.estimates import Estimate, to_dict
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.parts import left_of, parts_of
 from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import TeamRig

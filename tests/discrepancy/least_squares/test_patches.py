@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discrepancy.least_squares.gram import gram_of
-from discrepancy.least_squares.patches import Patches
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.patches import Patches
+from discrepancy.team.linear.whitening import Whitening
 from patchwork import patchwork
 
 N, C, MOVING = 60, 5, 50

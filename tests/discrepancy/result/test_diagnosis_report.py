@@ -11,15 +11,15 @@ import pytest
 
 from diagnosed import small_diagnosis
 from discrepancy.candidate import Candidate
-from discrepancy.causes.numbers import number
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.numbers import number
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure
-from discrepancy.result.text import WIDTH, format_diagnosis, probability_words
+from discrepancy.result.lines import WIDTH, format_diagnosis, probability_words
 from discrepancy.result.text_gain import ERRORS, response_units
 from discrepancy.result.traces import Trace, group_units, groups
-from discrepancy.rig import Channel
+from discrepancy.channel import Channel
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors

@@ -7,7 +7,7 @@ import pytest
 from diagnosed import VERDICTS, scattered, small_diagnosis
 from discrepancy import rules
 from discrepancy.result.remains import farthest, remains
-from discrepancy.result.text import format_diagnosis
+from discrepancy.result.lines import format_diagnosis
 from mocobot_report.diagnosis.part import KINDS
 
 

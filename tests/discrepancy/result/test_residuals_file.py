@@ -14,7 +14,7 @@ import pytest
 
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import TABLES, load_traces, save_traces
-from discrepancy.rig import Channel
+from discrepancy.channel import Channel
 from estimator import inputs
 from estimator.errors import InputError
 

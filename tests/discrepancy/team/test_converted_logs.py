@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.linear.chatter import Fast
 from discrepancy.team.linear.inertia import held_inertia
 from discrepancy.team.linear.start import linearised_trials, start_shared

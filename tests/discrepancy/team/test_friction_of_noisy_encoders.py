@@ -6,7 +6,7 @@ from helpers.team_case import exact
 
 from discrepancy import rules
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.causes.sliding import KEPT, _doubtful
+from discrepancy.team.causes.friction import KEPT, _doubtful
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
 from estimator.filtering import differentiate

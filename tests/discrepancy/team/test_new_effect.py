@@ -8,7 +8,7 @@ import pytest
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.result.json import diagnosis_to_dict
 from discrepancy.result.read import read_diagnosis
-from discrepancy.result.text import format_diagnosis
+from discrepancy.result.lines import format_diagnosis
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances

@@ -10,7 +10,7 @@ import pytest
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.laws.candidate import candidate_of
 from discrepancy.laws.term import Term
-from discrepancy.laws.variable import TIME
+from discrepancy.team.laws.variable import TIME
 from discrepancy.least_squares.problem import Problem
 from discrepancy.team import rows
 from discrepancy.team.linear import start

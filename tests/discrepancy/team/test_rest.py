@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import fftconvolve
 from scipy.stats import chi2
 
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import Resting
 from team_case import exact

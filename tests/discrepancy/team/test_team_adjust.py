@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.rules import MODEL_ABOVE, MODEL_BELOW_HZ, MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD
-from discrepancy.team.chattering import chattering
+from discrepancy.team.linear.chatter import chattering
 from discrepancy.team.linear.chatter import Fast
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals

@@ -6,11 +6,27 @@ from typing import ClassVar
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from discrepancy import rules
-from discrepancy.causes.free_while import in_parts, pieces_while
 from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.causes.free_while import in_parts, pieces_while
+from discrepancy.team.linear.rest import PLAY_FORCE_N
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+
+PLAY_COLUMNS_AT_A_TIME = 16
+"""Of that travel. Chosen: memory."""
+
+PLAY_CONTACT_PER_N = 0.02
+"""Of a play, by which its ends give way to a newton, over which slopes are taken. Chosen: 1 um/N behind 50 um; columns
+go straight with it."""
+
+PLAY_OPEN_KNOTS_S = 0.05
+"""Between knots of that travel. Measured: play of 0.8 mm leaves a chi2/n of 51 with knots every 0.2 s and forces below
+0.4 N, 12 every 0.1 s below 1 N, 1.15 every 0.05 s; nothing faster passes the rows' filter."""
+
+PLAY_OPEN_N, PLAY_OPEN_S = 1.0, 0.03
+"""Force below which a payload that is loose may travel, and for how long before and after. Measured: it travels for a
+tenth of a second, with forces of up to 1 N in the filtered signals where there should be none; and derived: so long a
+filter of 20 Hz takes to show a force that begins. With 0.4 N alone, half of the travel is outside."""
 
 
 class GraspPlay(Cause):
@@ -25,10 +41,9 @@ class GraspPlay(Cause):
     parameters = ("play_m",)
     tolerances = (3e-6,)
     at = "grasp"
-    shapes = ({"force_N": rules.PLAY_FORCE_N}, {"force_N": rules.PLAY_FORCE_N, "contact_per_N": 0.0})
-    determined: ClassVar = {"contact_per_N": rules.PLAY_CONTACT_PER_N}
+    shapes = ({"force_N": PLAY_FORCE_N}, {"force_N": PLAY_FORCE_N, "contact_per_N": 0.0})
+    determined: ClassVar = {"contact_per_N": PLAY_CONTACT_PER_N}
     positive = ("play_m",)
-    form_share = rules.FRICTION_FORM_SHARE
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
     def sentence(self, n):
@@ -39,9 +54,6 @@ class GraspPlay(Cause):
 
     def slope_step(self, name, number):
         return self.determined[name]  # from nought on, and straight
-
-    def possible(self, values, se, shape):
-        return super().possible(values, se, shape) and shape.get("contact_per_N", 0.0) >= 0.0
 
     def physical(self, values, context):
         play_m = float(values[0])
@@ -55,14 +67,12 @@ class GraspPlay(Cause):
 
     def unknowns(self, trial, robot, joint, shape):
         force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
-        around = np.ones(2 * math.ceil(rules.PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
+        around = np.ones(2 * math.ceil(PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
         columns = []
         for axis in range(3):
-            small = np.abs(force[:, axis]) < rules.PLAY_OPEN_N
+            small = np.abs(force[:, axis]) < PLAY_OPEN_N
             loose = np.asarray(binary_dilation(small, around), dtype=np.bool_)
-            places = in_parts(
-                pieces_while(loose, rate_hz, rules.PLAY_OPEN_KNOTS_S), rules.PLAY_COLUMNS_AT_A_TIME
-            )
+            places = in_parts(pieces_while(loose, rate_hz, PLAY_OPEN_KNOTS_S), PLAY_COLUMNS_AT_A_TIME)
             along = trial.data.R_bi[:, robot, :, axis] @ trial.bases.R[robot].T
             columns.append(trial.of_shifts(robot, along, places))
         return columns[0].beside(columns[1:])

@@ -8,13 +8,38 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from discrepancy import rules
-from discrepancy.causes.base import Shape
-from discrepancy.causes.pendulum import Pendulum, swung
-from discrepancy.team.causes.base import Cause
+from discrepancy.team.causes.base import Cause, Shape
+from discrepancy.team.causes.pendulum import SWING_FIRST_ROUNDS, SWING_ROUNDS, Pendulum, swung
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.so3 import skew
+
+SLOSH_SECONDS = 150
+"""Second modes that are told apart, each as likely as the others. Derived: thirty lengths, 10 % apart, by five headings
+or shares. Without it a second mode would always explain what a pendulum of one mode does, and noise beside it."""
+
+SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
+"""By which a heading is moved next, and the step of slopes by it. Chosen."""
+
+SLOSH_SECOND_FINER, SLOSH_SHARES_FINER = (0.6, 0.75, 0.87, 0.95, 1.05, 1.15, 1.35, 1.7), (0.5, 0.75, 1.3, 2.0)
+"""Shares of the second length, and of its share, tried next. Chosen."""
+
+SLOSH_SECOND, SLOSH_SHARE = (0.3, 0.55, 1.8, 3.3), 0.25
+"""Length of a second pendulum over the first's, and its share of the mass, tried first. Chosen: a quarter is what the
+second mode of two equal pendulums in a row has."""
+
+SLOSH_HEADINGS_RAD = (0.0, 0.79, 1.57, 2.36)
+"""Its headings, tried first. Measured, likewise: one 25 deg off still helps."""
+
+SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
+"""Length across over that along of what swings on two lengths, tried first. Measured (tuning set 99300, damping ratio
+0.04): a length 25 % off still helps."""
+
+SLOSH_MOST_DAMPED = 0.3
+"""Largest damping ratio tried. Chosen."""
+
+SLOSH_LENGTHS_M = (0.04, 1.0)
+"""Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 
 OFF = ("off_x_m", "off_y_m", "off_z_m")
 """Numbers of a shape: from the centre of mass to where it hangs for the columns, in {1}; any place nearby will do."""
@@ -24,7 +49,7 @@ class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
 
     Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length, far ones
-    what ``discrepancy.causes.pendulum`` says; v is how fast it would swing if it turned with the payload, to which its
+    what ``team.causes.pendulum`` says; v is how fast it would swing if it turned with the payload, to which its
     damper is fixed. The payload feels -mass x'' at the point, upwards what raises the mass, and, as the damper pulls
     where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and rigid part are in the
     payload's own parameters.
@@ -49,7 +74,7 @@ class Slosh(Cause):
         "length_m": 0.02,
         "damping_ratio": 0.1,
         "across_length_m": 0.05,
-        "heading_rad": rules.SLOSH_TURN_RAD,
+        "heading_rad": SLOSH_TURN_RAD,
         "second_length_m": 0.05,
         "second_share": 0.1,
     }
@@ -72,7 +97,7 @@ class Slosh(Cause):
         point = trial.shared.pi[1:4] / trial.shared.pi[0] + off
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
         (*ways, up), wrench = _level_ways(trial, point), np.zeros((len(R_b1), 6, 4))
-        rounds = rules.SWING_ROUNDS if set(OFF) & set(shape) else rules.SWING_FIRST_ROUNDS
+        rounds = SWING_ROUNDS if set(OFF) & set(shape) else SWING_FIRST_ROUNDS
         if "across_length_m" in shape:
             drop_m = shape["length_m"] - shape["across_length_m"]
             along, across = _ways(R_b1, shape["heading_rad"])
@@ -110,22 +135,10 @@ class Slosh(Cause):
         return [x for x in ({**shape, **two} for two in more) if _tried(x)]
 
     def alike(self, shape):
-        return rules.SLOSH_SECONDS if _has_two(shape) else self.among
-
-    def recentred(self, values, shape):
-        """Swung about where it is found to hang."""
-        reach = rules.SLOSH_REACH_M
-        at = np.clip(values[1:] / max(values[0], 1e-6), -reach, reach)
-        return {**shape, **dict(zip(OFF, at.tolist(), strict=True))}
+        return SLOSH_SECONDS if _has_two(shape) else self.among
 
     def slope_step(self, name, number):
         return self.determined[name] if name == "heading_rad" else super().slope_step(name, number)
-
-    def possible(self, values, se, shape):
-        """A mass that is there, swings, and hangs within the payload's reach."""
-        within = np.abs(values[1:]) <= rules.SLOSH_REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
-        swings = shape["damping_ratio"] <= rules.SLOSH_SWINGS and 0.0 < shape.get("second_share", 0.5) < 1.0
-        return bool(values[0] > 2.0 * se[0] and within.all() and swings)
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
@@ -190,30 +203,28 @@ def _second_modes(shape: Shape) -> list[Shape]:
     length_m = shape["length_m"]
     two: list[Shape] = [
         {"across_length_m": length_m * x, "heading_rad": turn}
-        for x in rules.SLOSH_ACROSS
-        for turn in rules.SLOSH_HEADINGS_RAD
+        for x in SLOSH_ACROSS
+        for turn in SLOSH_HEADINGS_RAD
     ]
-    return two + [
-        {"second_length_m": length_m * x, "second_share": rules.SLOSH_SHARE} for x in rules.SLOSH_SECOND
-    ]
+    return two + [{"second_length_m": length_m * x, "second_share": SLOSH_SHARE} for x in SLOSH_SECOND]
 
 
 def _nearer_mode(shape: Shape) -> list[Shape]:
     """Numbers of the second mode, changed."""
     name = "across_length_m" if "across_length_m" in shape else "second_length_m"
-    near: list[Shape] = [{name: shape[name] * x} for x in rules.SLOSH_SECOND_FINER]
+    near: list[Shape] = [{name: shape[name] * x} for x in SLOSH_SECOND_FINER]
     if name == "across_length_m":
-        return near + [{"heading_rad": shape["heading_rad"] + x} for x in rules.SLOSH_HEADINGS_FINER_RAD]
-    return near + [{"second_share": shape["second_share"] * x} for x in rules.SLOSH_SHARES_FINER]
+        return near + [{"heading_rad": shape["heading_rad"] + x} for x in SLOSH_HEADINGS_FINER_RAD]
+    return near + [{"second_share": shape["second_share"] * x} for x in SLOSH_SHARES_FINER]
 
 
 def _tried(shape: Shape) -> bool:
     """Whether pendulums are so long and so little damped that it is worth a try."""
-    least, most = rules.SLOSH_LENGTHS_M
+    least, most = SLOSH_LENGTHS_M
     lengths = [x for name, x in shape.items() if name.endswith("length_m")]
     share = shape.get("second_share", 0.5)
     return all(least <= x <= most for x in lengths) and (
-        shape["damping_ratio"] <= rules.SLOSH_MOST_DAMPED and share < 1.0
+        shape["damping_ratio"] <= SLOSH_MOST_DAMPED and share < 1.0
     )
 
 

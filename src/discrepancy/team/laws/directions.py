@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.laws.place import Place
+from discrepancy.team.laws.place import Place
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import moment_about_axes
 from estimator.arrays import Array

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from discrepancy.laws.place import Place
-from discrepancy.laws.variable import Variable
+from discrepancy.team.laws.place import Place
+from discrepancy.team.laws.variable import Variable
 from discrepancy.team.laws.variables import joint_variable, payload_felt, payload_variable
 
 XYZ = ("x", "y", "z")
@@ -52,23 +52,6 @@ def places_of(robots: int) -> list[Place]:
     return out
 
 
-def is_reading(place: Place) -> bool:
-    """Whether it is what a sensor reads that is wrong."""
-    return place.name in READINGS
-
-
-def own_reading(place: Place) -> str:
-    """Name of the signal that is read there."""
-    return f"{READINGS[place.name]}_{place.robot}_{place.joint}"
-
-
-def indices_of(place: Place) -> tuple[int, int]:
-    """Robot and joint of a reading, from 0."""
-    assert place.robot is not None
-    assert place.joint is not None
-    return place.robot - 1, place.joint - 1
-
-
 def _joint(
     name: str, robot: int, joint: int, target: str, unit: str, title: str, own: tuple[Variable, ...], *,
     offset: bool = False, twin: str | None = None,
@@ -88,13 +71,3 @@ def _payload(
     units: tuple[str, ...] = (),
 ) -> Place:
     return Place(name, None, None, targets, axes, unit, title, own, units=units)
-
-
-def twin_of(place: Place) -> Place | None:
-    """The place whose rows are the same, minus these; see ``Place.twin``."""
-    if place.twin is None or place.robot is None or place.joint is None:
-        return None
-    return _joint(
-        place.twin, place.robot, place.joint, "driven_torque", place.unit, "torque in {driven joint}",
-        place.own, twin=None,
-    )  # fmt: skip

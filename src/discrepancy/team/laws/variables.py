@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.laws.variable import TIME, Kind, Variable
+from discrepancy.team.laws.variable import TIME, Kind, Variable
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
@@ -53,12 +53,6 @@ def payload_felt() -> Variable:
     )
     words = "acceleration felt in the payload, less gravity"
     return Variable("payload_felt", words, "f", parts[0].unit, "vector", parts=parts, turns=turns)
-
-
-def variables_of(robots: int) -> list[Variable]:
-    """All signals of N robots and their payload."""
-    each = [joint_variable(n, i + 1, j) for n in _JOINTS for i in range(robots) for j in (1, 2, 3)]
-    return [TIME, *each, *(payload_variable(n, axis) for n in _PAYLOAD for axis in "xyz")]
 
 
 def signals_of(linear: TrialLinear) -> dict[str, Array]:

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from discrepancy import rules
-from discrepancy.least_squares.stored import given_back, is_stored, stored
 from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.stored import given_back, is_stored, stored
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+
+LINEAR_BYTES = 1.5e8
+"""Of all linear trials, from which they are kept in files. Chosen: memory; those of seven minutes of three robots."""
 
 
 def held(trials: Iterable[TrialLinear]) -> tuple[TrialLinear, ...]:
@@ -24,7 +26,7 @@ def held(trials: Iterable[TrialLinear]) -> tuple[TrialLinear, ...]:
     for trial in trials:
         out.append(trial)
         total += sum(x.nbytes for x in _arrays(trial))
-        if total > rules.LINEAR_BYTES:
+        if total > LINEAR_BYTES:
             out = [filed(each) for each in out]
     return tuple(out)
 

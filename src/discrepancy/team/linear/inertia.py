@@ -2,10 +2,13 @@
 
 import numpy as np
 
-from discrepancy import rules
 from estimator.arrays import Array
 from estimator.estimate.principal import inertia_matrix
 from estimator.rigid_team.residual import Shared
+
+INERTIA_OFF = 0.3
+"""Share by which the inertia that turns noise into moments may be off. Chosen: then these are off by as much at most;
+with none at all, a healthy log of 12 bits left twice its noise."""
 
 
 def held_inertia(p_1i: Array, mass: float, p_1c: Array) -> Array:
@@ -42,4 +45,4 @@ def inertia_is_like_held(shared: Shared) -> Array:
 def is_another(a: Shared, b: Shared) -> bool:
     """Whether noise that is turned into moments by a's inertia must be so again, by b's."""
     first, second = inertia_about_centre(a), inertia_about_centre(b)
-    return bool(np.linalg.norm(first - second) > rules.INERTIA_OFF * np.linalg.norm(second))
+    return bool(np.linalg.norm(first - second) > INERTIA_OFF * np.linalg.norm(second))

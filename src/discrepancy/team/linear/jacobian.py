@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy import rules
 from estimator.arm.arms import Arms, arm_of, levelled
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
@@ -17,6 +16,9 @@ from estimator.rigid_team.slots import COUNT, PHI, STEPS, THETA
 from estimator.signals.arm_data import ArmData, arm_data
 from estimator.signals.grasp_data import GraspData
 from estimator.so3 import cross
+
+TEAM_JACOBIAN_HZ = 25.0
+"""Rate of derivatives, interpolated between. Chosen: twice the rows'."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,7 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
     Central differences through one robot's own formulas, then by hand through what is linear in the robots;
     evaluated at 25 Hz.
     """
-    samples, every = len(s), max(1, round(data.rate_hz / rules.TEAM_JACOBIAN_HZ))
+    samples, every = len(s), max(1, round(data.rate_hz / TEAM_JACOBIAN_HZ))
     knots = np.arange(0, samples, every)
     s = s[knots]
     data = _thinned(data, knots)

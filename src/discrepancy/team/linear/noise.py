@@ -9,14 +9,45 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from discrepancy import rules
-from discrepancy.team.linear.chatter import Fast, columns_of, native_hz
-from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.chatter import (
+    MODEL_HZ,
+    MODEL_PHI_RAD,
+    MODEL_TAU_NM,
+    MODEL_THETA_RAD,
+    Fast,
+    columns_of,
+    native_hz,
+)
+from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.sampling import SENSORS
 from mocobot_logs.resample.resampling import Resampling
+
+QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
+"""Noise of the rates that tell rest from sliding, up to which they are smoothed as usual; signals with more are
+smoothed more, down to that cut-off. Derived: a joint that turns round at 0.3 rad/s^2 is told to do so within 1 ms, of a
+row's 80; a torque's is that of the sensors with which thresholds were chosen; rows have nothing above 5 Hz. Noise
+counts from that share of a rounding step on: with less a joint at rest repeats one reading; its error is a tenth."""
+
+PHASE_TRAVEL = 4.0
+"""Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
+changes an encoder's speed by half at most."""
+
+SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
+"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and how far that of the signal
+falls with it. Chosen: the trajectory need only be one that the stairs may have come from."""
+
+CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
+"""Cut-off of signals in which something chatters, over its frequency, and at most over the sampling rate. Derived: the
+mean of a torque times the angle at which it acts is that of both oscillating together, of which the square of the
+filter's gain is left: at 27 Hz and 100 Hz 0.4 % with the usual cut-off and all with 45 Hz, at 1 kHz 97 % with 54 Hz.
+Measured: of torques of +- 7 N m it is up to 49 mN (docs/diagnosis/validation.md, 'Robots that chatter')."""
+
+MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
+"""Up to where, and the share of it that is left above. Measured: of the same, a twentieth of the power from 3 Hz on,
+and hardly anything from 4 Hz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +79,19 @@ class Noise:
 
         What chatters is let through: dry friction turns with it, and hardly holds up what is slower.
         """
-        noisy = self.sigma > rules.NOISY_STEPS * self.step
+        noisy = self.sigma > NOISY_STEPS * self.step
         white = np.where(noisy, np.hypot(self.sigma, self.step / np.sqrt(12.0)), 0.0)
         rates = white * np.sqrt(signals.rate_hz / native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
-        quiet = np.array([rules.QUIET_RAD_PER_S, rules.QUIET_RAD_PER_S, rules.QUIET_NM_PER_S])
+        quiet = np.array([QUIET_RAD_PER_S, QUIET_RAD_PER_S, QUIET_NM_PER_S])
         # Noise of a rate grows with the cut-off to the power 3/2.
         less = (quiet[:, None, None] / np.maximum(rates, 1e-300)).clip(max=1.0) ** (2.0 / 3.0)
-        smooth_hz = np.maximum(rules.TEAM_SMOOTH_HZ * less, rules.QUIET_HZ)
+        smooth_hz = np.maximum(TEAM_SMOOTH_HZ * less, QUIET_HZ)
         fast = Fast.of(signals) if self.chatters else None
         if fast is None or not fast.is_loud(self.step):
             return replace(signals, smooth_hz=smooth_hz)
-        most = rules.CHATTER_RATE_SHARE * signals.rate_hz
-        let_through = np.where(fast.lines > 0.0, np.minimum(rules.CHATTER_OVER * fast.at_hz, most), 0.0)
-        pre_hz = max(float(let_through.max()), rules.TEAM_PRE_HZ)
+        most = CHATTER_RATE_SHARE * signals.rate_hz
+        let_through = np.where(fast.lines > 0.0, np.minimum(CHATTER_OVER * fast.at_hz, most), 0.0)
+        pre_hz = max(float(let_through.max()), TEAM_PRE_HZ)
         return replace(signals, smooth_hz=np.maximum(smooth_hz, let_through), pre_hz=pre_hz)
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
@@ -120,7 +151,7 @@ def _rate_gain(rate_hz: float) -> float:
     """Standard deviation of the rates that tell rest from motion, of white noise of 1 at every sample [1/s]."""
     impulse = np.zeros(int(4.0 * rate_hz) + 1)
     impulse[len(impulse) // 2] = 1.0
-    smooth = low_pass(impulse, rate_hz, rules.TEAM_SMOOTH_HZ)
+    smooth = low_pass(impulse, rate_hz, TEAM_SMOOTH_HZ)
     return float(np.linalg.norm(differentiate(smooth, rate_hz)))
 
 
@@ -138,11 +169,11 @@ def _model_errors(x: Array, rate_hz: float, rng: np.random.Generator) -> Array:
 
     Rounding does so, too, and is drawn for it: to a step that scatters by the floor; of what is quick, little stays.
     """
-    floor = np.repeat([rules.MODEL_PHI_RAD, rules.MODEL_THETA_RAD, rules.MODEL_TAU_NM], 3)
-    step = floor * np.sqrt(12.0 * rate_hz / rules.MODEL_HZ)
+    floor = np.repeat([MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM], 3)
+    step = floor * np.sqrt(12.0 * rate_hz / MODEL_HZ)
     errors = _read(x, step, np.zeros_like(step), rng)
-    slow = low_pass(errors, rate_hz, rules.MODEL_BELOW_HZ)
-    return slow + rules.MODEL_ABOVE * (errors - slow)
+    slow = low_pass(errors, rate_hz, MODEL_BELOW_HZ)
+    return slow + MODEL_ABOVE * (errors - slow)
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:
@@ -152,8 +183,8 @@ def _phase(x: Array, rng: np.random.Generator) -> Array:
     a broken line over travel, drawn anew every ``PHASE_TRAVEL`` steps, uniform modulo one everywhere.
     """
     # Beyond two knots a sample nothing is left to repeat.
-    travel = np.minimum(np.abs(np.diff(x, axis=0, prepend=x[:1])), 2 * rules.PHASE_TRAVEL)
-    at = np.cumsum(travel, axis=0) / rules.PHASE_TRAVEL
+    travel = np.minimum(np.abs(np.diff(x, axis=0, prepend=x[:1])), 2 * PHASE_TRAVEL)
+    at = np.cumsum(travel, axis=0) / PHASE_TRAVEL
     low = np.floor(at).astype(np.intp)
     knots = rng.uniform(0.0, 2.0, (int(low.max()) + 2, *x.shape[1:]))
     return np.take_along_axis(knots, low, axis=0) * (1.0 - (at - low)) + np.take_along_axis(
@@ -168,13 +199,11 @@ def _unrounded(signals: Signals, step: Array) -> Array:
     three stairs go into a period of ``TEAM_SMOOTH_HZ``, the cut-off falls with their frequency.
     """
     x, rate_hz = columns_of(signals), signals.rate_hz
-    slow = differentiate(low_pass(x, rate_hz, rules.SLOW_HZ), rate_hz)
-    stairs_hz = low_pass(np.abs(slow), rate_hz, rules.SLOW_HZ) / np.where(step > 0, step, 1e-300)
-    cutoffs = rules.TEAM_SMOOTH_HZ * 0.5 ** np.arange(rules.SMOOTHER_OCTAVES + 1)
-    octave = np.log2(rules.TEAM_SMOOTH_HZ / np.maximum(stairs_hz / 3.0, 1e-9)).clip(
-        0.0, rules.SMOOTHER_OCTAVES
-    )
-    octave[stairs_hz < rules.SLOW_HZ] = 0.0  # at rest
+    slow = differentiate(low_pass(x, rate_hz, SLOW_HZ), rate_hz)
+    stairs_hz = low_pass(np.abs(slow), rate_hz, SLOW_HZ) / np.where(step > 0, step, 1e-300)
+    cutoffs = TEAM_SMOOTH_HZ * 0.5 ** np.arange(SMOOTHER_OCTAVES + 1)
+    octave = np.log2(TEAM_SMOOTH_HZ / np.maximum(stairs_hz / 3.0, 1e-9)).clip(0.0, SMOOTHER_OCTAVES)
+    octave[stairs_hz < SLOW_HZ] = 0.0  # at rest
     out = np.zeros_like(x)
     for k, cutoff in enumerate(cutoffs):
         weight = np.maximum(1.0 - np.abs(octave - k), 0.0)

@@ -11,11 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, eye_array
 
-from discrepancy import rules
-from discrepancy.least_squares.patches import Patch, Patches
+from discrepancy.team.linear.patches import Patch, Patches
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+
+SHORTEST_HOLD_S = 1.2
+"""Left of a hold, to be one row. Chosen."""
+
+SETTLING_S = 0.3
+"""Left out at both ends of a hold. Chosen."""
+
+HOLD_CUTOFF_HZ = 2.0
+"""Cut-off of the speed that tells rest. Chosen."""
+
+STILL_RAD_PER_S = 1e-3
+"""Joints slower than that rest. Derived: twenty times what rounding does below ``HOLD_CUTOFF_HZ``."""
+
+TEAM_ROWS_HZ = 12.5
+"""Chosen with the cut-off: it leaves filtered noise nearly white."""
+
+TEAM_CUTOFF_HZ = 5.0
+"""Cut-off of the rows. Chosen."""
 
 TOGETHER = 16
 """Moving rows that are made at once; of more, a dense matrix would be zero for the most part."""
@@ -134,7 +151,7 @@ class Reduction:
         rate, keep = signals.rate_hz, signals.keep
         kernel = _kernel(rate)
         half = len(kernel) // 2
-        step = max(1, round(rate / rules.TEAM_ROWS_HZ))
+        step = max(1, round(rate / TEAM_ROWS_HZ))
         holds, in_hold = _holds(signals)
         rows, columns, values, sample = [], [], [], []
         first, last = max(keep.start, half), min(keep.stop, len(signals.time) - half)
@@ -162,7 +179,7 @@ def _kernel(rate_hz: float) -> Array:
     half = round(0.8 * rate_hz)
     impulse = np.zeros(4 * half + 1)
     impulse[2 * half] = 1.0
-    response = low_pass(impulse, rate_hz, rules.TEAM_CUTOFF_HZ)[half : 3 * half + 1]
+    response = low_pass(impulse, rate_hz, TEAM_CUTOFF_HZ)[half : 3 * half + 1]
     return response / response.sum()
 
 
@@ -171,11 +188,11 @@ def _holds(signals: Signals) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
     rate = signals.rate_hz
     # Rounding moves a resting joint too; below 2 Hz that is a twentieth of the threshold.
     angles = np.concatenate([signals.phi, signals.theta], axis=1).reshape(len(signals.time), -1)
-    speed = np.abs(differentiate(low_pass(angles, rate, rules.HOLD_CUTOFF_HZ), rate)).max(axis=1)
-    still = speed < rules.STILL_RAD_PER_S
+    speed = np.abs(differentiate(low_pass(angles, rate, HOLD_CUTOFF_HZ), rate)).max(axis=1)
+    still = speed < STILL_RAD_PER_S
     keep = signals.keep
     still[: keep.start] = still[keep.stop :] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
-    settle, shortest = round(rules.SETTLING_S * rate), round(rules.SHORTEST_HOLD_S * rate)
+    settle, shortest = round(SETTLING_S * rate), round(SHORTEST_HOLD_S * rate)
     spans = [(start + settle, stop - settle) for start, stop in edges.reshape(-1, 2)]
     return [(start, stop) for start, stop in spans if stop - start >= shortest], still

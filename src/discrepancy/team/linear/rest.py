@@ -9,13 +9,24 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import rate_matrix
 from estimator.arrays import Array
 from estimator.filtering import differentiate
 from estimator.rigid_team.slots import TAU, THETA
+
+PLAY_FORCE_N = 0.4
+"""Below which a payload may be anywhere in its play. Chosen."""
+
+REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
+"""Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
+
+PLAY_KNOTS_S = 0.2
+"""Between knots of the travel that play leaves open at small forces. Chosen."""
+
+DRAWS_AT_A_TIME, DRAWN_TOGETHER = 8, 4.5e5
+"""Of noise, and samples of all robots in them, at most. Chosen: memory; eight of three minutes of three robots."""
 
 Moves = Literal["phi", "theta", "tau"]
 KINDS: tuple[tuple[Moves, str, str], ...] = (
@@ -24,6 +35,8 @@ KINDS: tuple[tuple[Moves, str, str], ...] = (
     ("theta", "gimbal_friction", "coulomb_Nm"),
 )
 """What friction is told by, its cause, and the parameter that is its limit."""
+HEALTHY = {"joint_friction": 1.0, "gimbal_friction": 1.0, "sea_hysteresis": 1.0, "grasp_play": 1.0}
+"""Kinds that leave something open even where they are within their tolerances, and that spread."""
 Tolerances = Mapping[str, Mapping[str, float]]
 
 
@@ -48,7 +61,11 @@ class Resting:
         self._limit_Nm: dict[Moves, float] = {
             moves: tolerances.get(cause, {}).get(name, 0.0) for moves, cause, name in KINDS
         }
-        slow = {"phi": rules.REST_RAD_PER_S, "theta": rules.REST_RAD_PER_S, "tau": rules.REST_NM_PER_S}
+        slow = {
+            "phi": REST_RAD_PER_S,
+            "theta": REST_RAD_PER_S,
+            "tau": REST_NM_PER_S,
+        }
         self._play_m = tolerances.get("grasp_play", {}).get("play_m", 0.0)
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
 
@@ -89,9 +106,9 @@ class Resting:
         """Place in a grasp's play along the axes of {i} [m] while the force leaves it open, shape (Q, 3); else 0."""
         trial = self._trial
         time = trial.signals.time
-        knots = np.arange(time[0], time[-1] + rules.PLAY_KNOTS_S, rules.PLAY_KNOTS_S)
+        knots = np.arange(time[0], time[-1] + PLAY_KNOTS_S, PLAY_KNOTS_S)
         anywhere = [np.interp(time, knots, rng.standard_normal(len(knots))) for _ in range(3)]
-        between = np.abs(trial.data.wrench[:, robot, 3:]) < rules.PLAY_FORCE_N
+        between = np.abs(trial.data.wrench[:, robot, 3:]) < PLAY_FORCE_N
         return np.asarray(self._play_m * np.stack(anywhere, axis=1) * between)
 
     def _torque(self, moves: Moves, rng: np.random.Generator) -> Array:
@@ -104,7 +121,7 @@ class Resting:
 
 def draws_at_a_time(trial: TrialLinear) -> int:
     """How many draws of a trial's noise there may be together."""
-    return max(1, min(rules.DRAWS_AT_A_TIME, int(rules.DRAWN_TOGETHER // trial.s[..., 0].size)))
+    return max(1, min(DRAWS_AT_A_TIME, int(DRAWN_TOGETHER // trial.s[..., 0].size)))
 
 
 def _numbered(signals: Signals, moves: Moves, slow: float) -> NDArray[np.intp]:

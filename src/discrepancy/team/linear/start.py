@@ -8,9 +8,8 @@ from typing import cast
 import numpy as np
 from joblib import Parallel, delayed
 
-from discrepancy import rules
-from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
+from discrepancy.team.linear.chatter import NOISE_SEED
 from discrepancy.team.linear.filed import held, is_filed, rested
 from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
 from discrepancy.team.linear.noise import Noise
@@ -18,6 +17,7 @@ from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import Resting, Tolerances, draws_at_a_time
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
+from discrepancy.team.linear.whitening import Whitening
 from estimator.arm.arms import Arms
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -34,6 +34,9 @@ from estimator.rigid_team.residual import (
     poses,
     start_bases,
 )
+
+NOISE_DRAWS = 24
+"""From which the rows' covariance is made. Chosen."""
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
@@ -176,9 +179,9 @@ def what_noise_leaves(
     moving = trial.reduction.moving
     draws, told = before or (None, None)
     if draws is None or told is None:
-        draws, errors = noise_rows(trial, noise, np.random.default_rng([rules.NOISE_SEED, k]))
+        draws, errors = noise_rows(trial, noise, np.random.default_rng([NOISE_SEED, k]))
         told = SignalNoise.of(draws, errors, moving)
-    rests = Resting(trial, tolerances)(np.random.default_rng([rules.NOISE_SEED, k, 1]), len(draws))
+    rests = Resting(trial, tolerances)(np.random.default_rng([NOISE_SEED, k, 1]), len(draws))
     rested(trial)
     return Whitening.of(draws + rests, moving, uneven=True), told, None if is_filed(trial) else draws
 
@@ -221,7 +224,7 @@ def gauss_newton(
 def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and signals (draws, n, N, 21)."""
     out: list[tuple[Array, Array]] = []
-    errors = noise.draws(trial.signals, rng, rules.NOISE_DRAWS)
+    errors = noise.draws(trial.signals, rng, NOISE_DRAWS)
     while some := list(islice(errors, draws_at_a_time(trial))):  # not all at once, for the sake of memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))

@@ -8,13 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy import rules
-from discrepancy.least_squares.patches import Patches
-from discrepancy.least_squares.stored import is_stored, stored
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.jacobian import BySignals, by_signals
+from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.stored import is_stored, stored
 from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
@@ -25,6 +24,13 @@ from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, po
 from estimator.rigid_team.slots import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
 from estimator.signals.grasp_data import GraspData
 from estimator.so3 import skew
+
+SHIFT_REACH_S = 0.5
+"""Before and after a displacement in which its accelerations show. Derived: a filter of 20 Hz has died to 1e-6."""
+
+CHATTER_JACOBIAN_HZ = 10.0
+"""Cut-off of signals at which slopes are taken where something chatters. Derived: below half of
+``TEAM_JACOBIAN_HZ``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +193,7 @@ class TrialLinear:
             along: direction in {b1}, shape (Q, 3).
             pieces: samples of an interval, and k columns of displacements there [m], shape (s, k).
         """
-        reach = math.ceil(rules.SHIFT_REACH_S * self.signals.rate_hz)
+        reach = math.ceil(SHIFT_REACH_S * self.signals.rate_hz)
 
         def blocks() -> Iterator[tuple[slice, Array]]:
             for at, values in pieces:
@@ -283,7 +289,7 @@ def linearise(
     columns = moved, reduction(by_bases(data, shared, bases))
     at = s, data
     if full and signals.chatters:  # between its knots J would fold that into slow motion
-        calm = filtered(replace(signals, pre_hz=rules.CHATTER_JACOBIAN_HZ))
+        calm = filtered(replace(signals, pre_hz=CHATTER_JACOBIAN_HZ))
         at = calm, grasp_data(calm, arms, signals.rate_hz)
     J = by_signals(*at, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
     return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)

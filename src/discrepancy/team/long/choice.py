@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from discrepancy import rules
-from discrepancy.team.long.parts import parted, seconds
+from discrepancy.team.long.parts import PART_S, parted, seconds
 from estimator.recording.model import Recording
+
+SEARCHED_PARTS, SHORTEST_PART_S = 4, 40.0
+"""How many parts at least those are, and how long at least. Chosen: they can be held out of each other's fit, and are
+spread over the recording; several ways of a random motion, and twenty times what the filters leave out."""
+
+SEARCHED_S, SEARCHED_POWER = 480.0, 1.4
+"""Of recordings of three robots together that is searched for causes; of N robots (3 / N)^power of it. Chosen: a
+minute and a half of CPU. Measured: a minute of three robots takes 10 s, of ten 53 s (docs/commands/performance.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +46,9 @@ class Choice:
         """
         most_s, total_s = searched_s(recordings[0].metadata.robots), seconds(recordings)
         everything = whole or total_s <= most_s
-        longest_s = rules.PART_S
+        longest_s = PART_S
         if not everything:
-            longest_s = min(max(most_s / rules.SEARCHED_PARTS, rules.SHORTEST_PART_S), longest_s)
+            longest_s = min(max(most_s / SEARCHED_PARTS, SHORTEST_PART_S), longest_s)
         parts = tuple(parted(recordings, longest_s))
         count = len(parts) if everything else min(max(2, int(most_s * len(parts) / total_s)), len(parts))
         taken = tuple(k * len(parts) // count for k in range(count))
@@ -82,4 +89,4 @@ class Choice:
 
 def searched_s(robots: int) -> float:
     """How much of long recordings is searched, all together [s]: less of many robots, whose minutes take longer."""
-    return rules.SEARCHED_S * (3.0 / robots) ** rules.SEARCHED_POWER
+    return SEARCHED_S * (3.0 / robots) ** SEARCHED_POWER

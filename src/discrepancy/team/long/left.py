@@ -8,9 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from discrepancy import rules
 from discrepancy.team.linear.reduction import Reduction
 from estimator.arrays import Array
+
+ODD_CHANCE, ODD_FACTOR = 0.01, 1.5
+"""A part is searched, too, where in one of its windows more is left than would be by chance once in a hundred such
+diagnoses if windows were normal, and by that factor. Derived: Student's t of the windows that were searched, over all
+comparisons; the factor is chosen: what moves otherwise leaves otherwise. Measured: an hour of a random motion, 0.8."""
+
+ODD_WINDOW_S = 10.0
+"""Of a part at a time that is held against what was searched. Chosen: a short push, some periods of a motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +39,7 @@ class Left:
         """Of rows, shape (n, C), in any unit."""
         moving, time = rows[: reduction.moving], reduction.time[: reduction.moving]
         lasts_s = time[-1] - time[0] if len(time) else 0.0
-        count = max(1, int(lasts_s / rules.ODD_WINDOW_S))  # equal ones: none is left over at the end
+        count = max(1, int(lasts_s / ODD_WINDOW_S))  # equal ones: none is left over at the end
         window = np.minimum((time - time[:1]) / max(lasts_s, 1e-9) * count, count - 1).astype(int)
         # One that holds leave little of tells little.
         parts = [moving[window == k] for k in np.unique(window)]
@@ -62,7 +69,7 @@ def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int,
         # Means are about nought; how loud windows are, about what they are on average, in shares of it.
         middle = known.mean(axis=0) if name == "rms" else np.zeros(known.shape[1])
         scale = np.sqrt(np.sum((known - middle) ** 2, axis=0) / (len(known) - (name == "rms")))
-        allowed = -rules.ODD_FACTOR * stdtrit(len(known) - 1, 0.5 * rules.ODD_CHANCE / count)
+        allowed = -ODD_FACTOR * stdtrit(len(known) - 1, 0.5 * ODD_CHANCE / count)
         for k, x in each.items():
             away = (x - middle if name == "rms" else np.abs(x)) / np.maximum(scale, 1e-300)
             worst[k] = max(worst[k], float(away.max(initial=0.0) / allowed))

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from discrepancy import rules
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.left import Left, more_left, times_as_much
 from discrepancy.team.rig import AsFound, TeamRig
 from estimator.errors import InputError
 from estimator.recording.model import Recording
+
+ODD_NAMED = 3
+"""Of such parts that were not searched all the same, how many are named. Chosen."""
 
 T = TypeVar("T")
 
@@ -80,8 +82,8 @@ def _said(choice: Choice, odd: dict[int, float], ratio: float | None) -> tuple[s
     if not odd:
         return (*notes, f"In none of {searched} is so much more left that something else had to be there.")
     worst = sorted(odd, key=lambda k: -odd[k])
-    names = "; ".join(choice.parts[k].name for k in worst[: rules.ODD_NAMED])
-    more = f", and {len(odd) - rules.ODD_NAMED} more" if len(odd) > rules.ODD_NAMED else ""
+    names = "; ".join(choice.parts[k].name for k in worst[:ODD_NAMED])
+    more = f", and {len(odd) - ODD_NAMED} more" if len(odd) > ODD_NAMED else ""
     return (
         *notes,
         f"Something else is in {len(odd)} of {searched}: {names}{more}. Diagnose these by themselves, or all with "

@@ -1,1 +1,0 @@
-"""Causes that could be added to a hypothesis, in their best shapes."""

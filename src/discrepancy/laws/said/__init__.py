@@ -1,1 +1,0 @@
-"""Laws in words, numbers and units, as people and the simulator take them."""

@@ -1,1 +1,0 @@
-"""Rows, unknowns and their fit."""

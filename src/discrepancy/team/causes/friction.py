@@ -1,0 +1,246 @@
+"""Friction of driven joints, gimbal axes and springs: sliding, at rest, and giving way before it slips."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.team.causes.base import Cause, Shape, one_joint, one_robot
+from discrepancy.team.causes.free_while import in_parts, pieces_while, played
+from discrepancy.team.linear.patches import PATCH_COLUMNS, Patches
+from discrepancy.team.linear.rest import REST_RAD_PER_S
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arm.gimbal import moment_about_axes
+from estimator.arrays import Array
+from estimator.filtering import differentiate
+from estimator.rigid_team.slots import TAU, THETA
+
+PRESLIDING_OPEN_SHARE = 0.5
+"""Of its limit, by which friction that gives way may differ from Prandtl's law until it slips. Measured on LuGre, Dahl
+and Bouc-Wen friction of 0.15, 0.14 and 0.40 N m: chi2/n 1.43, 1.39 and 9.5 with 0, 1.10, 1.12 and 1.6 with 0.2, 1.05,
+1.07 and 1.35 with this; by evidence 1000, 1000 and 2500 nats likelier, sizes 3, 2 and 6 % off instead of 6, 6, 20."""
+
+PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
+"""Shares of such a torque that are tried next. Chosen."""
+
+PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
+"""The same of a joint's friction, by its angle. Chosen: bristles of 0.2 to 2 mrad are met; a step of 16 bits is 0.1."""
+
+REST_KNOTS_S = 0.05
+"""Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a
+spring, 0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than
+0.15 s left out; 1.12, 1.05 and 1.09 with 0.05 s; 1.07, 1.03 and 1.08 with every rest. Nothing faster passes the filter
+of the rows."""
+
+TURN_RAD_PER_S = 1e-2
+"""Below which friction that is kept may not be reversed yet when a joint turns round. Derived: from a turn at 0.5
+rad/s^2 until then it moves by 0.1 mrad, a step of 16 bits. Measured on four recordings (0.096 N m in a joint that gives
+way by 10 urad): chi2/n 1.72, 1.29, 2.55, 1.23 without, 1.13, 0.99, 1.29, 1.05 with 4e-3, 1.12, 0.98, 1.15, 1.05 with
+this; viscous friction is off by 6.9, 5.4, 14, 0.4 standard errors, by 1.1, 0.9, 2.2, 0.9, and by 0.3, 1.1, 0.7, 1.3."""
+
+KEPT = "kept_below_rad_per_s"
+"""Rate of a shape below which friction keeps its direction: so stiff that no encoder shows how it gives way."""
+
+
+class Friction(Cause):
+    """Friction of what a joint's signal tells the motion of: Coulomb and, unless a cause has one parameter, viscous.
+
+    At rest, below the rate that is its shape, it may have any value up to its limit, or it keeps what it had. Or it
+    gives way in proportion before it slips, as a slider behind a spring does (Prandtl): it is reversed in full over
+    twice what it gives way by.
+
+    Attributes:
+        moves: the signal.
+        sign: of the torque's reading while that grows.
+        gives: name of what it gives way by, in units of the signal.
+        gives_range: of that.
+    """
+
+    family = "dissipation"
+    parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
+    tolerances = (2e-3, 2e-3)
+    clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
+    shapes = (
+        {"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3}, {KEPT: 4e-3},
+        *({"presliding_rad": x} for x in PRESLIDINGS_RAD),
+    )  # fmt: skip
+    determined: ClassVar[Mapping[str, float]] = {"presliding_rad": 0.1}
+    positive = ("coulomb_Nm",)
+    moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
+    sign: ClassVar[float] = 1.0
+    gives: ClassVar[str] = "presliding_rad"
+    gives_range: ClassVar[tuple[float, float]] = PRESLIDING_RANGE_RAD
+
+    def sentence(self, n):
+        soft = f", after it has given way by {n(self.gives, 'mrad', 1e3)}" if n.values.get(self.gives) else ""
+        return (
+            f"the {self.at} rubs with {n('coulomb_Nm', 'N m')} (Coulomb, while it moves{soft}) and "
+            f"{n('viscous_Nms_per_rad', 'N m s/rad')} (viscous)"
+        )
+
+    def finer(self, shape):
+        least, most = self.gives_range
+        near = (shape[self.gives] * share for share in PRESLIDING_FINER) if self.gives in shape else ()
+        return [{self.gives: x} for x in near if least <= x <= most]
+
+    def physical(self, values, context):
+        return super().physical(values, context) | {self.gives: context.shape.get(self.gives, 0.0)}
+
+    def direction(self, trial: TrialLinear, robot: int, joint: int) -> Array:
+        """What a torque of 1 N m adds to the residual's samples, shape (Q, C)."""
+        return trial.J(robot, TAU, np.eye(3)[joint])
+
+    def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
+        states = np.stack(self._sliding(trial.signals, trial, robot, joint, shape), axis=-1)
+        return trial.reduction(self.direction(trial, robot, joint)[..., None] * states[:, None])
+
+    def undo(
+        self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
+    ) -> Signals | None:
+        torque = np.zeros(len(signals.time))
+        for value, state in zip(values, self._sliding(signals, trial, robot, joint, shape), strict=True):
+            torque += value * state
+        return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
+
+    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
+        """What it does while it holds: any torque that it takes, as it changes with the load.
+
+        Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
+        it may be another by a share of its limit until it slips. Where it is kept, whatever it is while the joint turns
+        round, or seems to move the other way, and too slowly to be sure.
+        """
+        bent, rate, *_ = (*self._sliding(trial.signals, trial, robot, joint, shape), None)
+        state = np.abs(bent)
+        open_ = state < 1.0 - 1e-9 if KEPT not in shape else _doubtful(bent, rate)
+        rests = pieces_while(open_, trial.signals.rate_hz, REST_KNOTS_S)
+        rests = in_parts(rests, PATCH_COLUMNS)
+        if self.gives in shape or KEPT in shape:
+            slips = np.flatnonzero(state >= 1.0 - 1e-9)
+            before = slice(0, slips[0] if len(slips) else len(state))
+            share = PRESLIDING_OPEN_SHARE if self.gives in shape else 1.0
+            rests = ((at, share * values) for at, values in rests)
+            rests = chain([(before, np.ones((before.stop, 1)))] if before.stop else [], rests)
+        return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
+
+    def _sliding(
+        self, signals: Signals, trial: TrialLinear, robot: int, joint: int, shape: Shape
+    ) -> Sequence[Array]:
+        """Direction of motion in [-1, 1], which fades to zero at rest, and rate; as many as there are parameters.
+
+        Where it gives way, how far it is bent in place of the direction. Angles are taken without their noise: that of
+        a parallel axis, which moves alike, would else be told apart by noise, and both together have less.
+        """
+        (number,) = shape.values()
+        smooth = signals.smooth(self.moves, robot, joint)
+        if self.moves != "tau":
+            read, quiet = (one.smooth(self.moves, robot, joint) for one in (trial.signals, trial.adjusted))
+            smooth = smooth - (read - quiet)
+        rate = self.sign * differentiate(smooth, signals.rate_hz)
+        if self.gives in shape:
+            bent = self.sign * (smooth - played(smooth, number)) / number
+        else:
+            bent = _kept(rate, number) if KEPT in shape else rate / number
+        return (np.clip(bent, -1.0, 1.0), rate)[: len(self.parameters)]
+
+
+def _kept(rate: Array, slow: float) -> Array:
+    """Direction of motion, and at rest of the motion before, 0 until the first, shape (Q,).
+
+    Which way it moves is told where it is fast; since when, by where its rate left zero before.
+    """
+    out, way = np.zeros_like(rate), np.sign(rate)
+    starts, fastest = _motions(rate)
+    for start in starts[fastest >= slow]:
+        out[start:] = way[start]
+    return out
+
+
+def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
+    """Where a joint may move against the direction that is kept, or turns round, shape (Q,).
+
+    Dry friction is reversed only once a joint has moved by more than it gives way, be that less than encoders show: a
+    law that reverses it at once takes that for a late torque sensor.
+    """
+    starts, fastest = _motions(rate)
+    counts = np.diff([*starts, len(rate)])
+    fast = np.concatenate([np.zeros(len(rate) - int(counts.sum())), np.repeat(fastest, counts)])
+    slow = np.abs(rate) < TURN_RAD_PER_S
+    stretch = np.cumsum(np.diff(slow, prepend=False))
+    turns = np.flatnonzero(np.diff(kept))
+    turning = slow & np.isin(stretch, stretch[[turns, turns + 1]])
+    return turning | ((kept * rate < 0.0) & (fast >= REST_RAD_PER_S))
+
+
+def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:
+    """Where each motion one way begins, and how fast it becomes."""
+    starts = np.flatnonzero(np.diff(np.sign(rate), prepend=0.0))
+    return starts, np.maximum.reduceat(np.abs(rate), starts) if len(starts) else np.zeros(0)
+
+
+PRESLIDING_RANGE_NM = (0.01, 1.0)
+"""Derived: less is passed within a sample; more is hardly ever turned round."""
+
+PRESLIDINGS_NM = (0.05, 0.2)
+"""Torque that a spring takes up while the friction inside it gives way before it slips, tried first. Chosen: Bouc-Wen
+springs that yield over 0.3 to 3 mrad at 100 N m/rad."""
+
+
+class SeaHysteresis(Friction):
+    """Friction parallel to the spring: the link gets more than the deflection tells while the torque grows.
+
+    Torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
+    """
+
+    title = "friction inside the spring of {driven joint}"
+    parameters = ("friction_Nm",)
+    tolerances = (2e-3,)
+    clipped = ()
+    shapes = (
+        {"slow_Nm_per_s": 0.2}, {"slow_Nm_per_s": 0.6}, *({"presliding_Nm": x} for x in PRESLIDINGS_NM)
+    )  # fmt: skip
+    determined: ClassVar = {"presliding_Nm": 0.1}
+    positive = ("friction_Nm",)
+    moves = "tau"
+    sign = -1.0
+    gives = "presliding_Nm"
+    gives_range = PRESLIDING_RANGE_NM
+    separate = (
+        "Motion with load reversals at rest separates friction in the spring from friction in the joint."
+    )
+
+    def sentence(self, n):
+        soft = (
+            f", and gives way over {n(self.gives, 'N m')} before it slips" if n.values.get(self.gives) else ""
+        )
+        return f"the spring rubs inside, with {n('friction_Nm', 'N m')}{soft}"
+
+
+class JointFriction(Friction):
+    """The link gets less than the spring gives while it moves; below ``slow_rad_per_s`` it rests."""
+
+    title = "friction in {driven joint}"
+    separate = "An arm-only run (payload released) shows friction of the joint alone."
+
+
+class GimbalFriction(Friction):
+    """The gimbal is not quite passive: it turns the payload with a moment about its axis (1, 2, 3 are z, y, x).
+
+    A pure moment is the same wherever it acts, so robots with parallel axes share the blame.
+    """
+
+    title = "friction in {gimbal axis}"
+    at = "gimbal joint"
+    moves = "theta"
+    separate = "Which robot's gimbal rubs shows only with one robot released at a time."
+    undo = Cause.undo  # no sensor reads it
+
+    def direction(self, trial, robot, joint):
+        """The payload is turned by less than the balance believes: an outside moment against the axis."""
+        moment = moment_about_axes(trial.s[:, robot, THETA], np.eye(3)[joint])
+        moment = moment @ trial.shared.grasps.R_1i[robot].T
+        return np.concatenate([np.zeros((len(moment), trial.channels - 3)), moment], axis=1)
