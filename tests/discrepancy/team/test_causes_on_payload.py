@@ -7,7 +7,6 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from discrepancy import rules
 from discrepancy.candidate import Transient
 from discrepancy.team.candidates import in_shapes
 from discrepancy.team.causes import CAUSES, cable
@@ -153,7 +152,7 @@ def test_ways_of_a_cable_begin_everywhere():
     at = np.array([0.3, -0.2, 0.1])
     plain = dict(zip(("lever_x_m", "lever_y_m", "lever_z_m"), at, strict=True))
     begun = CAUSES["payload_tether"].further(plain)
-    assert len(begun) == len(ways) * len(rules.CABLE_STRETCHES_M)
+    assert len(begun) == len(ways) * len(cable.CABLE_STRETCHES_M)
     for shape in begun:
         np.testing.assert_allclose(np.cross(at - cable.lever(shape), cable.direction(shape)), 0.0, atol=1e-12)
         assert CAUSES["payload_tether"].alike(shape) > CAUSES["payload_tether"].alike(plain)

@@ -13,6 +13,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.grasp_play import displaced
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
 from estimator.estimate.principal import inertia_parameters
+from patchwork import dense
 from team_case import DESIGN, exact, residual_of
 
 PLAY_M, FORCE_N = 5e-5, 0.4
@@ -35,7 +36,7 @@ def test_travel_between_the_ends_is_left_open(robot):
     changed = residual_of(case, replace(case.signals, phi=phi)) - case.linear.residual
     poses = changed[:, :12]
     column = cause.columns(case.linear, robot, 0, shape)[:, :12, 0]
-    unknowns = cause.unknowns(case.linear, robot, 0, shape).dense()[:, :12]
+    unknowns = dense(cause.unknowns(case.linear, robot, 0, shape))[:, :12]
     closed = poses - PLAY_M * column
     flat = unknowns.reshape(closed.size, -1)
     # Knots are closer than rows: as in the diagnosis they scatter by the play, beside noise of 0.1 um.
@@ -88,7 +89,7 @@ def test_shifts_for_a_while_are_displacements(robot):
     where = np.zeros(len(along), dtype=bool)
     where[500:530] = where[900:] = True
     pieces = list(pieces_while(where, linear.signals.rate_hz, 0.05))
-    columns = linear.of_shifts(robot, along[..., 0], in_parts(iter(pieces), 3)).dense()
+    columns = dense(linear.of_shifts(robot, along[..., 0], in_parts(iter(pieces), 3)))
     whole = np.stack(free_while(where, linear.signals.rate_hz, 0.05), axis=-1)
     expected = linear.of_pose(robot, None, along * whole[:, None])
     seen = expected[..., np.abs(expected).max(axis=(0, 1)) > 1e-4 * np.abs(expected).max()]

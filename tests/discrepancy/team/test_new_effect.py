@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-
 from discrepancy.engine.diagnose import diagnose
+
 from discrepancy.result.json import diagnosis_to_dict
 from discrepancy.result.read import read_diagnosis
 from discrepancy.result.text import format_diagnosis

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.problem import Problem
+from discrepancy.team.linear.elsewhere import found_at
+
 from discrepancy.team.candidates import every_candidate, explained_by
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise
-from discrepancy.team.linear.elsewhere import found_at
 from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.linear.start import Sensed, exact_residual
 from discrepancy.team.rig import TeamRig

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from discrepancy.engine.diagnose import diagnose
+
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload

@@ -6,15 +6,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.laws.candidate import candidate_of
 from discrepancy.laws.term import Term
-from discrepancy.team.laws.variable import TIME
 from discrepancy.least_squares.problem import Problem
-from discrepancy.team import rows
-from discrepancy.team.linear import start
 from discrepancy.team.linear.elsewhere import HEALTHY
+
+from discrepancy.team import rows
+from discrepancy.team.laws.variable import TIME
+from discrepancy.team.linear import start
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.estimate.payload import estimate_payload

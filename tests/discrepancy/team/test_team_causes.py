@@ -24,6 +24,7 @@ from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.rigid_team.residual import Bases, Shared
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
+from patchwork import dense
 from team_case import DESIGN, assert_close, exact, rate_of, residual_of
 
 ROBOTS = (0, 2)
@@ -212,7 +213,7 @@ def test_friction_that_gives_way_before_it_slips(case):
 def test_how_far_friction_was_bent_before_is_open_until_it_slips(case):
     cause, tau = CAUSES["sea_hysteresis"], case.signals.tau[:, 1, 2]
     gives = 0.45 * np.ptp(tau)
-    before = cause.unknowns(case.linear, 1, 2, {"presliding_Nm": gives}).dense()[..., 0]
+    before = dense(cause.unknowns(case.linear, 1, 2, {"presliding_Nm": gives}))[..., 0]
     first = case.signals.time[np.flatnonzero(np.abs(tau - tau[0]) > gives)[0]]
     late = case.linear.reduction.time > first + 0.5
     assert 0.05 < np.mean(~late) < 0.95
@@ -232,7 +233,7 @@ def test_friction_that_gives_way_need_not_do_so_in_proportion(case):
     def trace(torque):
         return case.linear.of_signals(1, tau=torque[:, None] * [0.0, 0.0, 1.0])
 
-    opened = cause.unknowns(case.linear, 1, 2, shape).dense()
+    opened = dense(cause.unknowns(case.linear, 1, 2, shape))
     holds = trace((np.abs(slider) < 1.0).astype(float))
     assert np.linalg.norm(opened[..., 1:].sum(axis=-1) - 0.5 * holds) < 0.05 * np.linalg.norm(0.5 * holds)
     flat, missing = opened.reshape(-1, opened.shape[2]), (trace(dahl) - trace(slider)).ravel()
@@ -292,8 +293,8 @@ def test_friction_at_rest_takes_any_force_that_passes_the_filter(case):
     still = replace(s, phi=frozen)
     linear = replace(case.linear, signals=still, s=filtered(still))
     cause = CAUSES["joint_friction"]
-    unknowns = cause.unknowns(linear, 1, 0, {"slow_rad_per_s": 1e-3}).dense()
-    moves = cause.unknowns(case.linear, 1, 0, {"slow_rad_per_s": 1e-3}).dense()
+    unknowns = dense(cause.unknowns(linear, 1, 0, {"slow_rad_per_s": 1e-3}))
+    moves = dense(cause.unknowns(case.linear, 1, 0, {"slow_rad_per_s": 1e-3}))
     assert moves.shape[2] + 30 < unknowns.shape[2] <= moves.shape[2] + 42  # 2 s, a knot every twentieth
     added = unknowns.reshape(-1, unknowns.shape[2])
     since = np.linspace(0.0, 2.0, stop - start - 10)

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import mocobot
-from discrepancy import rules
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.gain import mean_chi2
+from discrepancy.team.long import choice as choices
+from discrepancy.team.long import left as lefts
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
 from discrepancy.team.response import as_found, confirm, write_model
@@ -114,8 +115,10 @@ def test_models_to_take_away(tmp_path) -> None:
 
 def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque is wrong in the last part only, which was not searched at first."""
-    for name, value in (("SEARCHED_S", 16.0), ("SHORTEST_PART_S", 8.0), ("ODD_WINDOW_S", 2.0)):
-        monkeypatch.setattr(rules, name, value)
+    for owner, name, value in (
+        (choices, "SEARCHED_S", 16.0), (choices, "SHORTEST_PART_S", 8.0), (lefts, "ODD_WINDOW_S", 2.0),
+    ):  # fmt: skip
+        monkeypatch.setattr(owner, name, value)
     recording = mocobot.simulate("b", "random", vias=16, seed=6)
     choice = Choice.of([recording])
     odd = choice.others[-1]
