@@ -105,10 +105,6 @@ def test_what_is_behind_a_play():
     at = SimpleNamespace(shape={**soft, "contact_per_N": 0.002})
     assert cause.physical(np.array([2e-4]), at) == pytest.approx({"play_m": 2e-4, "contact_m_per_N": 4e-7})
     assert cause.physical(np.array([2e-4]), SimpleNamespace(shape=plain))["contact_m_per_N"] == 0.0
-    value, se = np.array([2e-4]), np.array([1e-6])
-    assert cause.possible(value, se, plain)
-    assert cause.possible(value, se, at.shape)
-    assert not cause.possible(value, se, {**soft, "contact_per_N": -0.001})
     # Slopes are there at nought, too.
     candidate = cause.candidate({"play_m": 3e-6}, soft, 1)
     ((less, more, size),) = shape_steps(candidate)
