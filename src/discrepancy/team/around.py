@@ -17,7 +17,7 @@ from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual, sensed_in
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.problem import TeamProblem, team_problem
-from discrepancy.team.rows import TeamRows
+from discrepancy.team.rig import TeamRig
 from estimator.arm.arms import true_joints
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
@@ -60,7 +60,7 @@ def found_in(problem: TeamProblem, state: State) -> Found:
     return Found(-x[problem.shared], local, tuple(values.values()), active)
 
 
-def robots_at(rig: TeamRows, found: Found) -> tuple[ArmUnit, ArmUnit, Shared]:
+def robots_at(rig: TeamRig, found: Found) -> tuple[ArmUnit, ArmUnit, Shared]:
     """The robots as they are found, how far that is from where they were believed to be, and the payload.
 
     Raises:

@@ -12,7 +12,6 @@ from discrepancy.team import constants
 from discrepancy.team.around import around, exact, opened_by, placed
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.rows import TeamRows
 from estimator.errors import InputError
 
 LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
@@ -40,12 +39,11 @@ class TeamOutcome:
     @property
     def rig(self) -> TeamRig:
         """The recordings, linear around what was found, and their simulator."""
-        assert isinstance(self.problem.rig, TeamRig)
         return self.problem.rig
 
 
 def search_team(
-    rig: TeamRows, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
+    rig: TeamRig, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
     until: Until | None = None,
 ) -> TeamOutcome:  # fmt: skip
     """The likeliest causes of what a team's model leaves of its recordings."""

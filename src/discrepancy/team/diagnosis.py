@@ -12,10 +12,10 @@ from discrepancy.evidence.judge import is_named
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.settings import ODDS, SETTINGS
 from discrepancy.evidence.until import Until
-from discrepancy.team.chattering import chattering
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.estimates import errors, seen_by
+from discrepancy.team.linear.chatter import chattering
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
 from discrepancy.team.response import as_found, confirm

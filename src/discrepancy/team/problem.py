@@ -20,7 +20,7 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.origin import origin_of
-from discrepancy.team.rows import TeamRows
+from discrepancy.team.rig import TeamRig
 from discrepancy.team.unlisted import OPEN_NATS, Laws
 from estimator.arrays import Array
 
@@ -93,7 +93,7 @@ class Listed:
     """
 
     groups: Sequence[Group]
-    X: Array
+    X: NDArray[np.float32]
 
     @classmethod
     def together(cls, each: list[Listed]) -> Listed:
@@ -131,7 +131,7 @@ class TeamProblem:
         there: values where all is linear, shape (K,).
     """
 
-    rig: TeamRows
+    rig: TeamRig
     cells: Cells
     groups: list[Group] = field(default_factory=list)
     families: list[list[int]] = field(default_factory=list)
@@ -464,7 +464,7 @@ class Catalogue:
         candidates: by the identity of a group.
     """
 
-    rig: TeamRows
+    rig: TeamRig
     groups: list[Group]
     labels: list[tuple[Candidate, int] | None]
     tolerance: list[float]
@@ -527,7 +527,7 @@ def _apart(first: Array, others: Array, most: int = 2) -> Array:
 
 
 def team_problem(
-    rig: TeamRows, opened: Sequence[Array] | None = None, catalogue: Catalogue | None = None
+    rig: TeamRig, opened: Sequence[Array] | None = None, catalogue: Catalogue | None = None
 ) -> TeamProblem:
     """The linear problem of a rig.
 

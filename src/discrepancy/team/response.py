@@ -72,7 +72,6 @@ class Hypothesis:
     @property
     def rig(self) -> TeamRig:
         """The recordings."""
-        assert isinstance(self.problem.rig, TeamRig)
         return self.problem.rig
 
     @cached_property
@@ -392,7 +391,6 @@ def as_found(outcome: TeamOutcome) -> tuple[TeamRig, AsFound]:
         InputError: there are no such robots.
     """
     rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
-    assert isinstance(rig, TeamRig)
     units, _, shared = robots_at(rig, found)
     return rig, AsFound.of(units, shared, found.active)
 

@@ -1,14 +1,27 @@
-"""A team of Omnids as a rig: its rows, and how to simulate it again."""
+"""A team of Omnids: recordings as whitened rows, the columns of every cause, and how to simulate it again."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Self
+
+import numpy as np
 
 from discrepancy.candidate import Candidate
-from discrepancy.team.candidates import in_shapes
+from discrepancy.causes.excluded import excluded_from
+from discrepancy.channel import Channel
+from discrepancy.team.candidates import (
+    every_candidate,
+    further_shapes,
+    in_shapes,
+    indices,
+    is_adjusted,
+    is_kept,
+    other_shapes,
+    shape_steps,
+)
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
@@ -18,16 +31,24 @@ from discrepancy.team.closed_loop import (
     scale_of_response,
     why_not,
 )
-from discrepancy.team.dependence import directions_of, quantities_of
-from discrepancy.team.linear.origin import origin_of, places_of
+from discrepancy.team.linear.adjust import as_loud, noise_of
+from discrepancy.team.linear.filed import OneByOne, is_filed, rested
+from discrepancy.team.linear.origin import beyond, origin_of, places_of
+from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.start import exact_residual
+from discrepancy.team.linear.rest import HEALTHY, limits_of
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.stored import stored
+from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.linear.unsearched import trial_at, without_bases
+from discrepancy.team.linear.whitening import Whitening, whitened
 from discrepancy.team.long.parts import LaterPart
-from discrepancy.team.rows import TeamRows
-from discrepancy.team.undecidable import statements
+from discrepancy.team.signature import channels_of, directions_of, quantities_of
+from discrepancy.team.words import statements
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
+from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared
 from mocobot_sim.effects.base import Effect
@@ -54,8 +75,211 @@ class AsFound:
         return cls(units, shared, [(c, v) for c, v in causes if places_of(c) is None and not c.of_trials])
 
 
-class TeamRig(TeamRows):
-    """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """One trial's whitened residual and the columns of its unknowns, n rows of C channels.
+
+    Attributes:
+        residual: shape (n, C); unit variance and independent if nothing is wrong.
+        local: columns of the trial's own unknowns, shape (n, C, l).
+        shared: columns of the unknowns of all trials, shape (n, C, s).
+    """
+
+    residual: Array
+    local: Array
+    shared: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TeamRig:
+    """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator.
+
+    Attributes:
+        recordings: the trials.
+        sensed: what noise leaves in the rows.
+        linear: linearised trials.
+        tolerances: standard deviations by cause and parameter.
+        excluded: causes left out of the catalogue.
+        origin: how far from the robots as they were believed to be all is linear; None for not at all.
+        resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
+        jobs: parallel processes.
+        laws: whether to look for what no table lists: where noise is loud (``auto``), ``always`` or ``never``.
+        kept: whitened columns that are asked for again and again.
+    """
+
+    recordings: tuple[Recording, ...]
+    sensed: Sensed
+    linear: tuple[TrialLinear, ...]
+    tolerances: Mapping[str, Mapping[str, float]]
+    excluded: frozenset[str]
+    origin: ArmUnit | None = None
+    resting: Mapping[str, float] = field(default_factory=dict)
+    jobs: int = 1
+    laws: str = "auto"
+    kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        recordings: Sequence[Recording],
+        estimate: PayloadEstimate,
+        tolerances: Mapping[str, Mapping[str, float]],
+        excluded: Sequence[str] = (),
+        jobs: int = 1,
+    ) -> Self:
+        """Linearise recordings around their estimate.
+
+        Raises:
+            InputError: the recordings do not determine the grasps, the mass and the centre of mass, or a cause to
+                be excluded does not exist.
+        """
+        left_out = excluded_from(CAUSES, excluded)
+        return cls._at(recordings, start_shared(estimate), tolerances, left_out, None, HEALTHY, jobs)
+
+    @classmethod
+    def _at(
+        cls,
+        recordings: Sequence[Recording],
+        shared: Shared,
+        tolerances: Mapping[str, Mapping[str, float]],
+        excluded: frozenset[str],
+        origin: ArmUnit | None,
+        resting: Mapping[str, float],
+        jobs: int,
+        sensed: Sensed | None = None,
+        explained: Callable[[int, TrialLinear], Array] | None = None,
+    ) -> Self:
+        limits = limits_of(tolerances, resting)
+        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed, explained)
+        return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
+
+    @property
+    def whitening(self) -> tuple[Whitening, ...]:
+        """Of every trial."""
+        return self.sensed.whitening
+
+    @property
+    def trials(self) -> Sequence[str]:
+        return [recording.name for recording in self.recordings]
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return self.linear[0].robots
+
+    @property
+    def local_unknowns(self) -> int:
+        return self.linear[0].by_bases.shape[2]
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return channels_of(self.robots)
+
+    def candidates(self) -> list[Candidate]:
+        """Every cause of the catalogue at every place; transients come from ``transients``."""
+        found = every_candidate(self.robots, self.tolerances, self.excluded)
+        return [candidate for candidate in found if not (self.aligned and CAUSES[candidate.cause].by_clocks)]
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the motion has set the robots' clocks in every trial."""
+        return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
+
+    def columns(self, candidate: Candidate) -> Sequence[Array]:
+        return self._each(lambda t: self._columns(t, candidate), len(self.linear))
+
+    def _each(self, of: Callable[[int], Array], count: int) -> Sequence[Array]:
+        """Arrays by their number; of long recordings each whenever it is asked for."""
+        return OneByOne(of, count) if is_filed(self.linear[0]) else list(map(of, range(count)))
+
+    def _columns(self, trial: int, candidate: Candidate) -> Array:
+        linear = self.linear[trial]
+        if not candidate.acts_in(trial):
+            return np.broadcast_to(0.0, (*linear.residual.shape, len(candidate.parameters)))
+        if (key := (trial, *candidate.trace)) in self.kept:
+            return self.kept[key]
+        columns = whitened(self.whitening[trial], self._unwhitened(trial, candidate))
+        rested(linear)
+        if candidate.transient is None and is_kept(candidate):
+            self.kept[key] = stored(columns) if is_filed(linear) else columns
+        return columns
+
+    def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
+        """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
+        return CAUSES[candidate.cause].columns(self.linear[trial], *indices(candidate), candidate.shape)
+
+    def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
+        """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
+        place, own = indices(candidate), self.beyond(candidate, values)
+        return CAUSES[candidate.cause].undo(signals, self.linear[trial], *place, own, candidate.shape)
+
+    def _without(
+        self, trial: int, active: Sequence[tuple[Candidate, Array]], noise: Signals | None = None
+    ) -> tuple[Signals, list[tuple[Candidate, Array]]]:
+        """A trial's signals without causes that are errors of them, functions of them without noise; and others."""
+        signals, others = self.linear[trial].signals, []
+        for candidate, values in active:
+            x = noise if noise and is_adjusted(candidate) else None
+            seen = signals.minus(x.phi, x.theta, x.tau) if x else signals
+            true = self._undo(trial, candidate, values, seen)
+            if true is None:
+                others.append((candidate, values))
+            else:
+                signals = signals.minus(seen.phi - true.phi, seen.theta - true.theta, seen.tau - true.tau)
+        return signals, others
+
+    def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
+        if (key := ("open", *candidate.trace)) in self.kept:
+            return self.kept[key]
+        of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
+        own = [w.of_patches(of(t, *place)).fewer() for w, t in zip(self.whitening, self.linear, strict=True)]
+        if not is_filed(self.linear[0]):  # of long recordings they would fill the memory
+            self.kept[key] = own
+        return own
+
+    def beyond(self, candidate: Candidate, values: Array) -> Array:
+        """Values beyond what the robots, as they were found, have already."""
+        return beyond(candidate, values, self.origin)
+
+    def residual_there(
+        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        """The exact whitened residual where all is linear: what the robots are off by is in none of it."""
+        out = []
+        for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
+            acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
+            unknowns = linear.shared.moved(shared), linear.bases.moved(x)
+            signals, modelled = self._without(t, acting)
+            if any(is_adjusted(candidate) for candidate, _ in acting):
+                noise = noise_of(signals, *unknowns, linear, self.sensed.signals[t])
+                signals, _ = self._without(t, acting, noise)
+            residual = exact_residual(signals, *unknowns, linear.arms, linear.reduction)
+            residual += as_loud(signals, *unknowns, linear, self.sensed.signals[t])
+            for candidate, values in modelled:
+                residual -= self._unwhitened(t, candidate) @ self.beyond(candidate, values)
+            out.append(self.whitening[t](residual))
+            rested(linear)
+        return out
+
+    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
+        """The candidate with every other shape of its cause; any interval of a transient is found by its steps."""
+        return other_shapes(candidate, len(self.linear), finer=finer)
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        return further_shapes(candidate, len(self.linear))
+
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        return shape_steps(candidate)
+
+    def rows(self) -> list[Rows]:
+        """Whitened rows of every trial where all is linear."""
+        out = []
+        for linear, white in zip(self.linear, self.whitening, strict=True):
+            local = np.concatenate([linear.by_bases, linear.by_clocks], axis=2)
+            out.append(Rows(white(linear.residual), white(local), white(linear.by_shared)))
+        return out
+
+    # --- its simulator
 
     def grown(self, candidate: Candidate) -> list[Candidate]:
         if candidate.transient or candidate.cause not in CAUSES:
