@@ -1,4 +1,4 @@
-"""Short trials of a team in which something is hidden: a random one and a periodic one, simulated at 1 ms to save time."""
+"""Short trials of a team in which something is hidden: a random one, and a periodic one; at 1 ms to save time."""
 
 from __future__ import annotations
 

@@ -140,9 +140,13 @@ def test_a_payload_that_is_heavier_makes_no_noise_louder(case):
     read = next(COARSE.draws(case.signals, rng, 1))
     noisy = seen_by(rig, case.signals.minus(-read.phi, -read.theta, -read.tau))
     shared, local = nowhere(case)
-    (here,) = (a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True))
+    (here,) = (
+        a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True)
+    )
     shared[12] = heavier
-    (there,) = (a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True))
+    (there,) = (
+        a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True)
+    )
     assert np.mean(there[:, FORCE] ** 2) == pytest.approx(np.mean(here[:, FORCE] ** 2), rel=0.02)
 
 
