@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
-from discrepancy.cause_names import serial, team
-from discrepancy.causes.excluded import excluded_from
+from discrepancy.cause_names import JOINTS, TEAM, excluded_from
 from estimator.errors import InputError
 from estimator.files import check_place, holds
 from estimator.strict import read_json
@@ -158,7 +157,7 @@ def check_diagnose(options: opt.Diagnose) -> None:
         inputs = [*options.rec, *_given(options.tolerances), *map_file(options.map)]
         inputs += calibration_file(options.calibration)
         check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
-    _check_excluded(options.exclude, team.NAMES)
+    _check_excluded(options.exclude, TEAM)
     check_there(options.rec)
     check_formats(options.rec)
     for path in filter(Path.exists, map(truth_path, options.rec)):
@@ -193,7 +192,7 @@ def _check_joints(options: opt.Diagnose, model: Path) -> None:
     if options.out is not None:
         inputs = [*logs, *_given(model, options.tolerances, options.map)]
         check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
-    _check_excluded(options.exclude, serial.NAMES)
+    _check_excluded(options.exclude, JOINTS)
     _check_read(logs, model)
 
 

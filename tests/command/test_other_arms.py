@@ -8,7 +8,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from command import refused, run
-from discrepancy.cause_names.serial import NAMES
+from discrepancy.cause_names import JOINTS
 from made_arm import write_chain_log
 
 
@@ -16,7 +16,7 @@ from made_arm import write_chain_log
 @pytest.mark.parametrize("joints", [1, 7])
 def test_every_command_takes_a_cause_at_the_last_joint(tmp_path, capsys, joints) -> None:
     log, model, found = write_chain_log(tmp_path, joints, joints), tmp_path / "arm.xml", tmp_path / "found"
-    others = [name for name in NAMES if name != "friction"]
+    others = [name for name in JOINTS if name != "friction"]
     code, _, _ = run(
         capsys, "diagnose", log, "--model", model, "--out", found, "--no-closed-loop", "--exclude", *others,
     )  # fmt: skip

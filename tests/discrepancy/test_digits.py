@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from discrepancy.digits import three_digits
+from discrepancy.numbers import three_digits
 
 
 @pytest.mark.parametrize(

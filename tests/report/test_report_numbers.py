@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from discrepancy.causes.units import fitting, one_each, parameter
+from discrepancy.numbers import fitting, one_each, parameter
 from discrepancy.result.pictures.residual_statistics import binned, running_rms, spectrum
 from discrepancy.result.traces import Trace
 from mocobot_report.blocks.numbers import about, measured, percent, plain, size, spelled, with_error

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from discrepancy.digits import three_digits
 from discrepancy.evidence.findings import Finding
 from discrepancy.joints.causes import LINKS, WORDS
 from discrepancy.joints.findings import Foretold, JointVerdict
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.said import Said, joint_in_words, link_in_words, titled
+from discrepancy.numbers import three_digits
 from discrepancy.result.told import ALL, Told, Values
 from estimator.arrays import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from discrepancy.causes.numbers import Numbers, number
+from discrepancy.numbers import Numbers, number
 
 SLIDES = {
     "Nms_per_rad": "Ns_per_m", "Nm_per_rad": "N_per_m", "rad_per_Nm": "m_per_N", "rad_per_s": "m_per_s", "Nm": "N",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.causes.excluded import excluded_from
+from discrepancy.cause_names import excluded_from
 from discrepancy.evidence.findings import Event, Finding, Member
 from discrepancy.evidence.judge import Judge
 from discrepancy.evidence.odds import borne_out, odds_of

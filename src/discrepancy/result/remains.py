@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from discrepancy.causes.units import one_each, parameter
-from discrepancy.digits import three_digits
+from discrepancy.numbers import one_each, parameter, three_digits
 from discrepancy.result.read import is_of_joints, kind_of
 
 VISIBLE_CHI2_PER_N = 3.0

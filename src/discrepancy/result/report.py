@@ -8,10 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from discrepancy.causes.numbers import number
-from discrepancy.causes.units import one_each, parameter
-from discrepancy.digits import three_digits
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.numbers import number, one_each, parameter, three_digits
 from discrepancy.result.pictures.plots_evidence import label
 from discrepancy.result.read import VERDICTS, is_of_joints
 from discrepancy.result.remains import remedy

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.causes.units import Shown, one_each
+from discrepancy.numbers import Shown, one_each
 from discrepancy.result.remains import all_as_found
 
 Values = Mapping[str, Any]

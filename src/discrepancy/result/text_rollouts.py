@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from discrepancy.causes.units import Shown, one_each
+from discrepancy.numbers import Shown, one_each
 
 Values = Mapping[str, Any]
 FREE = "Rolled out from measured states under the logged torques"

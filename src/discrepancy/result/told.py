@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from discrepancy.digits import three_digits
 from discrepancy.evidence.findings import Finding, Limit, Member, Offer, Rival, Scatter, Verdict
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.numbers import three_digits
 from discrepancy.result.json import plain
 from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.remains import scatter_sentence

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discrepancy.causes.units import Shown, one_each
 from discrepancy.channel import Channel
+from discrepancy.numbers import Shown, one_each
 from estimator.arrays import Array
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.candidate import Candidate
-from discrepancy.causes.base import Shape
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Shape
 from discrepancy.team.linear.origin import beyond, places_of
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.trial_linear import TrialLinear

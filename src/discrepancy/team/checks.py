@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discrepancy.team import constants
+from discrepancy.team.linear.signals import TEAM_TRIM_S
 from estimator.arm.unit import ArmUnit
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
@@ -36,14 +36,11 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
             f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
             "nothing to diagnose"
         )
-    used = [
-        max(0.0, recording.time[-1] - recording.time[0] - 2.0 * constants.TEAM_TRIM_S)
-        for recording in recordings
-    ]
+    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TEAM_TRIM_S) for recording in recordings]
     if sum(used) < LEAST_S:
         names = ", ".join(recording.name for recording in recordings)
         raise InputError(
-            f"{names}: {sum(used):.1f} s are left when {constants.TEAM_TRIM_S:g} s are dropped at both ends; a "
+            f"{names}: {sum(used):.1f} s are left when {TEAM_TRIM_S:g} s are dropped at both ends; a "
             f"diagnosis needs at least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
         )
     for other in recordings[1:]:

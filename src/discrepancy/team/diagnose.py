@@ -8,8 +8,14 @@ from dataclasses import dataclass, replace
 from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.evidence.until import Until
-from discrepancy.team import constants
-from discrepancy.team.around import around, exact, opened_by, placed
+from discrepancy.team.around import (
+    STRAIGHT_BESIDE_CHI2_PER_N,
+    STRAIGHT_CHI2_PER_N,
+    around,
+    exact,
+    opened_by,
+    placed,
+)
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
 from estimator.errors import InputError
@@ -94,7 +100,7 @@ def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem
         problem, miss = exact(problem, state)
         search = replace(search, problem=problem, best=None)
         state = search.settled(search.value(state.chosen, state.posterior))
-        if miss < constants.STRAIGHT_CHI2_PER_N:
+        if miss < STRAIGHT_CHI2_PER_N:
             break
-        same = same and miss < constants.STRAIGHT_BESIDE_CHI2_PER_N
+        same = same and miss < STRAIGHT_BESIDE_CHI2_PER_N
     return problem, search, state, same

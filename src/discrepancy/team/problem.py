@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,7 +185,7 @@ class TeamProblem:
         """Append columns (n, 3 C, k), one array a trial."""
         return self.cells.add_rows(self.spectra(columns))
 
-    def beside(self, X: Array) -> Array:
+    def beside(self, X: NDArray[Any]) -> NDArray[Any]:
         """Rows of the cells, shape (C, n, k), beside what chosen causes leave open."""
         if self.opened is None:
             return X
@@ -194,7 +194,7 @@ class TeamProblem:
             out[..., first : first + BLOCK] = self._beside(X[..., first : first + BLOCK])
         return out
 
-    def _beside(self, X: Array) -> Array:
+    def _beside(self, X: NDArray[Any]) -> NDArray[Any]:
         bands, order = self.bands, self.cells.order
         plain = np.empty_like(X)
         plain[:, order] = X

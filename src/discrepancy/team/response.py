@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from discrepancy.candidate import Candidate
-from discrepancy.digits import three_digits
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Key, Search, State
+from discrepancy.numbers import three_digits
 from discrepancy.team.around import found_in, robots_at
 from discrepancy.team.closed_loop import named_effects, posture, team_of
 from discrepancy.team.diagnose import TeamOutcome

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from discrepancy.candidate import Candidate
-from discrepancy.causes.excluded import excluded_from
+from discrepancy.cause_names import excluded_from
 from discrepancy.channel import Channel
 from discrepancy.team.candidates import (
     every_candidate,

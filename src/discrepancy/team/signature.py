@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from discrepancy.channel import Channel
-from discrepancy.digits import three_digits
+from discrepancy.numbers import three_digits
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.linear.whitening import Whitening
 from estimator.arrays import Array

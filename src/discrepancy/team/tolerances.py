@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from discrepancy.causes import tolerances_file
+from discrepancy import tolerances_file
 from discrepancy.team.causes import CAUSES
 
 
@@ -16,7 +16,7 @@ def default_tolerances() -> dict[str, dict[str, float]]:
 
 
 def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
-    """The defaults, with what a TOML file changes; see ``discrepancy.causes.tolerances_file``.
+    """The defaults, with what a TOML file changes; see ``discrepancy.tolerances_file``.
 
     Raises:
         InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.

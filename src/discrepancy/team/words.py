@@ -1,8 +1,10 @@
 """A team's causes in the words of a lab."""
 
+from collections.abc import Mapping
 from typing import Any
 
-from discrepancy.causes.words import Words
+from discrepancy.candidate import Candidate
+from discrepancy.numbers import Numbers
 from discrepancy.team.causes import CAUSES
 
 UNDECIDABLE = (
@@ -30,11 +32,23 @@ UNDECIDABLE = (
 """What recordings of a parked team that holds one rigid payload cannot decide: what, why, and what would."""
 
 
-class TeamWords(Words):
+class TeamWords:
     """Sentences about a mocobot team."""
 
-    causes = CAUSES
     units = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}  # noqa: RUF012
+
+    def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+        """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+        cause = CAUSES[candidate.cause]
+        return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
+
+    def separate(self, candidate: Candidate) -> str:
+        """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
+        return CAUSES[candidate.cause].separate
+
+    def unit(self, name: str) -> str:
+        """Unit of a closed-loop channel, or of a quantity that a misfit may depend on."""
+        return self.units[name]
 
 
 def statements(robots: int, *, aligned: bool) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
-from discrepancy.result.remains import remains, remedy
+from discrepancy.result.remains import remedy
 from estimator.calibrate.calibration import Calibration
 from estimator.estimate.frames import frames_said
 from estimator.estimate.result import PayloadEstimate
@@ -89,7 +89,7 @@ def diagnosis_html(values: Values) -> str:
         sentences = [
             tidy(text) for text in (*(entry["sentence"] for entry in values["scatter"]), remedy(values))
         ]
-    left = remains(values)
+    left = values["remains"]
     if not sentences and not left and values["verdict"] != "consistent":
         sentences = [tidy(residual["nominal"]["signature"]["sentence"])]
     sentences += map(tidy, left)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from discrepancy.team import constants
+from discrepancy.team.causes.payload import MASS_OVER_S
 from estimator.arrays import Array
 from mocobot.campaign.ground import Ground
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
@@ -44,7 +44,7 @@ def draw_at(
     elif cause == "slosh":
         parameters = _slosh(factor, ground, rng)
     elif cause == "payload_mass":  # a drift: another mass in some trials needs several
-        rate = factor * ground.limits.at(cause)["mass_kg"] / constants.MASS_OVER_S * rng.choice([-1.0, 1.0])
+        rate = factor * ground.limits.at(cause)["mass_kg"] / MASS_OVER_S * rng.choice([-1.0, 1.0])
         parameters = {"rate_kgps": float(rate)} | _vector("point", "m", _near(ground.p_1c, rng))
     elif cause == "tether":
         parameters = _tether(factor, ground.limits.at(cause, robot), np.zeros(3), rng)

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from discrepancy.result.evidence_list import drawn, label, relation
 
-from discrepancy.causes.units import Shown
+from discrepancy.numbers import Shown
 from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.read import is_of_joints
 from discrepancy.result.text_rollouts import blocks, diverged_sentences, lost, shown_units

@@ -10,7 +10,7 @@ from discrepancy.result.evidence_list import label
 from discrepancy.result.text import NEAREST, NOTHING_WRONG_HERE, SAID
 from scipy.spatial.transform import Rotation
 
-from discrepancy.causes.units import one_each, parameter
+from discrepancy.numbers import one_each, parameter
 from discrepancy.result.read import (
     AS_FOUND,
     EXTENDED,
@@ -20,7 +20,7 @@ from discrepancy.result.read import (
     name_of,
     read_diagnosis,
 )
-from discrepancy.result.remains import farthest, remains, remedy, sizes_of
+from discrepancy.result.remains import farthest, remedy, sizes_of
 from discrepancy.result.text_gain import foretold_torques
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
@@ -349,7 +349,7 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     if len(values["causes"]) == 1:
         meaning = meaning.replace("causes explain", "cause explains").replace("causes are", "cause is")
     said: list[Node | str] = []
-    left = remains(values)
+    left = values["remains"]
     if values["causes"]:
         said = [bullets([sentence_of(cause) for cause in values["causes"]])]
     elif values["verdict"] == "miscalibrated":

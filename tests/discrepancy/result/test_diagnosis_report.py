@@ -12,8 +12,8 @@ import pytest
 
 from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
-from discrepancy.causes.numbers import number
 from discrepancy.channel import Channel
+from discrepancy.numbers import number
 from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure

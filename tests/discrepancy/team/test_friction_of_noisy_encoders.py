@@ -5,10 +5,9 @@ import pytest
 from helpers.team_case import exact
 
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.causes.sliding import KEPT, _doubtful
-from discrepancy.team.constants import TEAM_SMOOTH_HZ
+from discrepancy.team.causes.friction import KEPT, _doubtful
 from discrepancy.team.linear.noise import QUIET_HZ, QUIET_RAD_PER_S, Noise
-from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.signals import TEAM_SMOOTH_HZ, Signals
 from estimator.filtering import differentiate
 from patchwork import dense
 

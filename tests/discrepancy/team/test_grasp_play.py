@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.causes.free_while import free_while, in_parts, pieces_while
 from discrepancy.team.candidates import shape_steps
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.free_while import free_while, in_parts, pieces_while
 from discrepancy.team.causes.grasp_play import displaced
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
 from estimator.estimate.principal import inertia_parameters

@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from discrepancy.causes.pendulum import Pendulum, swung
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.pendulum import Pendulum, swung
 from discrepancy.team.causes.slosh import OFF
 from outside_wrench import check_wrench, point, relieved, reported
 from recorded_team import COM

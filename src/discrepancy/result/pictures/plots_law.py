@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from discrepancy.causes.units import fitting
+from discrepancy.numbers import fitting
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, titled
 
 Values = Mapping[str, Any]

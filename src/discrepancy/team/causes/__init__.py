@@ -1,11 +1,29 @@
-"""The catalogue: one file per cause; the class in ``sea_bias.py`` is ``SeaBias``."""
+"""The catalogue of a team's causes, by subject."""
 
-from importlib import import_module
-
-from discrepancy.cause_names.team import NAMES
 from discrepancy.team.causes.base import Cause
+from discrepancy.team.causes.cable import PayloadTether, Tether
+from discrepancy.team.causes.friction import GimbalFriction, JointFriction, SeaHysteresis
+from discrepancy.team.causes.geometry import BaseTilt, LinkLength
+from discrepancy.team.causes.grasp_play import GraspPlay
+from discrepancy.team.causes.payload import Drag, PayloadMass, Push
+from discrepancy.team.causes.readings import (
+    ClockDelay,
+    PhiZero,
+    SeaBias,
+    SeaHardening,
+    SeaScale,
+    SensorLag,
+    ThetaZero,
+    TorqueLag,
+    TorqueSkew,
+)
+from discrepancy.team.causes.slosh import Slosh
+from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex
 
-CAUSES: dict[str, Cause] = {
-    name: getattr(import_module(f"{__name__}.{name}"), name.title().replace("_", ""))() for name in NAMES
-}
+CATALOGUE = (
+    PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,
+    SeaHysteresis, JointFriction, GimbalFriction, TorqueSkew, TorqueLag, SensorLag, ClockDelay, GraspFlex,
+    GraspPlay, Tether, PayloadTether, Push, Drag, Slosh, PayloadMass,
+)  # fmt: skip
+CAUSES: dict[str, Cause] = {cause.name: cause() for cause in CATALOGUE}
 """Every cause by its name."""

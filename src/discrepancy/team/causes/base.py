@@ -1,21 +1,23 @@
 """What every cause of the team's catalogue offers the diagnosis."""
 
-from abc import abstractmethod
+import inspect
+import re
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from discrepancy.candidate import Candidate
-from discrepancy.causes import base
-from discrepancy.causes.base import Shape
+from discrepancy.candidate import Candidate, Parameter, Transient
+from discrepancy.numbers import Numbers, number
 from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 
+Shape = Mapping[str, float]
 At = Literal["driven joint", "gimbal joint", "robot", "grasp", "payload"]
 
 GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
@@ -38,13 +40,25 @@ class Context:
     trial: int | None
 
 
-class Cause(base.Cause):
+class Cause(ABC):
     """One physical cause: the trace that one unit of each of its parameters leaves in the residual.
 
     The simulator's effect has the same name. Tolerances are those of a well-kept Omnid: assumed, like its masses, for a
     calibrated unit with 16-bit encoders; a lab replaces them by its own (``--tolerances``).
 
     Attributes:
+        name: as on the command line: that of the class, in lower case with underscores.
+        title: in words, for people; the part it sits at in braces, such as ``friction in {driven joint}``. The name
+            without underscores, if a cause does not say.
+        family: causes of one family look alike.
+        parameters: names of the columns' parameters, units as suffix.
+        tolerances: of the parameters, standard deviations that are no news; none where the cause is an event.
+        scales: their typical sizes, where there are no tolerances.
+        positive: parameters that cannot be negative.
+        transient: whether it acts for a while in one trial.
+        where: the part of the machine, of what sits at no robot.
+        among: of how many it is one, where its shape says at which of many places it sits; 0 where places are listed.
+        separate: what experiment would tell it from its look-alikes.
         at: what it can sit at; every robot has its own but for the payload.
         joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
@@ -55,6 +69,17 @@ class Cause(base.Cause):
         adjusted: whether it is a function of the readings, which are taken without their noise then.
     """
 
+    name: ClassVar[str]
+    title: ClassVar[str] = ""
+    family: ClassVar[str]
+    parameters: ClassVar[tuple[str, ...]]
+    tolerances: ClassVar[tuple[float, ...]] = ()
+    scales: ClassVar[tuple[float, ...]] = ()
+    positive: ClassVar[tuple[str, ...]] = ()
+    transient: ClassVar[bool] = False
+    where: ClassVar[str] = "payload"
+    among: ClassVar[int] = 0
+    separate: ClassVar[str] = ""
     at: ClassVar[At] = "driven joint"
     joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
@@ -63,6 +88,38 @@ class Cause(base.Cause):
     by_clocks: ClassVar[bool] = False
     fleeting: ClassVar[bool] = False
     adjusted: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        cls.name = re.sub(r"\B(?=[A-Z])", "_", cls.__name__).lower()
+
+    def candidate(
+        self, given: Mapping[str, float], shape: Shape, robot: int | None = None, joint: int | None = None
+    ) -> Candidate:
+        """The cause at a place.
+
+        Args:
+            given: standard deviations that are no news, by parameter; an event where there are none.
+            shape: numbers inside its columns.
+            robot, joint: where, from 1.
+        """
+        parameters = tuple(
+            Parameter(name, given.get(name, 0.0), scale)
+            for name, scale in zip(self.parameters, self.tolerances or self.scales, strict=True)
+        )
+        return Candidate(
+            self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title,
+            among=self.among,
+        )  # fmt: skip
+
+    def event(self, given: Mapping[str, float], when: Transient) -> Candidate:
+        """A transient cause during an interval."""
+        return replace(self.candidate(given, when.shape), transient=when)
+
+    def sentence(self, n: Numbers) -> str:
+        """What it does, without place and full stop; the first line of its docstring, if it says nothing else."""
+        said = (inspect.getdoc(self) or self.name).splitlines()[0].rstrip(".")
+        each = ", ".join(f"{name} = {number(value, n.se.get(name), '')}" for name, value in n.values.items())
+        return f"{said} ({each})"
 
     @property
     def per(self) -> Literal["joint", "robot", "payload"]:
@@ -114,7 +171,7 @@ class Cause(base.Cause):
     def place(self, candidate: Candidate) -> str:
         """Robot and joint, of a gimbal its axis, too."""
         if self.at != "gimbal joint" or candidate.joint is None:
-            return super().place(candidate)
+            return candidate.place.capitalize()
         return f"Robot {candidate.robot}, gimbal joint {candidate.joint}, axis {GIMBAL_AXES[candidate.joint]}"
 
     def physical(self, values: Array, context: Context) -> dict[str, float]:

@@ -1,14 +1,24 @@
-"""A cable: a spring that pulls along itself alone, and not at all where it is slack; a strap also stiffens."""
+"""Cables and straps that pull at a robot or at the payload."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 
-from discrepancy.causes.base import Shape
-from discrepancy.causes.numbers import Numbers
-from discrepancy.team import constants
+from discrepancy.numbers import Numbers
+from discrepancy.team.causes.base import Cause, Shape
 from estimator.arrays import Array
+
+CABLES, CABLE_LINES = 10_000, 100
+"""Cables that are told apart. Derived: ways 0.1 rad apart (4 pi / 0.01) times eight stretches; at the payload also
+lines 0.1 m apart across a metre each way."""
+
+TETHER_LEVER_M, TETHER_FINER_M, TETHER_STEP_M = 0.4, (0.2, 0.07, 0.025), 0.02
+"""Levers of a tether of the payload at which a search begins, by which it goes on, and over which slopes are taken.
+Chosen: half of a payload, and so fine that a Gauss-Newton step does the rest."""
 
 CABLE_STIFFENS_RANGE_PER_M, CABLE_STIFFENS_STEP_PER_M, STRAPS = (-3.0, 1000.0), 20.0, 20
 """By which share of its stiffness a strap is stiffer per metre of stretch: at least and most, over which slopes are
@@ -34,7 +44,7 @@ STRETCH, NEAR, STIFFENS = "stretch_m", "near_per_m", "stiffens_per_m"
 """By how much it is stretched at home; one over how far away it is tied; by which share it is stiffer per stretch."""
 SLOPE_STEPS: Mapping[str, float] = (
     dict.fromkeys(TURNS, CABLE_TURN_STEP)
-    | dict.fromkeys(OFFSETS, constants.TETHER_STEP_M)
+    | dict.fromkeys(OFFSETS, TETHER_STEP_M)
     | {STRETCH: CABLE_STRETCH_STEP_M, NEAR: CABLE_NEAR_STEP_PER_M}
     | {STIFFENS: CABLE_STIFFENS_STEP_PER_M}
 )
@@ -138,7 +148,7 @@ def strap(shape: Shape) -> list[Shape]:
 
 def alike(shape: Shape) -> int:
     """Of how many cables, told apart by their shapes alone, one is one."""
-    return constants.CABLES * (STRAPS if STIFFENS in shape else 1)
+    return CABLES * (STRAPS if STIFFENS in shape else 1)
 
 
 def through(at: Array, shape: Shape) -> Shape:
@@ -159,3 +169,158 @@ def _near(shape: Shape) -> float:
 
 def _stiffens(shape: Shape) -> float:
     return float(np.clip(shape.get(STIFFENS, 0.0), *CABLE_STIFFENS_RANGE_PER_M))
+
+
+class Tether(Cause):
+    """Force k (anchor - grasp) on the payload at a robot's grasp, anchor fixed in that robot's {b}.
+
+    The columns are the force at the home position and the stiffness. With ``stretch_m`` in its shape it is a cable, of
+    which stiffness is all.
+    """
+
+    title = "tether at {grasp}"
+    family = "sea_torque"
+    parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
+    scales = (0.1, 0.1, 0.1, 1.0)
+    at = "grasp"
+    shapes = ({}, *first_ways())
+    fleeting = True
+    determined: ClassVar[Mapping[str, float]] = SLOPE_STEPS
+    positive = ("stiffness_N_per_m",)
+    separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
+
+    def sentence(self, n):
+        return (
+            f"something like a cable pulls at the grasp with {n('stiffness_N_per_m', 'N/m')} towards "
+            f"{n.vector('anchor', 'm')} in its base frame{slack(n)}"
+        )
+
+    def columns(self, trial, robot, joint, shape):
+        data, grasps = trial.data, trial.shared.grasps
+        home = np.array([0.0, 0.0, trial.design.home_height_m])
+        moved = data.p_bi[:, robot] - home
+        if is_cable(shape):
+            forces = [pull(shape, moved)]
+        else:
+            forces = [*(np.broadcast_to(axis, moved.shape) for axis in np.eye(3)), -moved]
+        columns = []
+        for force_b in forces:
+            force = np.einsum("qji,qj->qi", data.R_bi[:, robot], force_b) @ grasps.R_1i[robot].T
+            columns.append(trial.of_wrench(force, np.cross(grasps.p_1i[robot], force)))
+        return beside_force(columns)
+
+    def further(self, shape):
+        return every_way()
+
+    def grown(self, shape):
+        return strap(shape)
+
+    def finer(self, shape):
+        return otherwise_slack(shape)
+
+    def alike(self, shape):
+        return alike(shape) if is_cable(shape) else self.among
+
+    def slope_step(self, name, number):
+        return self.determined[name]
+
+    def physical(self, values, context):
+        return tied(values, context.shape, np.array([0.0, 0.0, context.home_height_m]))
+
+
+SLOSH_REACH_M = 1.5
+"""From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+
+TETHER_POINTS = 1000
+"""Points of a payload that are told apart. Derived: every 0.1 m of a metre each way; near the limit they err by 0.05 m.
+Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
+
+LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
+
+
+def _at(lever: Array) -> Shape:
+    return dict(zip(LEVERS, lever.tolist(), strict=True))
+
+
+class PayloadTether(Cause):
+    """Force k (anchor - point) on a point of the payload, anchor fixed in robot 1's {b}.
+
+    The columns are the force at home and the stiffness; the point is the shape, seen from the centre of mass along the
+    axes of {1}. With ``stretch_m`` in its shape it is a cable, of which stiffness is all, and the point where its line
+    is at home.
+    """
+
+    title = "tether of the payload"
+    family = "sea_torque"
+    parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
+    scales = (0.1, 0.1, 0.1, 1.0)
+    at = "payload"
+    among = TETHER_POINTS
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        dict.fromkeys(LEVERS, 0.0),
+        *(_at(sign * TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
+        *(through(np.zeros(3), way) for way in first_ways()),
+    )
+    fleeting = True
+    determined: ClassVar[Mapping[str, float]] = {
+        **dict.fromkeys(LEVERS, TETHER_STEP_M),
+        **SLOPE_STEPS,
+    }
+    positive = ("stiffness_N_per_m",)
+    separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
+
+    def sentence(self, n):
+        return (
+            f"something like a cable pulls at the payload's point {n.vector('point', 'm')} in {{1}} with "
+            f"{n('stiffness_N_per_m', 'N/m')} towards {n.vector('anchor', 'm')} in robot 1's base frame{slack(n)}"
+        )
+
+    def columns(self, trial, robot, joint, shape):
+        R, p = trial.data.R_bi[:, 0], trial.data.p_bi[:, 0]  # {1} in {b1}
+        point = trial.shared.pi[1:4] / trial.shared.pi[0] + _lever(shape)
+        moved = p + R @ point - (np.array([0.0, 0.0, trial.design.home_height_m]) + point)
+        if is_cable(shape):
+            forces_b = [pull(shape, moved)]
+        else:
+            forces_b = [*(np.broadcast_to(axis, p.shape) for axis in np.eye(3)), -moved]
+        forces = [np.einsum("qji,qj->qi", R, force_b) for force_b in forces_b]
+        return beside_force([trial.of_wrench(force, np.cross(point, force)) for force in forces])
+
+    def further(self, shape):
+        at = _lever(shape)
+        return [through(at, way) for way in every_way()]
+
+    def finer(self, shape):
+        """Nearer to the best; a tether is tied within the payload's reach."""
+        if is_cable(shape):
+            return otherwise_slack(shape)  # slopes tell the rest
+        moved = [
+            dict(shape) | {name: shape[name] + step}
+            for name in LEVERS
+            for far in TETHER_FINER_M
+            for step in (far, -far)
+        ]
+        return [other for other in moved if np.linalg.norm(_lever(other)) <= SLOSH_REACH_M]
+
+    def grown(self, shape):
+        return strap(shape)
+
+    def alike(self, shape):
+        return alike(shape) * CABLE_LINES if is_cable(shape) else self.among
+
+    def slope_step(self, name, number):
+        return self.determined[name]
+
+    def physical(self, values, context):
+        point = context.p_1c + _lever(context.shape)
+        home = np.array([0.0, 0.0, context.home_height_m]) + point
+        return tied(values, context.shape, home) | {
+            f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
+        }
+
+
+def _lever(shape):
+    """From the centre of mass to where it is tied, in {1} [m], shape (3,)."""
+    if is_cable(shape):
+        return lever(shape)
+    return np.array([shape[name] for name in LEVERS])

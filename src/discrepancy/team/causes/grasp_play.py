@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from discrepancy.causes.free_while import in_parts, pieces_while
-from discrepancy.team import constants
 from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.causes.free_while import in_parts, pieces_while
+from discrepancy.team.linear.rest import PLAY_FORCE_N
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 
@@ -41,7 +41,7 @@ class GraspPlay(Cause):
     parameters = ("play_m",)
     tolerances = (3e-6,)
     at = "grasp"
-    shapes = ({"force_N": constants.PLAY_FORCE_N}, {"force_N": constants.PLAY_FORCE_N, "contact_per_N": 0.0})
+    shapes = ({"force_N": PLAY_FORCE_N}, {"force_N": PLAY_FORCE_N, "contact_per_N": 0.0})
     determined: ClassVar = {"contact_per_N": PLAY_CONTACT_PER_N}
     positive = ("play_m",)
     separate = "Internal forces of both signs at rest separate play from flexibility."

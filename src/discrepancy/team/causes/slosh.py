@@ -8,10 +8,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from discrepancy.causes.base import Shape
-from discrepancy.causes.pendulum import Pendulum, swung
-from discrepancy.team import constants
-from discrepancy.team.causes.base import Cause
+from discrepancy.team.causes.base import Cause, Shape
+from discrepancy.team.causes.pendulum import SWING_FIRST_ROUNDS, SWING_ROUNDS, Pendulum, swung
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.so3 import skew
@@ -51,7 +49,7 @@ class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
 
     Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length, far ones
-    what ``discrepancy.causes.pendulum`` says; v is how fast it would swing if it turned with the payload, to which its
+    what ``team.causes.pendulum`` says; v is how fast it would swing if it turned with the payload, to which its
     damper is fixed. The payload feels -mass x'' at the point, upwards what raises the mass, and, as the damper pulls
     where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and rigid part are in the
     payload's own parameters.
@@ -99,7 +97,7 @@ class Slosh(Cause):
         point = trial.shared.pi[1:4] / trial.shared.pi[0] + off
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
         (*ways, up), wrench = _level_ways(trial, point), np.zeros((len(R_b1), 6, 4))
-        rounds = constants.SWING_ROUNDS if set(OFF) & set(shape) else constants.SWING_FIRST_ROUNDS
+        rounds = SWING_ROUNDS if set(OFF) & set(shape) else SWING_FIRST_ROUNDS
         if "across_length_m" in shape:
             drop_m = shape["length_m"] - shape["across_length_m"]
             along, across = _ways(R_b1, shape["heading_rad"])

@@ -1,14 +1,20 @@
-"""What gives way to a force: a spring beside a damper, as Kelvin and Voigt have it, and the mass that moves along."""
+"""What gives way to a force: bases and grasps, a spring beside a damper as Kelvin and Voigt have it, and creep."""
 
 from typing import ClassVar, cast
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from discrepancy.causes.base import Shape
-from discrepancy.team import constants
-from discrepancy.team.causes.base import Cause
+from discrepancy.team.causes.base import Cause, Shape, stack
+from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arm.gimbal import rate_matrix
 from estimator.arrays import Array
+from estimator.rigid_team.slots import THETA
+
+RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
+"""Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds
+the rest; the first is that of a base of 60 kg that gives way by 1 to 3 um/N, critically damped. Of a grasp it is the
+least: 5 kg, a share of a payload, on 1 um/N, ten tolerances, follow within 4.5 ms."""
 
 RELAXATION_RANGE_S = (0.001, 0.5)
 """Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
@@ -28,7 +34,7 @@ class Yielding(Cause):
     parameters = ("compliance_m_per_N",)
     tolerances = (1e-7,)
     positive = ("compliance_m_per_N",)
-    shapes = tuple({"relaxation_s": time_s} for time_s in constants.RELAXATIONS_S)
+    shapes = tuple({"relaxation_s": time_s} for time_s in RELAXATIONS_S)
     determined: ClassVar = {"relaxation_s": 0.1}
 
     def finer(self, shape):
@@ -48,3 +54,192 @@ def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
     filtered = cast("tuple[Array, Array, float]", cont2discrete(([1.0], below), 1.0 / rate_hz, method="foh"))
     start = force[:1]
     return np.asarray(start + lfilter(np.ravel(filtered[0]), filtered[1], force - start, axis=0), dtype=float)
+
+
+BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
+"""Compliance times the mass that moves, over the square of the lag, tried where a base gives way: a quarter is damped
+critically; and shares of it tried next. Chosen."""
+
+
+class BaseCompliance(Yielding):
+    """The base gives way to the horizontal force, which is the reaction to arm and payload.
+
+    Where it gives way much the robot's own mass shows: on 14 um/N, 70 kg swing at 5 Hz.
+    """
+
+    title = "compliance of {base}"
+    at = "robot"
+    determined: ClassVar = {**Yielding.determined, "inertia_s2": 0.1}
+    separate = (
+        "Vertical forces (lifting against each other) separate a base, which yields sideways, from a grasp."
+    )
+
+    def sentence(self, n):
+        along = f", {n('mass_kg', 'kg')} moving along" if n.values.get("mass_kg") else ""
+        return (
+            f"the base gives way horizontally, by {n('compliance_m_per_N', 'um/N', 1e6)}, and follows the force within "
+            f"{n('relaxation_s', 'ms', 1e3)}{along}"
+        )
+
+    def finer(self, shape):
+        times = super().finer(shape)
+        if "inertia_s2" not in shape:
+            return times
+        inertias = (shape["inertia_s2"] * share for share in BASE_INERTIA_FINER)
+        return [*({**shape, **time} for time in times), *({**shape, "inertia_s2": x} for x in inertias)]
+
+    def further(self, shape):
+        """With the robot's mass on the spring; the same lag where forces are slow."""
+        if "inertia_s2" in shape:
+            return []
+        shares = BASE_INERTIA_SHARES
+        return [{**shape, "inertia_s2": share * shape["relaxation_s"] ** 2} for share in shares]
+
+    def physical(self, values, context):
+        given = super().physical(values, context)
+        inertia_s2 = given.pop("inertia_s2", 0.0)
+        return {**given, "mass_kg": inertia_s2 / (given["compliance_m_per_N"] or np.inf)}
+
+    def columns(self, trial, robot, joint, shape):
+        mass_kg = trial.design.wrist_mass_kg + 1.5 * trial.design.rod_mass_kg
+        force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
+        force = force + mass_kg * trial.wrist_accelerations[:, robot]
+        horizontal = lagging(-force * np.array([1.0, 1.0, 0.0]), trial.signals.rate_hz, shape)
+        return stack([trial.of_pose(robot, None, horizontal @ trial.bases.R[robot].T)])
+
+
+CREEP_STARTS = 100
+"""How many of them there are, each as likely as the others. Derived: three bases, by a minute in steps of 2 s."""
+
+CREEP_STEP_S = 0.5
+"""Step of slopes by that time. Chosen: what creeps from half a second sooner or later goes nearly the same way."""
+
+CREEP_FINER_S = (-2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0)
+"""By which such a time is moved next. Chosen."""
+
+CREEP_STARTS_S = tuple(3.0 * k for k in range(1, 31))
+"""Into a trial, at which a base may begin to creep, tried first. Chosen: trials last less than a minute and a half."""
+
+
+class BaseCreep(Cause):
+    """The base moves at constant velocity (x, y in its own axes) during a trial; with ``start_s`` from then on only."""
+
+    title = "creep of {base}"
+    family = "base_creep"
+    parameters = ("x_mps", "y_mps")
+    tolerances = (2e-8, 2e-8)
+    at = "robot"
+    determined: ClassVar = {"start_s": CREEP_STEP_S}
+    separate = "A longer recording at rest."
+
+    def sentence(self, n):
+        start = f" from {n('start_s', 's')} into a trial" if n.values.get("start_s") else ""
+        return (
+            f"the base creeps over the floor{start}, by {n('x_mps', 'um/min', 6e7, signed=True)} along its x axis and "
+            f"{n('y_mps', 'um/min', 6e7, signed=True)} along its y axis"
+        )
+
+    def further(self, shape):
+        return [] if shape else [{"start_s": start_s} for start_s in CREEP_STARTS_S]
+
+    def finer(self, shape):
+        starts_s = [shape["start_s"] + x for x in CREEP_FINER_S] if shape else []
+        return [{"start_s": start_s} for start_s in starts_s if start_s > 0.0]
+
+    def alike(self, shape):
+        return CREEP_STARTS if shape else self.among
+
+    def slope_step(self, name, number):
+        return self.determined[name]
+
+    def physical(self, values, context):
+        return super().physical(values, context) | {"start_s": context.shape.get("start_s", 0.0)}
+
+    def columns(self, trial, robot, joint, shape):
+        # From the recording's begin, of which this may be a later part; a constant way is the bases' own.
+        since = shape.get("start_s", trial.signals.time[0])
+        time = np.maximum(0.0, trial.signals.time - since)
+        return stack(
+            [
+                trial.of_pose(robot, None, np.outer(time, trial.bases.R[robot] @ np.eye(3)[k]))
+                for k in range(2)
+            ]
+        )
+
+
+GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
+"""Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
+
+GRASP_TURNS_M = (0.05, -0.05)
+"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first. Chosen: a flange's
+thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
+
+
+class GraspFlex(Yielding):
+    """The payload's grasp site stays behind the flange, giving way to the force on the payload.
+
+    It may turn besides, about a point on the grasp's axis at ``offset_m`` from the gimbal's centre (along z of {i}).
+    The gimbal passes no moment, so the moment about that point is its distance times the force across the axis, and
+    the turning goes with the force: ``turning_rad_per_N`` is compliance in rotation times distance. Without such a
+    point in its shape it does not turn.
+    """
+
+    title = "compliance of {grasp}"
+    parameters = ("compliance_m_per_N", "turning_rad_per_N")
+    tolerances = (1e-7, 1e-6)  # the second: bolts 7 cm apart that give way as much, 5 cm off the gimbal
+    positive = ("compliance_m_per_N", "turning_rad_per_N")
+    clipped = ("turning_rad_per_N",)
+    at = "grasp"
+    shapes = (
+        *({"relaxation_s": time_s} for time_s in sorted(RELAXATIONS_S)),  # no base moves along
+        *({"relaxation_s": min(RELAXATIONS_S), "offset_m": offset_m} for offset_m in GRASP_TURNS_M),
+    )
+    determined: ClassVar = {**Yielding.determined, "offset_m": 0.1}
+    separate = (
+        "Vertical forces (lifting against each other) separate a grasp from a base, which yields sideways."
+    )
+
+    def sentence(self, n):
+        turns = ""
+        if n.values.get("offset_m"):
+            turns = f", turns by {n('turning_rad_per_N', 'mrad/N', 1e3)} of force across it about a point "
+            turns += f"{n('offset_m', 'mm', 1e3, signed=True)} along its axis from the gimbal's centre"
+        gives = f"gives way by {n('compliance_m_per_N', 'um/N', 1e6)}{turns}"
+        return (
+            f"the grasp is flexible: it {gives}, and follows the force within {n('relaxation_s', 'ms', 1e3)}"
+        )
+
+    def finer(self, shape):
+        times = super().finer(shape)
+        if "offset_m" not in shape:
+            return times
+        least_m, most_m = GRASP_TURNS_RANGE_M
+        offsets_m = (shape["offset_m"] * share for share in GRASP_TURNS_FINER)
+        near = [{**shape, "offset_m": x} for x in offsets_m if least_m <= abs(x) <= most_m]
+        return [*({**shape, **time} for time in times), *near]
+
+    def columns(self, trial, robot, joint, shape):
+        R_bi, to_b1 = trial.data.R_bi[:, robot], trial.bases.R[robot]
+        # Its springs turn with it, and so does what lags in them.
+        force = lagging(trial.data.wrench[:, robot, 3:], trial.signals.rate_hz, shape)
+        gives = _moved(trial, robot, to_b1 @ R_bi, -force)
+        turns = np.zeros_like(gives)
+        if "offset_m" in shape:
+            offset_m = shape["offset_m"]
+            across = force * [1.0, 1.0, 0.0]
+            turned = np.sign(offset_m) * np.cross([0.0, 0.0, 1.0], force)  # of the payload
+            # The gimbal reads its own side of the grasp, which has not turned.
+            angles = np.linalg.solve(rate_matrix(trial.s[:, robot, THETA]), turned[..., None])[..., 0]
+            turns = _moved(trial, robot, to_b1 @ R_bi, -abs(offset_m) * across)
+            turns += trial.of_signals(robot, theta=-angles)
+        return stack([gives, turns])
+
+    def physical(self, values, context):
+        offset_m = context.shape.get("offset_m", 0.0)
+        turning = float(values[1]) if offset_m else 0.0
+        return super().physical(values, context) | {"turning_rad_per_N": turning, "offset_m": offset_m}
+
+
+def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
+    """Rows of a grasp that is displaced along the axes of {i}, shape (Q, 3)."""
+    return trial.of_pose(robot, None, np.einsum("qij,qj->qi", R_b1i, by))

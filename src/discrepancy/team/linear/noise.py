@@ -9,9 +9,16 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from discrepancy.team import constants
-from discrepancy.team.linear.chatter import Fast, columns_of, native_hz
-from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.chatter import (
+    MODEL_HZ,
+    MODEL_PHI_RAD,
+    MODEL_TAU_NM,
+    MODEL_THETA_RAD,
+    Fast,
+    columns_of,
+    native_hz,
+)
+from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
@@ -78,13 +85,13 @@ class Noise:
         quiet = np.array([QUIET_RAD_PER_S, QUIET_RAD_PER_S, QUIET_NM_PER_S])
         # Noise of a rate grows with the cut-off to the power 3/2.
         less = (quiet[:, None, None] / np.maximum(rates, 1e-300)).clip(max=1.0) ** (2.0 / 3.0)
-        smooth_hz = np.maximum(constants.TEAM_SMOOTH_HZ * less, QUIET_HZ)
+        smooth_hz = np.maximum(TEAM_SMOOTH_HZ * less, QUIET_HZ)
         fast = Fast.of(signals) if self.chatters else None
         if fast is None or not fast.is_loud(self.step):
             return replace(signals, smooth_hz=smooth_hz)
         most = CHATTER_RATE_SHARE * signals.rate_hz
         let_through = np.where(fast.lines > 0.0, np.minimum(CHATTER_OVER * fast.at_hz, most), 0.0)
-        pre_hz = max(float(let_through.max()), constants.TEAM_PRE_HZ)
+        pre_hz = max(float(let_through.max()), TEAM_PRE_HZ)
         return replace(signals, smooth_hz=np.maximum(smooth_hz, let_through), pre_hz=pre_hz)
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
@@ -144,7 +151,7 @@ def _rate_gain(rate_hz: float) -> float:
     """Standard deviation of the rates that tell rest from motion, of white noise of 1 at every sample [1/s]."""
     impulse = np.zeros(int(4.0 * rate_hz) + 1)
     impulse[len(impulse) // 2] = 1.0
-    smooth = low_pass(impulse, rate_hz, constants.TEAM_SMOOTH_HZ)
+    smooth = low_pass(impulse, rate_hz, TEAM_SMOOTH_HZ)
     return float(np.linalg.norm(differentiate(smooth, rate_hz)))
 
 
@@ -162,8 +169,8 @@ def _model_errors(x: Array, rate_hz: float, rng: np.random.Generator) -> Array:
 
     Rounding does so, too, and is drawn for it: to a step that scatters by the floor; of what is quick, little stays.
     """
-    floor = np.repeat([constants.MODEL_PHI_RAD, constants.MODEL_THETA_RAD, constants.MODEL_TAU_NM], 3)
-    step = floor * np.sqrt(12.0 * rate_hz / constants.MODEL_HZ)
+    floor = np.repeat([MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM], 3)
+    step = floor * np.sqrt(12.0 * rate_hz / MODEL_HZ)
     errors = _read(x, step, np.zeros_like(step), rng)
     slow = low_pass(errors, rate_hz, MODEL_BELOW_HZ)
     return slow + MODEL_ABOVE * (errors - slow)
@@ -194,8 +201,8 @@ def _unrounded(signals: Signals, step: Array) -> Array:
     x, rate_hz = columns_of(signals), signals.rate_hz
     slow = differentiate(low_pass(x, rate_hz, SLOW_HZ), rate_hz)
     stairs_hz = low_pass(np.abs(slow), rate_hz, SLOW_HZ) / np.where(step > 0, step, 1e-300)
-    cutoffs = constants.TEAM_SMOOTH_HZ * 0.5 ** np.arange(SMOOTHER_OCTAVES + 1)
-    octave = np.log2(constants.TEAM_SMOOTH_HZ / np.maximum(stairs_hz / 3.0, 1e-9)).clip(0.0, SMOOTHER_OCTAVES)
+    cutoffs = TEAM_SMOOTH_HZ * 0.5 ** np.arange(SMOOTHER_OCTAVES + 1)
+    octave = np.log2(TEAM_SMOOTH_HZ / np.maximum(stairs_hz / 3.0, 1e-9)).clip(0.0, SMOOTHER_OCTAVES)
     octave[stairs_hz < SLOW_HZ] = 0.0  # at rest
     out = np.zeros_like(x)
     for k, cutoff in enumerate(cutoffs):

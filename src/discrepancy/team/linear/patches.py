@@ -12,8 +12,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.team import constants
 from estimator.arrays import Array
+
+PATCH_COLUMNS = 48
+"""Of what a cause leaves open that are kept together. Chosen: a few seconds of friction at rest; of fewer, calls cost
+more than numbers, of more, most numbers are nought."""
 
 PATCH_SHOWS = 1e-6
 """Of what a cause leaves open, trace of one column over the largest from which it counts. Derived: the largest is some
@@ -76,7 +79,7 @@ class Patches:
         """These columns, and then others of the same trial."""
         return Patches(self.shape, (*self.each, *(patch for other in others for patch in other.each)))
 
-    def together(self, least: int = constants.PATCH_COLUMNS) -> Patches:
+    def together(self, least: int = PATCH_COLUMNS) -> Patches:
         """The same columns in patches of so many at least, of those that follow each other."""
         out: list[Patch] = []
         some: list[Patch] = []

@@ -9,13 +9,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.team import constants
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import rate_matrix
 from estimator.arrays import Array
 from estimator.filtering import differentiate
 from estimator.rigid_team.slots import TAU, THETA
+
+PLAY_FORCE_N = 0.4
+"""Below which a payload may be anywhere in its play. Chosen."""
+
+REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
+"""Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
 
 PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
@@ -57,9 +62,9 @@ class Resting:
             moves: tolerances.get(cause, {}).get(name, 0.0) for moves, cause, name in KINDS
         }
         slow = {
-            "phi": constants.REST_RAD_PER_S,
-            "theta": constants.REST_RAD_PER_S,
-            "tau": constants.REST_NM_PER_S,
+            "phi": REST_RAD_PER_S,
+            "theta": REST_RAD_PER_S,
+            "tau": REST_NM_PER_S,
         }
         self._play_m = tolerances.get("grasp_play", {}).get("play_m", 0.0)
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
@@ -103,7 +108,7 @@ class Resting:
         time = trial.signals.time
         knots = np.arange(time[0], time[-1] + PLAY_KNOTS_S, PLAY_KNOTS_S)
         anywhere = [np.interp(time, knots, rng.standard_normal(len(knots))) for _ in range(3)]
-        between = np.abs(trial.data.wrench[:, robot, 3:]) < constants.PLAY_FORCE_N
+        between = np.abs(trial.data.wrench[:, robot, 3:]) < PLAY_FORCE_N
         return np.asarray(self._play_m * np.stack(anywhere, axis=1) * between)
 
     def _torque(self, moves: Moves, rng: np.random.Generator) -> Array:

@@ -7,12 +7,20 @@ from typing import Literal
 
 import numpy as np
 
-from discrepancy.team import constants
 from estimator.arm.arms import true_joints
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.model import Recording
 from estimator.recording.sampling import Sampling
+
+TEAM_SMOOTH_HZ = 12.0
+"""Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
+
+TEAM_TRIM_S = 2.0
+"""Left out at both ends of a recording. Chosen."""
+
+TEAM_PRE_HZ = 20.0
+"""Cut-off before the nonlinear formulas. Derived: high enough that filtering and they commute to within the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +43,7 @@ class Signals:
     rate_hz: float
     sampling: tuple[Sampling, ...] | None = None
     smooth_hz: Array | None = None
-    pre_hz: float = constants.TEAM_PRE_HZ
+    pre_hz: float = TEAM_PRE_HZ
     _last: dict[tuple[str, int, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -53,7 +61,7 @@ class Signals:
 
     def smooth(self, moves: Literal["phi", "theta", "tau"], robot: int, joint: int) -> Array:
         """A signal of one joint, filtered so that its rate tells rest from sliding, shape (Q,)."""
-        usual, kind = constants.TEAM_SMOOTH_HZ, ("phi", "theta", "tau").index(moves)
+        usual, kind = TEAM_SMOOTH_HZ, ("phi", "theta", "tau").index(moves)
         cutoff_hz = usual if self.smooth_hz is None else float(self.smooth_hz[kind, robot, joint])
         which = moves, robot, joint
         if which not in self._last:  # shapes of one cause are asked for one after the other
@@ -70,9 +78,9 @@ class Signals:
     @property
     def chatters(self) -> bool:
         """Whether something oscillates above what is usually let through to the nonlinear formulas."""
-        return self.pre_hz > constants.TEAM_PRE_HZ
+        return self.pre_hz > TEAM_PRE_HZ
 
     @property
     def keep(self) -> slice:
         """Rows left once the filters' transients at both ends are dropped."""
-        return trim_slice(len(self.time), self.rate_hz, constants.TEAM_TRIM_S)
+        return trim_slice(len(self.time), self.rate_hz, TEAM_TRIM_S)

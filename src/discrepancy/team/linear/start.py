@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 from joblib import Parallel, delayed
 
-from discrepancy.team import constants
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
+from discrepancy.team.linear.chatter import NOISE_SEED
 from discrepancy.team.linear.filed import held, is_filed, rested
 from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
 from discrepancy.team.linear.noise import Noise
@@ -179,9 +179,9 @@ def what_noise_leaves(
     moving = trial.reduction.moving
     draws, told = before or (None, None)
     if draws is None or told is None:
-        draws, errors = noise_rows(trial, noise, np.random.default_rng([constants.NOISE_SEED, k]))
+        draws, errors = noise_rows(trial, noise, np.random.default_rng([NOISE_SEED, k]))
         told = SignalNoise.of(draws, errors, moving)
-    rests = Resting(trial, tolerances)(np.random.default_rng([constants.NOISE_SEED, k, 1]), len(draws))
+    rests = Resting(trial, tolerances)(np.random.default_rng([NOISE_SEED, k, 1]), len(draws))
     rested(trial)
     return Whitening.of(draws + rests, moving, uneven=True), told, None if is_filed(trial) else draws
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from discrepancy.team import constants
-from discrepancy.team.long.parts import parted, seconds
+from discrepancy.team.long.parts import PART_S, parted, seconds
 from estimator.recording.model import Recording
 
 SEARCHED_PARTS, SHORTEST_PART_S = 4, 40.0
@@ -47,7 +46,7 @@ class Choice:
         """
         most_s, total_s = searched_s(recordings[0].metadata.robots), seconds(recordings)
         everything = whole or total_s <= most_s
-        longest_s = constants.PART_S
+        longest_s = PART_S
         if not everything:
             longest_s = min(max(most_s / SEARCHED_PARTS, SHORTEST_PART_S), longest_s)
         parts = tuple(parted(recordings, longest_s))

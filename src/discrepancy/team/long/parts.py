@@ -11,8 +11,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from discrepancy.team import constants
+from discrepancy.team.linear.signals import TEAM_TRIM_S
 from estimator.recording.model import Recording
+
+PART_S = 180.0
+"""Of a recording at most that is looked at as one trial. Chosen: what a trial leaves open costs its square, and ten of
+its overlaps are a tenth of that; longer than any trial of the experiment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +33,7 @@ def parted(recordings: Sequence[Recording], longest_s: float | None = None) -> l
         recordings: whole.
         longest_s: of a part [s]; None for that of the rules.
     """
-    return [part for recording in recordings for part in _parts(recording, longest_s or constants.PART_S)]
+    return [part for recording in recordings for part in _parts(recording, longest_s or PART_S)]
 
 
 def seconds(recordings: Sequence[Recording]) -> float:
@@ -45,7 +49,7 @@ def _edges(recording: Recording, longest_s: float) -> list[int]:
 
 
 def _parts(recording: Recording, longest_s: float) -> list[Recording]:
-    edges, trim = _edges(recording, longest_s), round(constants.TEAM_TRIM_S * recording.metadata.rate_hz)
+    edges, trim = _edges(recording, longest_s), round(TEAM_TRIM_S * recording.metadata.rate_hz)
     if len(edges) == 2:
         return [recording]
     out = []

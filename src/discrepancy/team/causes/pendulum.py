@@ -10,8 +10,11 @@ from typing import cast
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from discrepancy.team import constants
 from estimator.arrays import Array
+
+SWING_ROUNDS, SWING_FIRST_ROUNDS, SWING_SETTLED = 20, 1, 1e-4
+"""Times a pendulum that swings far is swung again, the same while shapes are only looked through, and the change from
+which it is enough. Chosen: sizes are told to a percent."""
 
 SWING_MOST, SWING_START, SWING_EASED = 0.95, 0.9, 0.6
 """How far it swings at most, over its length, the same while it is sought, and by which share its restoring force is
@@ -65,7 +68,7 @@ def swung(
     turned: Sequence[Array],
     lift: Array,
     pendulums: Sequence[Pendulum],
-    rounds: int = constants.SWING_ROUNDS,
+    rounds: int = SWING_ROUNDS,
 ) -> tuple[list[Array], list[Array], Array]:
     """How 1 kg swings on two level ways whose damper turns with what it hangs in, from rest.
 
@@ -112,7 +115,7 @@ def swung(
             weight = max(SWING_WEIGHT * weight, SWING_LEAST_WEIGHT)
         new *= _within(pendulums, new)
         swing, last, far = new, moved, Far.of(pendulums, new, turned, lift)
-        if moved < constants.SWING_SETTLED:
+        if moved < SWING_SETTLED:
             break
     swings, damped = [], []
     for own, drive, way, rate in zip(pendulums, drives, swing, far.rates, strict=True):

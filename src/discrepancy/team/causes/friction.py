@@ -1,4 +1,6 @@
-"""Dry friction while it slides, and when it does not."""
+"""Friction of driven joints, gimbal axes and springs: sliding, at rest, and giving way before it slips."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
@@ -7,17 +9,16 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.causes.base import Shape
-from discrepancy.causes.free_while import in_parts, pieces_while
-from discrepancy.causes.play import played
-from discrepancy.team import constants
-from discrepancy.team.causes.base import Cause, one_joint, one_robot
-from discrepancy.team.linear.patches import Patches
+from discrepancy.team.causes.base import Cause, Shape, one_joint, one_robot
+from discrepancy.team.causes.free_while import in_parts, pieces_while, played
+from discrepancy.team.linear.patches import PATCH_COLUMNS, Patches
+from discrepancy.team.linear.rest import REST_RAD_PER_S
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arm.gimbal import moment_about_axes
 from estimator.arrays import Array
 from estimator.filtering import differentiate
-from estimator.rigid_team.slots import TAU
+from estimator.rigid_team.slots import TAU, THETA
 
 PRESLIDING_OPEN_SHARE = 0.5
 """Of its limit, by which friction that gives way may differ from Prandtl's law until it slips. Measured on LuGre, Dahl
@@ -117,7 +118,7 @@ class Friction(Cause):
         state = np.abs(bent)
         open_ = state < 1.0 - 1e-9 if KEPT not in shape else _doubtful(bent, rate)
         rests = pieces_while(open_, trial.signals.rate_hz, REST_KNOTS_S)
-        rests = in_parts(rests, constants.PATCH_COLUMNS)
+        rests = in_parts(rests, PATCH_COLUMNS)
         if self.gives in shape or KEPT in shape:
             slips = np.flatnonzero(state >= 1.0 - 1e-9)
             before = slice(0, slips[0] if len(slips) else len(state))
@@ -172,10 +173,74 @@ def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
     stretch = np.cumsum(np.diff(slow, prepend=False))
     turns = np.flatnonzero(np.diff(kept))
     turning = slow & np.isin(stretch, stretch[[turns, turns + 1]])
-    return turning | ((kept * rate < 0.0) & (fast >= constants.REST_RAD_PER_S))
+    return turning | ((kept * rate < 0.0) & (fast >= REST_RAD_PER_S))
 
 
 def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:
     """Where each motion one way begins, and how fast it becomes."""
     starts = np.flatnonzero(np.diff(np.sign(rate), prepend=0.0))
     return starts, np.maximum.reduceat(np.abs(rate), starts) if len(starts) else np.zeros(0)
+
+
+PRESLIDING_RANGE_NM = (0.01, 1.0)
+"""Derived: less is passed within a sample; more is hardly ever turned round."""
+
+PRESLIDINGS_NM = (0.05, 0.2)
+"""Torque that a spring takes up while the friction inside it gives way before it slips, tried first. Chosen: Bouc-Wen
+springs that yield over 0.3 to 3 mrad at 100 N m/rad."""
+
+
+class SeaHysteresis(Friction):
+    """Friction parallel to the spring: the link gets more than the deflection tells while the torque grows.
+
+    Torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
+    """
+
+    title = "friction inside the spring of {driven joint}"
+    parameters = ("friction_Nm",)
+    tolerances = (2e-3,)
+    clipped = ()
+    shapes = (
+        {"slow_Nm_per_s": 0.2}, {"slow_Nm_per_s": 0.6}, *({"presliding_Nm": x} for x in PRESLIDINGS_NM)
+    )  # fmt: skip
+    determined: ClassVar = {"presliding_Nm": 0.1}
+    positive = ("friction_Nm",)
+    moves = "tau"
+    sign = -1.0
+    gives = "presliding_Nm"
+    gives_range = PRESLIDING_RANGE_NM
+    separate = (
+        "Motion with load reversals at rest separates friction in the spring from friction in the joint."
+    )
+
+    def sentence(self, n):
+        soft = (
+            f", and gives way over {n(self.gives, 'N m')} before it slips" if n.values.get(self.gives) else ""
+        )
+        return f"the spring rubs inside, with {n('friction_Nm', 'N m')}{soft}"
+
+
+class JointFriction(Friction):
+    """The link gets less than the spring gives while it moves; below ``slow_rad_per_s`` it rests."""
+
+    title = "friction in {driven joint}"
+    separate = "An arm-only run (payload released) shows friction of the joint alone."
+
+
+class GimbalFriction(Friction):
+    """The gimbal is not quite passive: it turns the payload with a moment about its axis (1, 2, 3 are z, y, x).
+
+    A pure moment is the same wherever it acts, so robots with parallel axes share the blame.
+    """
+
+    title = "friction in {gimbal axis}"
+    at = "gimbal joint"
+    moves = "theta"
+    separate = "Which robot's gimbal rubs shows only with one robot released at a time."
+    undo = Cause.undo  # no sensor reads it
+
+    def direction(self, trial, robot, joint):
+        """The payload is turned by less than the balance believes: an outside moment against the axis."""
+        moment = moment_about_axes(trial.s[:, robot, THETA], np.eye(3)[joint])
+        moment = moment @ trial.shared.grasps.R_1i[robot].T
+        return np.concatenate([np.zeros((len(moment), trial.channels - 3)), moment], axis=1)

@@ -1,1 +1,0 @@
-"""What the causes of every rig share."""
