@@ -14,11 +14,9 @@ from mocobot_sim.trial.trajectories import random_vias, sphere_motion
 from mocobot_sim.trial.trial import run_trial
 
 
-def recorded(
-    payload: str, effects: Sequence[Effect] = (), *, seed: int, vias: int = 8, preset: str = "nominal"
-) -> list[Recording]:
+def recorded(payload: str, effects: Sequence[Effect] = (), *, seed: int, vias: int = 8) -> list[Recording]:
     """Two trials; equal arguments give equal bits."""
-    rng, sensors, home = np.random.default_rng(seed), sensor_preset(preset), build_team(payload)
+    rng, sensors, home = np.random.default_rng(seed), sensor_preset("nominal"), build_team(payload)
     motions = [
         random_vias(home.wrist_home_b, rng, vias=vias),
         sphere_motion(home.wrist_home_b, home.X_1i, duration_s=10.0, rng=rng),

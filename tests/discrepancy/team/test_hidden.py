@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import mocobot
 from diagnosed import check_schema
 from discrepancy.team.diagnosis import diagnose_team
 from estimator.errors import InputError
@@ -56,8 +57,8 @@ BIAS = make_effect("sea_bias", *HIDDEN["sea_bias"][1:])
 
 
 @cache
-def trials(payload: str, *effects: Effect, seed: int = 11, preset: str = "nominal") -> Sequence[Recording]:
-    return recorded(payload, effects, seed=seed, preset=preset)
+def trials(payload: str, *effects: Effect, seed: int = 11) -> Sequence[Recording]:
+    return recorded(payload, effects, seed=seed)
 
 
 def verdict(recordings: Sequence[Recording], **options: Any) -> dict[str, Any]:
@@ -158,7 +159,8 @@ def test_without_the_true_cause_its_family_or_something_unlisted_is_named_there(
 
 def test_a_fault_of_uncalibrated_robots_is_named_beside_what_all_are_off_by() -> None:
     rubs = make_effect("joint_friction", {"coulomb_Nm": 0.15, "viscous_Nms_per_rad": 0.05}, 2, 1)
-    values = verdict(trials("b", rubs, seed=13, preset="uncalibrated"))
+    kinds = {"vias": 8, "duration_s": 10.0, "preset": "uncalibrated", "seed": 3}
+    values = verdict(mocobot.simulate_trials("b", ["random", "periodic"], effects=[rubs], **kinds))
     (cause,) = values["causes"]
     assert (cause["cause"], cause["robot"], cause["joint"]) == ("joint_friction", 2, 1)
     coulomb = cause["parameters"]["coulomb_Nm"]

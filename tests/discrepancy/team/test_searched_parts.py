@@ -17,7 +17,6 @@ from discrepancy.team.linear.start import start_shared
 from discrepancy.team.linear.unsearched import trial_at, without_bases
 from discrepancy.team.long import choice as choices
 from discrepancy.team.long import left as lefts
-from discrepancy.team.long import parts
 from discrepancy.team.long.choice import Choice, searched_s
 from discrepancy.team.long.left import Left, more_left, times_as_much
 from discrepancy.team.rig import AsFound, TeamRig
@@ -90,7 +89,7 @@ def test_notes_of_recordings_with_one_name(recording, monkeypatch: pytest.Monkey
     notes = choice.beside(choice.others).notes
     assert len(notes) == 2
     assert all("in 5 parts" in note for note in notes)
-    monkeypatch.setattr(parts, "PART_S", 30.0)
+    monkeypatch.setattr(choices, "PART_S", 30.0)
     assert all("in 3 parts" in note for note in Choice.of([recording, recording], whole=True).notes)
 
 
