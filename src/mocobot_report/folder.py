@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.result.text import format_diagnosis
-
 from discrepancy.channel import Channel
+from discrepancy.result.lines import format_diagnosis
 from discrepancy.result.read import FORMAT as DIAGNOSIS
 from discrepancy.result.read import parse_diagnosis
 from discrepancy.result.report import format_verdict

@@ -10,10 +10,7 @@ from typing import Any
 
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.numbers import number, one_each, parameter, three_digits
-from discrepancy.result.pictures.plots_evidence import label
-from discrepancy.result.read import VERDICTS, is_of_joints
-from discrepancy.result.remains import remedy
-from discrepancy.result.text import (
+from discrepancy.result.lines import (
     NOTHING_WRONG_HERE,
     WIDTH,
     cause_lines,
@@ -21,6 +18,9 @@ from discrepancy.result.text import (
     probability_words,
     wrapped,
 )
+from discrepancy.result.pictures.plots_evidence import label
+from discrepancy.result.read import VERDICTS, is_of_joints
+from discrepancy.result.remains import remedy
 from discrepancy.result.text_gain import gain_lines
 from discrepancy.result.text_rollouts import rollout_lines
 

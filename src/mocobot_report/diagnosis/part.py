@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 from discrepancy.result.evidence_list import label
-from discrepancy.result.text import NEAREST, NOTHING_WRONG_HERE, SAID
 from scipy.spatial.transform import Rotation
 
 from discrepancy.numbers import one_each, parameter
+from discrepancy.result.lines import NEAREST, NOTHING_WRONG_HERE, SAID
 from discrepancy.result.read import (
     AS_FOUND,
     EXTENDED,
