@@ -368,12 +368,11 @@ class TeamProblem:
         if group.late:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
-        near = (
-            self.rig.refinements(candidate, finer=True)
-            + self.rig.further(candidate)
-            + self.rig.grown(candidate)
-        )
+        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
         out = self._stepped(candidate, group, posterior)
+        for more in self.rig.grown(candidate):  # the same columns, until its further number has moved
+            of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
+            out += self._stepped(more, of_more, posterior)
         if near:
             prior = posterior.prior.copy()
             base = self.prior((), None)
