@@ -115,10 +115,3 @@ def indices(candidate: Candidate) -> tuple[int, int]:
 def is_adjusted(candidate: Candidate) -> bool:
     """Whether it is a function of readings, taken without their noise."""
     return candidate.cause in CAUSES and CAUSES[candidate.cause].adjusted
-
-
-def is_kept(candidate: Candidate) -> bool:
-    """Whether it is in one of a few shapes that are tried again and again."""
-    cause = CAUSES.get(candidate.cause)
-    shapes = () if cause is None or cause.fleeting else cause.shapes
-    return len(shapes) > 1 and candidate.shape in shapes

@@ -474,7 +474,7 @@ class Catalogue:
     labels: list[tuple[Candidate, int] | None]
     tolerance: list[float]
     kinds: Mapping[str, list[int]]
-    X: Array
+    X: NDArray[np.float32]
     listed: Listed
     apart: Mapping[Hashable, Array]
     candidates: Mapping[Hashable, Candidate]
@@ -491,7 +491,7 @@ class Catalogue:
         groups: list[Group] = []
         labels: list[tuple[Candidate, int] | None] = []
         none = np.zeros((len(plain.cells.channels), len(plain.cells.order), 0), dtype=np.float32)
-        tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none.astype(float)]
+        tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none]
         others = [Listed([], none)]
         apart: dict[Hashable, Array] = {}
         for candidate in rig.candidates():
@@ -507,7 +507,7 @@ class Catalogue:
             groups.append(replace(g, slab=tuple(g.slab[k] for k in shown), least=least))
             labels += [(candidate, int(k)) for k in shown]
             tolerance += [candidate.parameters[k].tolerance for k in shown]
-            rows.append(X[..., shown])
+            rows.append(X[..., shown].astype(np.float32))
             if shapes:
                 if near:
                     apart[candidate.key] = near.apart[candidate.key]
@@ -515,7 +515,7 @@ class Catalogue:
                     others.append(plain.listing(shapes, count))
                     firsts = [span.start for span in others[-1].spans]
                     apart[candidate.key] = _apart(X[..., 0], others[-1].X[..., firsts].astype(float))
-                rows.append(apart[candidate.key])
+                rows.append(apart[candidate.key].astype(np.float32))
                 tolerance += [candidate.parameters[0].tolerance] * rows[-1].shape[2]
                 labels += [None] * rows[-1].shape[2]
             kinds.setdefault(candidate.cause, []).extend(range(first, len(labels)))

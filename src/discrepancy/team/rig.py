@@ -18,7 +18,6 @@ from discrepancy.team.candidates import (
     in_shapes,
     indices,
     is_adjusted,
-    is_kept,
     other_shapes,
     shape_steps,
 )
@@ -39,7 +38,6 @@ from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import HEALTHY, limits_of
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
-from discrepancy.team.linear.stored import stored
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.linear.unsearched import trial_at, without_bases
 from discrepancy.team.linear.whitening import Whitening, whitened
@@ -104,7 +102,7 @@ class TeamRig:
         resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
         jobs: parallel processes.
         laws: whether to look for what no table lists: where noise is loud (``auto``), ``always`` or ``never``.
-        kept: whitened columns that are asked for again and again.
+        kept: what causes leave open, which is asked for again and again.
     """
 
     recordings: tuple[Recording, ...]
@@ -196,12 +194,8 @@ class TeamRig:
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
             return np.broadcast_to(0.0, (*linear.residual.shape, len(candidate.parameters)))
-        if (key := (trial, *candidate.trace)) in self.kept:
-            return self.kept[key]
         columns = whitened(self.whitening[trial], self._unwhitened(trial, candidate))
         rested(linear)
-        if candidate.transient is None and is_kept(candidate):
-            self.kept[key] = stored(columns) if is_filed(linear) else columns
         return columns
 
     def _unwhitened(self, trial: int, candidate: Candidate) -> Array:

@@ -65,8 +65,7 @@ class Cause(ABC):
         determined: numbers of the shape that the data determine, with what ``slope_step`` makes steps of.
         clipped: the effect's parameters that are zero where the fit has them below.
         by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
-        fleeting: whether it has so many shapes that their columns are made anew whenever they are asked for.
-        adjusted: whether it is a function of the readings, which are taken without their noise then.
+            adjusted: whether it is a function of the readings, which are taken without their noise then.
     """
 
     name: ClassVar[str]
@@ -86,7 +85,6 @@ class Cause(ABC):
     determined: ClassVar[Mapping[str, float]] = {}
     clipped: ClassVar[tuple[str, ...]] = ()
     by_clocks: ClassVar[bool] = False
-    fleeting: ClassVar[bool] = False
     adjusted: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:

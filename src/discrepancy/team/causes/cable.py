@@ -184,7 +184,6 @@ class Tether(Cause):
     scales = (0.1, 0.1, 0.1, 1.0)
     at = "grasp"
     shapes = ({}, *first_ways())
-    fleeting = True
     determined: ClassVar[Mapping[str, float]] = SLOPE_STEPS
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
@@ -261,7 +260,6 @@ class PayloadTether(Cause):
         *(_at(sign * TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
         *(through(np.zeros(3), way) for way in first_ways()),
     )
-    fleeting = True
     determined: ClassVar[Mapping[str, float]] = {
         **dict.fromkeys(LEVERS, TETHER_STEP_M),
         **SLOPE_STEPS,
