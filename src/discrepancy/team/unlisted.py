@@ -142,13 +142,18 @@ class Laws:
         return np.concatenate([s[variable.name] for s in self._signals])
 
     def functions(self, law: Unlisted) -> Array:
-        """Functions of the signal that a law is made of: cosines of its rank, or those of a hum, shape (Q, terms)."""
+        """Functions of the signal that a law is made of, shape (Q, terms): itself and cosines of its rank, or a hum.
+
+        Cosines alone have no slope at their ends, and what a joint's angle is off by acts through its rate, too.
+        """
         x = self.signal(law.variable)
         if law.hz is not None:
             turned = 2.0 * np.pi * law.hz * x
             return np.stack([np.sin(turned), np.cos(turned)], axis=1)
         u = (rankdata(x) - 0.5) / len(x)
-        return np.cos(np.pi * np.outer(u, np.arange(law.first, law.terms + 1.0)))
+        out = np.cos(np.pi * np.outer(u, np.arange(law.first, law.terms + 1.0)))
+        out[:, 1 - law.first] = (x - x.mean()) / (math.sqrt(2.0) * np.std(x) + 1e-300)
+        return out
 
     def basis(self, law: Unlisted) -> list[Array]:
         """The law's terms, shape (Q, terms) a trial."""
