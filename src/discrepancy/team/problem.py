@@ -368,12 +368,11 @@ class TeamProblem:
         if group.late:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
-        near = (
-            self.rig.refinements(candidate, finer=True)
-            + self.rig.further(candidate)
-            + self.rig.grown(candidate)
-        )
+        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
         out = self._stepped(candidate, group, posterior)
+        for more in self.rig.grown(candidate):  # the same columns, until its further number has moved
+            of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
+            out += self._stepped(more, of_more, posterior)
         if near:
             prior = posterior.prior.copy()
             base = self.prior((), None)
@@ -413,9 +412,16 @@ class TeamProblem:
             return []
         prior = np.append(posterior.prior, np.zeros(self.cells.count - len(posterior.prior)))
         prior[index] = np.square(size)
-        moved = numbers + Posterior(self.cells, prior, posterior.variance).mean[index]
+        step = Posterior(self.cells, prior, posterior.variance).mean[index]
         self.cells.truncate(count)
-        names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
+        cause = CAUSES[candidate.cause]
+        names = [n for n in cause.determined if n in candidate.shape]
+        # A time, a mass or a frequency has no other sign: its logarithm takes the step, by its prior at most.
+        scale = np.array(
+            [not cause.slope_step(n, 0.0) and bool(x) for n, x in zip(names, numbers, strict=True)]
+        )
+        share = np.divide(step, numbers, out=np.zeros_like(step), where=scale).clip(-STEP_SHARE, STEP_SHARE)
+        moved = np.where(scale, numbers * np.exp(share), numbers + step)
         shape = dict(candidate.shape) | dict(zip(names, moved.tolist(), strict=True))
         try:
             return [self.group_of(candidate.in_shape(shape), group.log_prior)]

@@ -20,6 +20,7 @@ from discrepancy.result.told import Told, Values
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.gain import Gain, Response
+from discrepancy.team.held import words_of
 from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.signature import signature
@@ -49,6 +50,9 @@ class TeamTold(Told):
         kind = kind or ("something unlisted" if cause in ("", "unlisted") else cause.replace("_", " "))
         return {"cause": cause, "kind": kind, "name": f"{kind} at {place}", "family": cause, "robot": None,
                 "joint": joint, "place": place}  # fmt: skip
+
+    def finding(self, f: Finding) -> Values:
+        return super().finding(f) | words_of(f)
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         candidate = self.verdict.candidates.get((f.cause, f.place))
