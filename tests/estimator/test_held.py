@@ -98,7 +98,9 @@ def test_held_readings_are_interpolated_onto_the_encoders_steps():
     spoilt = holding(true) != true
     assert np.abs(off).max() < 0.05 * np.abs((holding(true) - true) / STEP).max()
     assert set(np.flatnonzero(off)) <= set(np.flatnonzero(doubt)) | set(np.flatnonzero(np.abs(off) < 1.5))
-    assert np.all(np.isin(np.flatnonzero(doubt > 1.0), np.flatnonzero(np.convolve(spoilt, np.ones(5), "same") > 0)))
+    assert np.all(
+        np.isin(np.flatnonzero(doubt > 1.0), np.flatnonzero(np.convolve(spoilt, np.ones(5), "same") > 0))
+    )
 
 
 def test_a_team_that_moves_is_as_it_was_read():
