@@ -13,8 +13,8 @@ KNOTS, TRIED = 8, 40
 """Knots of a curve that is told as such; values of a number inside a term that are tried."""
 STEP_S = 0.05
 """In which a step is told to rise."""
-SIGN_SHARE = 0.03
-"""Of the spread of a signal, up to which its sign fades: beside what the terms of a curve tell from a jump."""
+SIGN_SHARES = (0.03, 0.06, 0.12, 0.25, 0.5)
+"""Of the spread of a signal, up to which its sign fades; the first is what the terms of a curve tell from a jump."""
 Numbers = Sequence[float]
 
 
@@ -83,7 +83,7 @@ PLAIN = (
 )
 SIGNED = (
     Shape("sign", lambda x, n: np.clip(x / n[0], -1.0, 1.0)[:, None], "{a} sign({x})", 0, 1, ("slow",),
-          lambda x: [(SIGN_SHARE * float(np.std(x)),)]),
+          lambda x: [(share * float(np.std(x)),) for share in SIGN_SHARES]),
     replace(ABOVE, text="{a} max({x}, 0)", tried=lambda x: [(0.0,)], fitted=False),
     replace(BELOW, text="{a} min({x}, 0)", tried=lambda x: [(0.0,)], fitted=False),
     _plain("absolute", np.abs, "{a} |{x}|", 1),

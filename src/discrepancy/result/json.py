@@ -3,7 +3,7 @@
 format, version     "mocobot-diagnosis", 3; version 2 has no ``machine``, ``finished`` and ``members``
 machine             "team", or "joints" of one robot of hinges and slides. A verdict of ``discrepancy.evidence`` on it
                     (``discrepancy.result.told``) has ``told``, ``event``, ``at``, ``reference`` and a limit's ``place``
-                    besides. In it ``prior_odds``, ``share_left``, ``law``, ``foretold``, ``unlisted_nats``, ``nats`` of
+                    besides. In it ``prior_odds``, ``share_left``, ``foretold``, ``unlisted_nats``, ``nats`` of
                     ``scatter`` and ``chi2_per_n`` of alternatives are null
 finished            whether the search came to its end
 recordings          names of the trials
@@ -31,8 +31,10 @@ causes              list, in the order of discovery, of
                                    beside everything that is off within its tolerance
     law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
                                    formula, units of the parameters}: an error at ``targets`` that is a function of
-                                   signals, and ``traces`` of the error as it was located beside it
-                                   (``laws.said.trace``); else null
+                                   ``of``, times the signal ``times`` if there is one; ``function`` names its terms
+                                   (``formulas.terms``), ``spline`` where no formula says the curve. ``traces``: by
+                                   trial {time_s, signal, error, se, law}, the curve as it was found without a formula
+                                   and what the formula says, both about their mean, one row a target; else null
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
     alternatives                   list of {cause, kind, name, family, robot, joint, place, probability,

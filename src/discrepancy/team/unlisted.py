@@ -84,7 +84,7 @@ class Unlisted:
     @property
     def group(self) -> Group:
         """The law as a group of the engine, without columns."""
-        k = np.arange(self.first, self.terms + 1.0) if self.hz is None else np.zeros(2)
+        k = np.append(np.arange(self.first, self.terms + 1.0), 1.0) if self.hz is None else np.zeros(2)
         falling = 1.0 / (1.0 + k)
         sizes = SLAB * SIZES[self.place.name] * falling / np.sqrt(np.sum(falling**2))
         shape = [(self.variable.name, float(self.component))]
@@ -142,21 +142,25 @@ class Laws:
         return np.concatenate([s[variable.name] for s in self._signals])
 
     def functions(self, law: Unlisted) -> Array:
-        """Functions of the signal that a law is made of: cosines of its rank, or those of a hum, shape (Q, terms)."""
+        """Functions of the signal that a law is made of, shape (Q, k): cosines of its rank and itself, or a hum.
+
+        Cosines alone have no slope at their ends, and what a joint's angle is off by acts through its rate, too.
+        """
         x = self.signal(law.variable)
         if law.hz is not None:
             turned = 2.0 * np.pi * law.hz * x
             return np.stack([np.sin(turned), np.cos(turned)], axis=1)
         u = (rankdata(x) - 0.5) / len(x)
-        return np.cos(np.pi * np.outer(u, np.arange(law.first, law.terms + 1.0)))
+        waves = np.cos(np.pi * np.outer(u, np.arange(law.first, law.terms + 1.0)))
+        return np.column_stack([waves, (x - x.mean()) / (math.sqrt(2.0) * np.std(x) + 1e-300)])
 
     def basis(self, law: Unlisted) -> list[Array]:
-        """The law's terms, shape (Q, terms) a trial."""
+        """The law's terms, shape (Q, k) a trial."""
         f = self.functions(law)
         return self._split(f if law.times is None else f * self.signal(law.times)[:, None])
 
     def columns(self, law: Unlisted) -> list[Array]:
-        """What the terms of a law add to the residual, shape (n, C, terms) a trial."""
+        """What the terms of a law add to the residual, shape (n, C, k) a trial."""
         out = []
         for linear, errors in zip(self.linear, self.basis(law), strict=True):
             D = directions_at(linear, law.place)[:, law.component]  # (n, parts, C)

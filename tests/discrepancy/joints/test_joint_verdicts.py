@@ -230,6 +230,12 @@ def test_what_no_table_lists_is_located(model: SerialModel, log: JointLog) -> No
     (finding,) = (f for f in verdict.findings if f.cause == "unlisted")
     assert (finding.place, finding.of) == ("elbow", "position")
     assert finding.probability > 0.5
+    assert finding.law is not None
+    told = finding.law.to_dict()
+    assert (told["targets"], told["of"], told["unit"]) == (["torque_3"], "q_3", "N m")
+    assert set(told["units"]) == set(finding.members[0].values)
+    away = np.subtract(told["traces"][0]["error"][0], told["traces"][0]["law"][0])
+    assert np.std(away) < 0.1 * np.std(told["traces"][0]["error"][0]) + 0.02
     assert {f.place for f in verdict.findings} == {"elbow"}
     assert verdict.verdict != "explained"
 
