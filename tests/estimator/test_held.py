@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.filtering import differentiate, low_pass
-from estimator.held import doubtful, held_spans, without_held
+from estimator.held import angle_of, doubtful, held_spans, without_held
 from estimator.recording.model import Recording
 from recordings import small_recording
 
@@ -90,7 +90,7 @@ def test_what_a_moving_angle_does_is_not_held(x):
 def test_held_readings_are_interpolated_onto_the_encoders_steps():
     true = rounded(sways())
     recording, (held,), doubt = without_held(moving_team(holding(true)))
-    assert (held.robot, held.joint, held.angle) == (1, 1, "phi")
+    assert angle_of(held.column, 3) == (0, 1, 1)
     assert len(held.spans) == len(GAPS)
     assert held.nats > 100.0
     off = (recording.phi[:, 1, 1] - true) / STEP
