@@ -58,6 +58,8 @@ class TeamTold(Told):
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         candidate = self.verdict.candidates.get((f.cause, f.place))
+        if f.law is not None:
+            return f"{f.law.sentence(place[:1].upper() + place[1:])}."
         if candidate is None or not parameters:
             return f"Something that no table lists acts at {place}."
         numbers = {name: entry["value"] for name, entry in parameters.items()}
@@ -125,7 +127,7 @@ class TeamDiagnosed:
             InputError: something cannot be written.
         """
         values, found = self._values, {(f.cause, f.place) for f in self.verdict.findings}
-        chosen = [c for c in self.outcome.state.chosen if c.group.key in found and not c.group.late]
+        chosen = [c for c in self.outcome.state.chosen if c.group.key in found]
         models = [(EXTENDED, False)] if chosen else []
         if self.gain is not None and self.gain.is_better_as_found:
             models.append((AS_FOUND, True))

@@ -3,9 +3,9 @@
 from functools import cache
 from typing import Any
 
+from discrepancy.team.diagnosis import diagnose_team
 from hidden.generator import HiddenSet, Kind, generate
 from hidden.schedule import Schedule
-from hidden.verdict import verdict_on
 
 TIMESTEP_S = 1e-3
 QUICK = Schedule(randoms=1, vias=8, periodic_s=10.0, hold_s=None)
@@ -28,7 +28,7 @@ generated = cache(generate)
 def blind(
     request: HiddenSet, excluded: tuple[str, ...] = (), **options: Any
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The verdict, and the truth that is opened after it."""
+    """The verdict by the rows, as its JSON, and the truth that is opened after it."""
     recordings, sealed = generated(request)
-    verdict = verdict_on(recordings, excluded, "undecided", **options)
+    verdict = diagnose_team(recordings, excluded=excluded, closed_loop=False, **options).to_dict()
     return verdict, sealed.open(verdict)

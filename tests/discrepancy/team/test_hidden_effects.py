@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from discrepancy.rules import CLEAN_CHI2_PER_N
 
 import discrepancy.team.causes
 import mocobot_sim.effects
-from discrepancy.rules import CLEAN_CHI2_PER_N
 from discrepancy.team.causes import CAUSES
 from hidden.draw import ground_of
 from hidden.generator import generate
