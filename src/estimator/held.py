@@ -53,19 +53,23 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
         x: readings, shape (Q,).
         step: rounding step, greater than 0.
     """
-    edges = np.flatnonzero(np.diff(x)) + 1
+    edges = np.append(0, np.flatnonzero(np.diff(x)) + 1)
     first, stop = edges[:-1], edges[1:]
-    there = (stop - first >= LEAST) & (first >= PERIODS) & (stop + PERIODS <= len(x))
+    there = (stop - first >= LEAST) & (stop + 3 * PERIODS <= len(x))
     first, stop = first[there], stop[there]
-    sure = held = np.zeros(len(first), dtype=bool)
-    for p in range(1, PERIODS + 1):
+    stops, leaves = np.zeros((2, len(first)), dtype=bool)
+    for p in range(PERIODS, 0, -1):
         most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
-        into, out = np.abs(x[first] - x[first - p]), np.abs(x[stop - 1 + p] - x[stop - 1])
-        held = held | (np.maximum(into, out) > most)
-        if p == 1:
-            sure = (into > most) & (out > most + np.abs(x[stop + 1] - x[stop]))
-    if not sure.any():
+        into, out = np.abs(x[first] - x[np.maximum(first - p, 0)]), np.abs(x[stop - 1 + p] - x[stop - 1])
+        stops, leaves = stops | (into > most), leaves | (out > most)
+    after = np.abs(x[stop + 1] - x[stop])
+    if not np.any((into > most) & (out > most + after)):
         return []
+    # From rest with one acceleration, a joint takes twice as long as at the speed at which it is seen again.
+    moved = np.abs(x[stop - 1 + PERIODS] - x[stop - 1])
+    speed = np.abs(x[stop - 1 + 3 * PERIODS] - x[stop - 1 + PERIODS]) / (2.0 * PERIODS)
+    late = stop - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
+    first, held = np.where(stops, first, np.maximum(first, late)), stops | leaves
     # One more at either end: what is taken between two readings has a share of both.
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 

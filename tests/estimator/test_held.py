@@ -55,6 +55,14 @@ def test_one_more_reading_on_the_way_out_hides_no_gap():
     assert (first, stop) in held_spans(x, STEP)
 
 
+def test_a_joint_that_rested_before_is_held_no_longer_than_it_moves():
+    still = np.maximum(TIME - 10.05, 0.0)
+    x = holding(rounded(np.where(TIME < 14.0, 0.4 + 0.5 * still**2, sways())), ((1000, 1015), *GAPS[3:]))
+    (start, stop), *_ = held_spans(x, STEP)
+    assert stop == 1016
+    assert 1000 <= start <= 1006
+
+
 def sticks() -> np.ndarray:
     """It comes to rest under friction, stays, breaks away faster and faster, and so on."""
     speed = np.maximum(np.abs(np.sin(1.3 * TIME)) - 0.4, 0.0) * np.sign(np.sin(1.3 * TIME))
@@ -98,7 +106,9 @@ def test_held_readings_are_interpolated_onto_the_encoders_steps():
     spoilt = holding(true) != true
     assert np.abs(off).max() < 0.05 * np.abs((holding(true) - true) / STEP).max()
     assert set(np.flatnonzero(off)) <= set(np.flatnonzero(doubt)) | set(np.flatnonzero(np.abs(off) < 1.5))
-    assert np.all(np.isin(np.flatnonzero(doubt > 1.0), np.flatnonzero(np.convolve(spoilt, np.ones(5), "same") > 0)))
+    assert np.all(
+        np.isin(np.flatnonzero(doubt > 1.0), np.flatnonzero(np.convolve(spoilt, np.ones(5), "same") > 0))
+    )
 
 
 def test_a_team_that_moves_is_as_it_was_read():
