@@ -45,9 +45,9 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
 
     An angle that stays within one step for m periods and has one acceleration all the time has a speed of 4 / m steps
     per period at most, so that it changes by (1 + 2 p / m)^2 steps in p periods before or after. A value that is held
-    is entered at speed, by more than that, and left by all that the angle moved meanwhile: by more than that, and by as
-    much more than in the period after. In an encoder that does so once, any value is held that is entered or left by
-    more.
+    is entered at a speed that, with its acceleration, would go on by more; and is left by all that the angle moved
+    meanwhile: by more than that, and by as much more than in the period after. In an encoder that does so once, any
+    value is held that is entered so, or left by more than the angle would come from with its acceleration.
 
     Args:
         x: readings, shape (Q,).
@@ -60,16 +60,20 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     stops, leaves = np.zeros((2, len(first)), dtype=bool)
     for p in range(PERIODS, 0, -1):
         most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
-        into, out = np.abs(x[first] - x[np.maximum(first - p, 0)]), np.abs(x[stop - 1 + p] - x[stop - 1])
-        stops, leaves = stops | (into > most), leaves | (out > most)
-    after = np.abs(x[stop + 1] - x[stop])
-    if not np.any((into > most) & (out > most + after)):
+        before, back = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0)
+        into, earlier = np.abs(x[first] - x[before]), np.abs(x[before] - x[back])
+        out, after = np.abs(x[stop - 1 + p] - x[stop - 1]), np.abs(x[stop - 1 + 2 * p] - x[stop - 1 + p])
+        enters = (2.0 * into - earlier > most) & (earlier > most)
+        stops, leaves = stops | enters, leaves | (2.0 * out - after > most)
+    if not np.any(enters & (out > most + after)):
         return []
-    # From rest with one acceleration, a joint takes twice as long as at the speed at which it is seen again.
+    # Where it stood before, too: from rest with one acceleration, it takes twice as long as at the speed at the end,
+    # which is seen some periods later only.
+    stood = np.abs(x[first] - x[np.maximum(2 * first - stop, 0)]) < 2.5 * step
     moved = np.abs(x[stop - 1 + PERIODS] - x[stop - 1])
     speed = np.abs(x[stop - 1 + 3 * PERIODS] - x[stop - 1 + PERIODS]) / (2.0 * PERIODS)
-    late = stop - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
-    first, held = np.where(stops, first, np.maximum(first, late)), stops | leaves
+    late = stop - 2 * PERIODS - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
+    first, held = np.where(stood & ~stops, np.maximum(first, late), first), stops | leaves
     # One more at either end: what is taken between two readings has a share of both.
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
