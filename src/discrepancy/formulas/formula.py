@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -35,7 +35,7 @@ MISSING = 0.2
 BEGUN, SAMPLES = 12, 1000
 """Likeliest terms that a second joins; samples at which formulas are compared."""
 Kind = Literal["angle", "way", "time", "other"]
-Piece = dict[str, float | str]
+Piece = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

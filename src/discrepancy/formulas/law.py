@@ -108,7 +108,10 @@ class Law:
             abs(x) for name, (x, _) in self.formula.parameters.items() if name.startswith(("ampl", "offset"))
         ]
         power = max((shape.power for shape, _ in self.formula.terms), default=0)
-        alone = self.unit in SMALL and self.unit not in (power and self.of.unit, self.times and self.times.unit)
+        alone = self.unit in SMALL and self.unit not in (
+            power and self.of.unit,
+            self.times and self.times.unit,
+        )
         return fitting(self.unit, max(sizes)) if alone else (self.unit, 1.0)
 
     def _unit_of(self, name: str) -> str:

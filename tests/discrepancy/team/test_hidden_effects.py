@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from discrepancy.rules import CLEAN_CHI2_PER_N
+from hidden.score import score
 
 import discrepancy.team.causes
 import mocobot_sim.effects
@@ -13,7 +14,6 @@ from discrepancy.team.causes import CAUSES
 from hidden.draw import ground_of
 from hidden.generator import generate
 from hidden.limits import LIMITS, pendulum_limit_kg
-from hidden.score import score
 from hidden.sealed import Sealed
 from hidden_quick import blind, generated, quick_set, tiny_set
 from mocobot.campaign.draw import draw_effect
