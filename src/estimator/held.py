@@ -45,9 +45,9 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
 
     An angle that stays within one step for m periods and has one acceleration all the time has a speed of 4 / m steps
     per period at most, so that it changes by (1 + 2 p / m)^2 steps in p periods before or after. A value that is held
-    is entered at a speed that, with its acceleration, would go on by more; and is left by all that the angle moved
-    meanwhile: by more than that, and by as much more than in the period after. In an encoder that does so once, any
-    value is held that is entered so, or left by more than the angle would come from with its acceleration.
+    is entered at speed, by more than that, and left by all that the angle moved meanwhile: by more than that, and by as
+    much more than in the period after. In an encoder that does so once, any value is held that is entered or left by
+    more than that beyond what the change before or after makes of the acceleration.
 
     Args:
         x: readings, shape (Q,).
@@ -63,9 +63,10 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
         before, back = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0)
         into, earlier = np.abs(x[first] - x[before]), np.abs(x[before] - x[back])
         out, after = np.abs(x[stop - 1 + p] - x[stop - 1]), np.abs(x[stop - 1 + 2 * p] - x[stop - 1 + p])
-        enters = (2.0 * into - earlier > most) & (earlier > most)
-        stops, leaves = stops | enters, leaves | (2.0 * out - after > most)
-    if not np.any(enters & (out > most + after)):
+        # Twice a change less another: two more roundings.
+        enters = (2.0 * into - earlier > most + 2.0 * step) & (earlier > most)
+        stops, leaves = stops | enters, leaves | (2.0 * out - after > most + 2.0 * step)
+    if not np.any((into > most) & (out > most + after)):
         return []
     # Where it stood before, too: from rest with one acceleration, it takes twice as long as at the speed at the end,
     # which is seen some periods later only.
