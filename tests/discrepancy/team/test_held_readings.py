@@ -39,7 +39,7 @@ def test_the_encoder_is_told_and_nothing_besides(found):
     assert (cause["cause"], cause["robot"], cause["joint"]) == ("unlisted", ROBOT, JOINT)
     assert values["verdict"] == "explained"
     assert [place["joint"] for place in values["places"]] == [JOINT]
-    assert cause["shape"]["share"] == pytest.approx(HELD / EVERY, rel=0.25)
+    assert 0.5 * HELD / EVERY < cause["shape"]["share"] < 1.2 * HELD / EVERY  # at rest none shows
     assert "held readings at driven joint 1 of robot 2" in str(found)
 
 
