@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -22,24 +21,21 @@ MOST = 0.5
 """Share of an angle's readings that repeat others, beyond which its encoder is no worse than slow. Chosen."""
 DIES_CYCLES = 4.0
 """Periods of its cut-off after which the low-pass filter's response is below 1e-4 of its peak. Derived."""
-FINEST_RAD = 2e-6
-"""Step of an angle that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
+FINEST = 2e-6
+"""Step [rad or m] of a reading that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """An angle whose encoder held its value.
+    """A reading that was held.
 
     Attributes:
-        robot, joint: from 0.
-        angle: ``phi`` or ``theta``.
+        column: which.
         spans: readings that are none, first and last but one more.
-        nats: by how much a value that is held is likelier than readings of a moving angle that happen to be equal.
+        nats: by how much a value that is held is likelier than readings of a moving joint that happen to be equal.
     """
 
-    robot: int
-    joint: int
-    angle: str
+    column: int
     spans: tuple[tuple[int, int], ...]
     nats: float
 
@@ -51,58 +47,89 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     per period at most, so that it changes by (1 + 2 p / m)^2 steps in p periods before or after. A value that is held
     is entered at speed, by more than that, and left by all that the angle moved meanwhile: by more than that, and by as
     much more than in the period after. In an encoder that does so once, any value is held that is entered or left by
-    more.
+    more than that beyond what the change before or after makes of the acceleration.
 
     Args:
         x: readings, shape (Q,).
         step: rounding step, greater than 0.
     """
-    edges = np.flatnonzero(np.diff(x)) + 1
+    edges = np.append(0, np.flatnonzero(np.diff(x)) + 1)
     first, stop = edges[:-1], edges[1:]
-    there = (stop - first >= LEAST) & (first >= PERIODS) & (stop + PERIODS <= len(x))
+    there = (stop - first >= LEAST) & (stop + 3 * PERIODS <= len(x))
     first, stop = first[there], stop[there]
-    sure = held = np.zeros(len(first), dtype=bool)
-    for p in range(1, PERIODS + 1):
+    stops, leaves = np.zeros((2, len(first)), dtype=bool)
+    for p in range(PERIODS, 0, -1):
         most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
-        into, out = np.abs(x[first] - x[first - p]), np.abs(x[stop - 1 + p] - x[stop - 1])
-        held = held | (np.maximum(into, out) > most)
-        if p == 1:
-            sure = (into > most) & (out > most + np.abs(x[stop + 1] - x[stop]))
-    if not sure.any():
+        before, back = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0)
+        into, earlier = np.abs(x[first] - x[before]), np.abs(x[before] - x[back])
+        out, after = np.abs(x[stop - 1 + p] - x[stop - 1]), np.abs(x[stop - 1 + 2 * p] - x[stop - 1 + p])
+        # Twice a change less another: two more roundings.
+        enters = (2.0 * into - earlier > most + 2.0 * step) & (earlier > most)
+        stops, leaves = stops | enters, leaves | (2.0 * out - after > most + 2.0 * step)
+    if not np.any((into > most) & (out > most + after)):
         return []
+    # Where it stood before, too: from rest with one acceleration, it takes twice as long as at the speed at the end,
+    # which is seen some periods later only.
+    stood = np.abs(x[first] - x[np.maximum(2 * first - stop, 0)]) < 2.5 * step
+    moved = np.abs(x[stop - 1 + PERIODS] - x[stop - 1])
+    speed = np.abs(x[stop - 1 + 3 * PERIODS] - x[stop - 1 + PERIODS]) / (2.0 * PERIODS)
+    late = stop - 2 * PERIODS - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
+    first, held = np.where(stood & ~stops, np.maximum(first, late), first), stops | leaves
     # One more at either end: what is taken between two readings has a share of both.
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
 
-def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Array]:
-    """A recording whose held readings are interpolated, which these are, and how wrong the interpolation may be.
+def filled(x: Array, steps: Sequence[float]) -> tuple[Array, tuple[Held, ...], Array]:
+    """Readings with held ones interpolated, which these are, and how wrong the interpolation may be.
 
-    The last is the difference between two orders of interpolation over the step of the reading's noise as it is
-    rounded, the largest of the angles at each instant, shape (Q,).
+    The last is the difference between two orders of interpolation over the standard deviation of the reading's
+    rounding, the largest of the columns at each instant, shape (Q,).
+
+    Args:
+        x: readings of C joints, shape (Q, C).
+        steps: rounding step of each, 0 for none.
     """
-    found, doubt = [], np.zeros(len(recording.time))
-    angles = {"phi": recording.phi, "theta": recording.theta}
-    for angle, x in angles.items():
-        for robot, joint in np.ndindex(x.shape[1:]):
-            own = x[:, robot, joint]
-            step = rounding_step(own) or FINEST_RAD
-            spans = held_spans(own, step)
-            there = mask_of(spans, len(own))
-            if not spans or there.mean() > MOST:
-                continue
-            found.append(Held(robot, joint, angle, tuple(spans), _nats(own, step, spans)))
-            cubic, quintic = (_interpolated(own, there, order) for order in (3, 5))
-            doubt = np.maximum(doubt, np.abs(cubic - quintic) / (step / np.sqrt(12.0)))
-            angles[angle] = x = x.copy()
-            x[:, robot, joint] = own + step * np.round((quintic - own) / step)
-    return replace(recording, **angles), tuple(found), doubt
+    found, doubt, out = [], np.zeros(len(x)), x
+    for column, (own, size) in enumerate(zip(x.T, steps, strict=True)):
+        step = size or FINEST
+        spans = held_spans(own, step)
+        there = np.zeros(len(own), dtype=bool)
+        for start, stop in spans:
+            there[start:stop] = True
+        if not spans or there.mean() > MOST:
+            continue
+        # Of readings that may have had any value on the joint's way.
+        nats = sum((b - a) * np.log1p(abs(own[b] - own[a]) / step) for a, b in spans)
+        found.append(Held(column, tuple(spans), float(nats)))
+        cubic, quintic = (_interpolated(own, there, order) for order in (3, 5))
+        doubt = np.maximum(doubt, np.abs(cubic - quintic) / (step / np.sqrt(12.0)))
+        out = x.copy() if out is x else out
+        out[:, column] = own + step * np.round((quintic - own) / step)
+    return out, tuple(found), doubt
+
+
+def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Array]:
+    """The same of a recording, whose columns are its driven angles, then those of its gimbals (``angle_of``)."""
+    angles = np.stack([recording.phi, recording.theta], axis=1)
+    x = angles.reshape(len(angles), -1)
+    x, held, doubt = filled(x, [rounding_step(own) for own in x.T])
+    if not held:
+        return recording, held, doubt
+    phi, theta = np.moveaxis(x.reshape(angles.shape), 1, 0)
+    return replace(recording, phi=phi, theta=theta), held, doubt
+
+
+def angle_of(column: int, robots: int) -> tuple[int, int, int]:
+    """Whether it is a gimbal's, and its robot and joint, all from 0, of a column of a recording of N robots."""
+    kind, robot, joint = np.unravel_index(column, (2, robots, 3))
+    return int(kind), int(robot), int(joint)
 
 
 def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_]:
     """Samples of filtered angles, rates and accelerations that held readings may change by more than noise, shape (Q,).
 
     Args:
-        doubt: of ``without_held``.
+        doubt: of ``filled``.
         rate_hz: of the samples.
         cutoff_hz: of the low-pass filter (``filtering.low_pass``).
     """
@@ -119,21 +146,11 @@ def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_
     return out
 
 
-def mask_of(spans: Sequence[tuple[int, int]], samples: int) -> NDArray[np.bool_]:
-    """Which of all samples are in spans, shape (samples,)."""
-    out = np.zeros(samples, dtype=bool)
-    for start, stop in spans:
-        out[start:stop] = True
-    return out
-
-
-def _nats(x: Array, step: float, spans: Sequence[tuple[int, int]]) -> float:
-    """Of readings that may have had any value on the angle's way."""
-    return float(sum((b - a) * np.log1p(abs(x[b] - x[a]) / step) for a, b in spans))
-
-
 def _interpolated(x: Array, missing: NDArray[np.bool_], order: int) -> Array:
-    at = np.arange(len(x), dtype=float)
-    out = x.copy()
+    from scipy.interpolate import (
+        make_interp_spline,  # takes a while to load, and few encoders hold their values
+    )
+
+    at, out = np.arange(len(x), dtype=float), x.copy()
     out[missing] = make_interp_spline(at[~missing], x[~missing], order)(at[missing])
     return out

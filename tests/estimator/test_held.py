@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.filtering import differentiate, low_pass
-from estimator.held import doubtful, held_spans, without_held
+from estimator.held import angle_of, doubtful, held_spans, without_held
 from estimator.recording.model import Recording
 from recordings import small_recording
 
@@ -47,12 +47,20 @@ def test_every_gap_is_found_with_a_reading_more_at_either_end():
     assert held_spans(holding(rounded(sways())), STEP) == [(first, stop + 1) for first, stop in GAPS]
 
 
-def test_one_more_reading_on_the_way_out_hides_no_gap():
+def test_one_more_reading_on_the_way_in_and_out_hides_no_gap():
     """What is resampled has a reading between the held value and the next."""
     x = holding(rounded(sways()))
     first, stop = GAPS[1]
-    x[stop - 1] += STEP
-    assert (first, stop) in held_spans(x, STEP)
+    x[[first, stop - 1]] += STEP
+    assert (first + 1, stop) in held_spans(x, STEP)
+
+
+def test_a_joint_that_rested_before_is_held_no_longer_than_it_moves():
+    still = np.maximum(TIME - 10.05, 0.0)
+    x = holding(rounded(np.where(TIME < 14.0, 0.4 + 0.5 * still**2, sways())), ((1000, 1015), *GAPS[3:]))
+    (start, stop), *_ = held_spans(x, STEP)
+    assert stop == 1016
+    assert 1000 <= start <= 1003
 
 
 def sticks() -> np.ndarray:
@@ -90,7 +98,7 @@ def test_what_a_moving_angle_does_is_not_held(x):
 def test_held_readings_are_interpolated_onto_the_encoders_steps():
     true = rounded(sways())
     recording, (held,), doubt = without_held(moving_team(holding(true)))
-    assert (held.robot, held.joint, held.angle) == (1, 1, "phi")
+    assert angle_of(held.column, 3) == (0, 1, 1)
     assert len(held.spans) == len(GAPS)
     assert held.nats > 100.0
     off = (recording.phi[:, 1, 1] - true) / STEP

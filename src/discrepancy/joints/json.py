@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from discrepancy.evidence.findings import Finding
+from discrepancy.evidence.held import words_of
 from discrepancy.joints.causes import LINKS, WORDS
 from discrepancy.joints.findings import Foretold, JointVerdict
 from discrepancy.joints.model import SerialModel
@@ -57,6 +58,9 @@ class JointTold(Told):
         if joint is None and place in self.model.joints:
             joint = self.model.joints.index(place) + 1
         return place if joint is None else joint_in_words(joint, self.model.joints[joint - 1])
+
+    def finding(self, f: Finding) -> Values:
+        return super().finding(f) | words_of(f, self.where(f.cause, f.place, f.joint))
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         """What a finding does, with its numbers; for a kind with their medians."""

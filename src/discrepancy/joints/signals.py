@@ -13,6 +13,7 @@ from discrepancy.joints.mechanics.motion import Motion
 from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+from estimator.held import Held, doubtful, filled
 from mocobot_logs.joints.joint_log import JointLog
 
 SMOOTH_HZ = 60.0
@@ -50,6 +51,8 @@ class Signals:
         typical: speed of every joint while it moves, over all logs (root mean square), shape (J,).
         cutoff_hz: of the rows.
         enabled: whether the drives are on, shape (W,); None where the log does not say.
+        held: positions of the log whose encoder holds its last value.
+        spoilt: samples that these change by more than noise, shape (W,); None: none does.
     """
 
     log: JointLog
@@ -65,6 +68,8 @@ class Signals:
     typical: Array
     cutoff_hz: float
     enabled: NDArray[np.bool_] | None = None
+    held: tuple[Held, ...] = ()
+    spoilt: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, log: JointLog, tree: Tree, inverse_torque: Callable[[Array, Array, Array], Array]) -> Signals:
@@ -77,7 +82,9 @@ class Signals:
         """
         rate = log.rate_hz
         step = work_step(rate)
-        q = low_pass(log.q, rate, smoothing_hz(rate))
+        q, held, doubt = filled(log.q, log.position_step)
+        spoilt = doubtful(doubt, rate, cutoff_hz(rate))[::step] if held else None
+        q = low_pass(q, rate, smoothing_hz(rate))
         dq = differentiate(q, rate)
         ddq = differentiate(dq, rate)
         torque, known = _filled(log)
@@ -88,7 +95,7 @@ class Signals:
         typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), LEAST_SPEED)
         return cls(
             log, tree, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical, cutoff_hz(rate),
-            None if log.enabled is None else log.enabled[here],
+            None if log.enabled is None else log.enabled[here], held, spoilt,
         )  # fmt: skip
 
     @cached_property

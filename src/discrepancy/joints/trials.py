@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from discrepancy.evidence.findings import Event
+from discrepancy.evidence.held import HeldReadings
 from discrepancy.joints.mechanics.nominal import inverse_torque
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel
@@ -112,26 +114,50 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
 def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array, ...], Array]:
     """Weights of samples that fade to zero where a joint is at a limit, whose force nobody knows, and the time there.
 
-    A joint that spends most of its time beyond its limits has others than the model.
+    A joint that spends most of its time beyond its limits has others than the model. Where an encoder holds its value,
+    the torques of all joints fade.
     """
     slack = model.model.jnt_margin + np.where(model.slides, LIMIT_M, LIMIT_RAD)
     at = [(s.q < model.lower + slack) | (s.q > model.upper - slack) for s in runs]
     time = np.sum([x.sum(axis=0) / s.rate_hz for x, s in zip(at, runs, strict=True)], axis=0)
     time[time > 0.5 * sum(len(s.time) / s.rate_hz for s in runs)] = 0.0
-    if not time.any():
+    spoilt = [np.zeros(len(s.time), dtype=bool) if s.spoilt is None else s.spoilt for s in runs]
+    if not (time.any() or any(x.any() for x in spoilt)):
         return (), time
     kept = []
-    for x, s in zip(at, runs, strict=True):
+    for x, bad, s in zip(at, spoilt, runs, strict=True):
         n = round(LIMIT_S * s.rate_hz)
-        wide = maximum_filter1d((x & (time > 0)).astype(float), 4 * n + 1, axis=0)
+        wide = maximum_filter1d((x & (time > 0) | bad[:, None]).astype(float), 4 * n + 1, axis=0)
         kept.append(1.0 - uniform_filter1d(wide, 2 * n + 1, axis=0))
     return tuple(kept), time
+
+
+def held_in(model: SerialModel, trials: Trials) -> list[HeldReadings]:
+    """Encoders that hold their last value for a while in any of the trials."""
+    events: dict[int, list[Event]] = {}
+    nats: dict[int, float] = {}
+    for trial, s in enumerate(trials.signals):
+        for held in s.held:
+            log = s.log
+            times = [Event(trial, float(log.time[a]), (b - a) / log.rate_hz) for a, b in held.spans]
+            times = [event for event in times if s.time[0] <= event.start_s <= s.time[-1]]
+            events.setdefault(held.column, []).extend(times)
+            nats[held.column] = nats.get(held.column, 0.0) + held.nats * len(times) / len(held.spans)
+    total_s = sum(len(s.time) / s.rate_hz for s in trials.signals)
+    return [
+        HeldReadings(
+            model.joints[j], j + 1, model.joints[j], own, sum(e.duration_s for e in own) / total_s, nats[j]
+        )
+        for j, own in sorted(events.items())
+        if own
+    ]
 
 
 def part_of(s: Signals, at: slice) -> Signals:
     """Some samples of a log."""
     own = {name: getattr(s, name)[at] for name in ("time", "q", "dq", "ddq", "torque", "usable", "inverse")}
-    return replace(s, enabled=None if s.enabled is None else s.enabled[at], **own)
+    more = {name: x if (x := getattr(s, name)) is None else x[at] for name in ("enabled", "spoilt")}
+    return replace(s, **own, **more)
 
 
 def _runs(s: Signals, joints: NDArray[np.intp]) -> list[slice]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from discrepancy.cause_names import excluded_from
 from discrepancy.evidence.findings import Event, Finding, Member
+from discrepancy.evidence.held import with_held
 from discrepancy.evidence.judge import Judge
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.parts import Values
@@ -30,7 +31,7 @@ from discrepancy.joints.parts import parts_of
 from discrepancy.joints.problem import JointProblem
 from discrepancy.joints.servo.loop import loop_laws, sentences
 from discrepancy.joints.servo.motor import driven_by_voltage
-from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
+from discrepancy.joints.trials import Trials, at_limits, held_in, notes_of, resting, trials_of
 from discrepancy.joints.unlisted import SIGNALS, law_of
 from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
@@ -104,7 +105,7 @@ class _JointJudge(Judge):
         """All that is told."""
         logs = [s.log for s in self.trials.runs]
         more = (*at_limits(self.model, self.trials.limited), *resting(logs), *self._notes())
-        return JointVerdict(
+        verdict = JointVerdict(
             **self.told(),
             trials=self.trials.names,
             reference=self.trials.names[self._changed :],
@@ -117,6 +118,7 @@ class _JointJudge(Judge):
             foretold=tuple(self._foretold([o.chosen for o in self.named])),
             by_the_others=self.by_the_others,
         )
+        return with_held(verdict, held_in(self.model, self.trials))
 
     @property
     def _changed(self) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
+from discrepancy.evidence.held import with_held
 from discrepancy.evidence.judge import is_named
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.settings import ODDS, SETTINGS
@@ -15,7 +16,7 @@ from discrepancy.evidence.until import Until
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.estimates import errors, seen_by
-from discrepancy.team.held import with_held
+from discrepancy.team.held import held_in
 from discrepancy.team.linear.chatter import chattering
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
@@ -108,7 +109,7 @@ def diagnose_team(
     if units is not None and in_encoder_frames(units):
         loops = (*loops, f"The payload's centre of mass and grasps are in {ENCODERS}.")
     verdict = judged_team(outcome, weighed, (*notes, *choice.notes, *loops), contradicted=contradicted)
-    return TeamDiagnosed(with_held(verdict, choice.searched), outcome, gain, why_not)
+    return TeamDiagnosed(with_held(verdict, held_in(choice.searched)), outcome, gain, why_not)
 
 
 def against_truth(found: TeamDiagnosed, truth: Mapping[str, Any]) -> TeamDiagnosed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ import numpy as np
 
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Finding
+from discrepancy.evidence.held import words_of
 from discrepancy.result.folder import REPORT, draw
 from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
 from discrepancy.result.remains import of_response
@@ -20,7 +22,6 @@ from discrepancy.result.told import Told, Values
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.gain import Gain, Response
-from discrepancy.team.held import words_of
 from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.signature import signature
@@ -52,7 +53,8 @@ class TeamTold(Told):
                 "joint": joint, "place": place}  # fmt: skip
 
     def finding(self, f: Finding) -> Values:
-        return super().finding(f) | words_of(f)
+        words, robot = words_of(f, f.place), re.search(r"of robot (\d+)$", f.place)
+        return super().finding(f) | words | ({"robot": int(robot[1])} if words and robot else {})
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         candidate = self.verdict.candidates.get((f.cause, f.place))

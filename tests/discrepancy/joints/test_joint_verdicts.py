@@ -282,3 +282,21 @@ def test_standard_errors_are_those_of_many_draws(model: SerialModel) -> None:
         assert set(found) == set(true)
         errors += [(found[name][0] - true[name]) / found[name][1] for name in true]
     assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.4
+
+
+# --- encoders that hold their last value
+
+
+def test_an_encoder_that_holds_its_value_is_told_and_nothing_besides(
+    model: SerialModel, log: JointLog
+) -> None:
+    q, length = log.q.copy(), round(0.13 * RATE_HZ)
+    for start in range(round(1.1 * RATE_HZ), len(q) - length, round(1.7 * RATE_HZ)):
+        q[start : start + length, 1] = q[start, 1]
+    verdict = judged(model, [replace(log, q=q)])
+    (found,) = verdict.findings
+    assert (found.cause, found.joint, verdict.verdict) == ("unlisted", 2, "explained")
+    assert found.event is not None
+    assert found.event.duration_s == pytest.approx(0.13, abs=0.04)
+    assert found.shape["share"] == pytest.approx(0.13 / 1.7, rel=0.3)
+    assert any("holds its last value" in note for note in verdict.notes)
