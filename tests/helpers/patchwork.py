@@ -14,3 +14,13 @@ def patchwork(rng, rows, channels, spans, firsts):
         whole.append(x)
         parts.append(Patches.of(x))
     return np.concatenate(whole, axis=2), Patches((rows, channels)).beside(parts)
+
+
+def dense(patches):
+    """The same columns as one array, shape (n, C, k)."""
+    out, at = np.zeros((*patches.shape, patches.width)), 0
+    for patch in patches.each:
+        stop = at + patch.values.shape[2]
+        out[patch.rows, patch.first :, at:stop] = patch.values
+        at = stop
+    return out

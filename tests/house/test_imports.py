@@ -43,6 +43,25 @@ def test_no_package_imports_a_later_one(package: str) -> None:
         assert roots(imported_modules(path)) & set(LOWER) <= LOWER[package] | {package}, module
 
 
+@pytest.mark.parametrize(
+    ("package", "never"),
+    [
+        ("evidence", ("team", "joints")),
+        ("result", ("team", "joints")),
+        ("team", ("joints",)),
+        ("joints", ("team",)),
+    ],
+)
+def test_search_and_reports_know_no_machine_and_machines_not_each_other(
+    package: str, never: tuple[str, ...]
+) -> None:
+    files = module_files(f"discrepancy.{package}")
+    assert files
+    for module, path in files.items():
+        taken = {name for name in imported_modules(path) if name.startswith("discrepancy.")}
+        assert not {name.split(".")[1] for name in taken} & set(never), module
+
+
 def test_no_module_imports_itself_through_others() -> None:
     """Imports for type checkers count: who has to know whom is the same question."""
     graph = project_imports()
@@ -67,7 +86,7 @@ UNWANTED = {
     "estimator": SIMULATOR | {"numba", "mocobot_logs"},
     "mocobot_logs": SIMULATOR | {"numba", "discrepancy", "mocobot"},
     "mocobot_inspect": SIMULATOR | {"numba", "discrepancy", "mocobot"},
-    "discrepancy.engine": SIMULATOR,
+    "discrepancy.evidence": SIMULATOR,
 }
 """What must not come along with a package, nor with those before it."""
 

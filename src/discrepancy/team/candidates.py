@@ -40,9 +40,9 @@ def every_candidate(
 
 def other_shapes(candidate: Candidate, trials: int, *, finer: bool = False) -> list[Candidate]:
     """The candidate in every other shape of the catalogue, or in finer ones around its own, in so many trials."""
-    if candidate.transient:
-        return []
     cause = CAUSES[candidate.cause]
+    if candidate.transient:
+        return [candidate.in_shape(shape) for shape in cause.finer(candidate.shape)] if finer else []
     return in_shapes(candidate, cause.finer(candidate.shape) if finer else cause.shapes, trials)
 
 

@@ -13,7 +13,6 @@ import pytest
 
 from command import refused, run
 from diagnosed import check_finite, small_diagnosis
-from discrepancy import cause_names
 from discrepancy.evidence.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS

@@ -5,102 +5,90 @@ from __future__ import annotations
 import math
 import string
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from diagnosed import small_diagnosis
+from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
+from discrepancy.channel import Channel
 from discrepancy.numbers import number
-from discrepancy.team.linear.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure
-from discrepancy.result.lines import WIDTH, format_diagnosis, probability_words
+from discrepancy.result.remains import of_response
+from discrepancy.result.report import format_verdict
 from discrepancy.result.text_gain import ERRORS, response_units
 from discrepancy.result.traces import Trace, group_units, groups
-from discrepancy.channel import Channel
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors
-from discrepancy.team.traces import unwhitened
+from discrepancy.team.linear.whitening import Whitening
+from discrepancy.team.verdict import unwhitened
 from discrepancy.team.words import TeamWords
 from mocobot_sim.effects.catalogue import EFFECTS
 
-
-def test_verdict_comes_first_and_lines_are_short() -> None:
-    text = format_diagnosis(small_diagnosis())
-    assert text.startswith(
-        "EXPLAINED. Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much."
-    )
-    assert max(map(len, text.splitlines())) <= WIDTH
-    for words in (
-        "Explains 99 % of the misfit in sample, 98 % on held-out trials (a gain on 2 of 2 folds).",
-        "[[Cause 1: torque zero of joint 1 of robot 2 (sea_bias)]]",
-        "Probability 80 %, 180 nats over nothing in its place; else spring stiffness of joint 1 of robot 2 (10 %), "
-        "something unlisted that looks like it (10 %).",
-        "Cannot be told from: spring stiffness of joint 1 of robot 2 by 2.0 nats.",
-        "A known weight separates them.",
-        "99.0 % of the excess error removed (95 % interval over 2 trials: 90.0 to 100.0 %)",
-        "A note.",
-        "this: of that; needs a weight.",
-        "chi2/n is 12 as simulated",
-    ):
-        assert words in " ".join(text.split())
+WIDTH = 100
 
 
-def test_consistent_data_have_a_short_report() -> None:
-    text = format_diagnosis(small_diagnosis("consistent"))
-    assert text.startswith("CONSISTENT.")
-    assert len(text.splitlines()) <= 24
-    assert "cannot decide" not in text
-    assert "torque zero of a driven joint (sea_bias): bias 19 to 21 mN m" in text
-    assert "encoder zero of a driven joint (phi_zero): zero 0.04 mrad" in text  # the unit of the next one
-    assert "encoder zero of a gimbal axis (theta_zero): zero 0.6 mrad (not everywhere)" in text
-    assert "mass that swings in the payload (slosh): mass never" in text
+def report(values: dict[str, Any]) -> str:
+    """All that there is to say, its lines joined."""
+    return " ".join(format_verdict(values, verbose=True).split())
 
 
-def test_unexplained_data_say_where_the_misfit_is() -> None:
-    values = small_diagnosis("unexplained")
-    values["residual"] |= {"chi2_per_n": 5.0}
-    text = format_diagnosis(values)
-    assert text.startswith("UNEXPLAINED. The 2 recordings and the simulation differ")
-    assert "What is left: somewhere." in text
-    assert "would have been noticed" not in text
-
-
-def test_miscalibrated_robots_are_to_be_calibrated() -> None:
-    text = format_diagnosis(small_diagnosis("miscalibrated"))
-    assert text.startswith("MISCALIBRATED. The robots of the 2 recordings are off")
-    assert max(map(len, text.splitlines())) <= WIDTH
-    said = " ".join(text.split())
-    assert "Zero of a gimbal axis: a spread of 5.2 mrad over 9 places (tolerance 0.1 mrad)." in said
-    assert '"mocobot calibrate" does so for a team' in said
-    assert "with nothing named and everything a little off, as far as its kind scatters" in said
-    assert "What would have been noticed" in text
+@pytest.mark.parametrize(
+    ("verdict", "begins", "says"),
+    [
+        ("explained", "EXPLAINED: one finding accounts for what the model gets wrong in the 2 trials. The team differs "
+         "from its model by torque zero of joint 1 of robot 2 or spring stiffness of joint 1 of robot 2.",
+         ("2 of 2 trials are likelier with that, all together by 7 nats",
+          "robot 2, joint 1 torque zero 50.0 +- 1.0 mN m 80 %",
+          "Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much.",
+          "Explains 99 % of the misfit in sample, 98 % on held-out trials (a gain on 2 of 2 folds).",
+          "180 nats over nothing in its place; else spring stiffness of joint 1 of robot 2 (10 %), something unlisted "
+          "that looks like it (10 %)", "A known weight separates them.", "this: of that; needs a weight.", "A note.",
+          "99.0 % of the excess error removed (95 % interval over 2 trials: 90.0 to 100.0 %)",
+          "chi2/n is 12 as modelled")),
+        ("partly_explained", "PARTLY EXPLAINED: one finding accounts for a part of what the model gets wrong", ()),
+        ("consistent", "CONSISTENT: the model explains the 2 trials within noise and tolerances.",
+         ("torque zero of a driven joint (sea_bias): bias 19 to 21 mN m",
+          "encoder zero of a driven joint (phi_zero): zero 0.04 mrad",
+          "encoder zero of a gimbal axis (theta_zero): zero 0.6 mrad (not everywhere)",
+          "mass that swings in the payload (slosh): mass never")),
+        ("unexplained", "UNEXPLAINED: no cause of the tables accounts for", ("at which speed, place and load",)),
+        ("miscalibrated", "MISCALIBRATED: in the 2 trials all places of a kind are off by more than their tolerances.",
+         ('"mocobot calibrate" does so for a team', "9 places zero of a gimbal axis", "52.0 times the tolerance",
+          "robot 2, joint 3 -9.10 +- 0.20", "and 5 more", "as far as its kind scatters")),
+    ],
+)  # fmt: skip
+def test_each_verdict_comes_first_in_short_lines(verdict: str, begins: str, says: tuple[str, ...]) -> None:
+    values = small_diagnosis(verdict)
+    assert report(values).startswith(begins)
+    for words in says:
+        assert words in report(values)
+    assert max(map(len, format_verdict(values, verbose=True).splitlines())) <= WIDTH
 
 
 @pytest.mark.parametrize(
     ("verdict", "shown"), [("miscalibrated", True), ("explained", True), ("consistent", False)]
 )
-def test_the_payload_is_told_without_and_with_what_is_off(verdict, shown) -> None:
+def test_the_payload_is_told_without_and_with_what_is_off(verdict: str, shown: bool) -> None:
     values = small_diagnosis(verdict)
     better = values["gain"]["estimates"]["before"] | {"mass_kg": 10.5}
     values["gain"]["estimates"] = {"before": better | {"mass_kg": 10.9}, "after": better}
     values["gain"]["errors"] = {"before": dict.fromkeys(ERRORS, 4.0), "after": dict.fromkeys(ERRORS, 0.25)}
-    lines = [line.split() for line in format_diagnosis(values).splitlines()]
+    lines = [line.split() for line in format_verdict(values, verbose=True).splitlines()]
     assert (["mass", "[kg]", "10.9", "10.5"] in lines) == shown
     assert ["mass", "[%]", "4", *(["0.25"] if shown else [])] in lines
 
 
 def test_a_suspicion_is_told_with_its_probability() -> None:
     values = small_diagnosis("consistent")
-    entry = small_diagnosis()["causes"][0]
-    values["suspected"] = [entry | {"at": None, "probability": 0.41, "over_nothing": 4.0}]
-    text = " ".join(format_diagnosis(values).split())
-    assert (
-        "torque zero of joint 1 of robot 2 (sea_bias), probability 41 %: Robot 2, joint 1: the torque" in text
-    )
+    values["suspected"] = [small_diagnosis()["causes"][0] | {"probability": 0.41, "over_nothing": 4.0}]
+    told = "torque zero of joint 1 of robot 2 (sea_bias), probability 41 %: Robot 2, joint 1: the torque"
+    assert told in report(values)
+    assert "suspected, too improbable to be named" in format_verdict(values)
 
 
 @pytest.mark.parametrize(
@@ -109,15 +97,49 @@ def test_a_suspicion_is_told_with_its_probability() -> None:
      (0.99995, "above 99.9 %")],
 )  # fmt: skip
 def test_a_probability_in_words(share: float, words: str) -> None:
-    assert probability_words(share) == words
-
-
-def test_a_rival_that_the_closed_loop_rules_out() -> None:
     values = small_diagnosis()
-    values["causes"][0]["alternatives"][0] |= {"ambiguous": False, "evidence_gap": -3.0, "chi2_per_n": 40.0}
-    text = " ".join(format_diagnosis(values).split())
-    assert "spring stiffness of joint 1 of robot 2 (3 nats better in the rows, closed loop chi2/n 40)" in text
-    assert "Cannot be told" not in text
+    values["causes"][0]["probability"] = share
+    assert f"Probability {words}, 180 nats over nothing" in report(values)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.79, True), (0.81, False)])
+def test_a_response_that_causes_hardly_mend_is_told(share: float, told: bool) -> None:
+    values = small_diagnosis()
+    values["gain"]["held_out"]["after"] |= {"chi2_per_n": 3.1}
+    values["gain"]["removed"]["share"] = share
+    assert bool(of_response(values)) == told
+    values["gain"]["held_out"]["after"] |= {"chi2_per_n": 2.9}
+    assert of_response(values) == []
+
+
+def test_a_response_with_parts_as_they_are_found_is_told() -> None:
+    values = small_diagnosis()
+    found = values["gain"]["held_out"]["after"] | {"chi2_per_n": 12.34}
+    as_found = "12.3 with every part as far off as it is found, within its tolerance, too"
+    assert as_found not in report(values)
+    values["gain"]["held_out"] |= {"as_found": found}
+    assert f"chi2/n {as_found}" in report(values)
+    values["gain"]["held_out"]["after"] |= {"chi2_per_n": 69.0}
+    values["gain"]["removed"]["share"] = 0.4
+    (said,) = of_response(values)
+    assert said.endswith(f"by chi2/n 69 (90 without them; noise alone leaves 1), by {as_found}.")
+    values = small_diagnosis("consistent")
+    both = dict.fromkeys(("before", "after"), found | {"chi2_per_n": 6123.0})
+    values["gain"]["held_out"] = both | {"as_found": found}
+    first, last = of_response(values)
+    assert "off by chi2/n 6120, where noise alone leaves 1" in first
+    assert "tolerances" in first
+    assert last == f"It is by {as_found}."
+
+
+def test_what_is_off_everywhere_beside_a_cause_has_its_rows() -> None:
+    values = small_diagnosis()
+    values["scatter"] = [scattered()]
+    text = report(values)
+    assert text.startswith("EXPLAINED")
+    assert (
+        "9 places zero of a gimbal axis zero [mrad] 52.0 times the tolerance robot 2, joint 3 -9.10" in text
+    )
 
 
 def test_errors_against_the_truth_are_shown() -> None:
@@ -129,7 +151,7 @@ def test_errors_against_the_truth_are_shown() -> None:
     assert found["com_mm"] == pytest.approx(3.0)
     assert found["grasp_rotation_deg"] == 0.0
     values["gain"]["errors"] = {"before": found, "after": errors(estimate, estimate)}
-    assert "centre of mass [mm]" in format_diagnosis(values)
+    assert "centre of mass [mm]" in report(values)
     with pytest.raises(ValueError, match="not"):
         errors(estimate, estimate | {"p_1c_m": [0.1, 0.2]})
 
@@ -158,34 +180,6 @@ def test_causes_are_named_in_words_where_they_sit() -> None:
     assert CAUSES["grasp_flex"].candidate({}, {}, 1).label == "compliance of the grasp of robot 1"
     assert CAUSES["clock_delay"].candidate({}, {}, 1).label == "clock delay of robot 1"
     assert Candidate("made_up", "", 2, None, ()).label == "made up (robot 2)"
-
-
-def test_a_share_beyond_the_first_is_a_further_one() -> None:
-    values = small_diagnosis()
-    second = values["causes"][0] | {"explained": {"in_sample": 0.01, "held_out": None}}
-    values["causes"].append(second)
-    text = " ".join(format_diagnosis(values).split())
-    assert text.count("Explains 99 % of") == 1
-    assert "Explains a further 1 % of the misfit in sample" in text
-    for share, words in (
-        (0.0, "0 %"),
-        (0.00067, "0.07 %"),
-        (-0.00067, "-0.07 %"),
-        (1e-6, "less than 0.001 %"),
-    ):
-        second["explained"]["in_sample"] = share
-        text = " ".join(format_diagnosis(values).split())
-        assert f"Explains a further {words} of the misfit in sample" in text
-
-
-def test_what_fits_worse_at_several_instants_is_named_once() -> None:
-    values = small_diagnosis()
-    push = values["causes"][0]["alternatives"][0] | {"name": "push", "ambiguous": False, "chi2_per_n": None}
-    gaps = (30.0, 40.0, 50.0)
-    values["causes"][0]["alternatives"] += [push | {"evidence_gap": gap} for gap in gaps]
-    values["causes"][0]["alternatives"].append(push | {"name": "drag", "evidence_gap": 60.0})
-    text = " ".join(format_diagnosis(values).split())
-    assert "Fits worse: push (30 nats worse), drag (60 nats worse)." in text
 
 
 @pytest.mark.parametrize("cause", sorted(CAUSES))

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from discrepancy.channel import Channel
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import TABLES, load_traces, save_traces
-from discrepancy.channel import Channel
 from estimator import inputs
 from estimator.errors import InputError
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from helpers.team_case import Case, true_bases, true_shared
 
-from discrepancy import rules
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import linearise
 from omnid_design import DESIGN
@@ -74,14 +73,14 @@ def test_what_does_not_chatter_is_filtered_as_usual(case: Case, loud: Signals) -
     calm, shaken = read(case.signals), read(loud)
     healthy = Noise.of([calm, calm])
     assert not healthy.chatters
-    assert healthy.known_to(calm).pre_hz == rules.TEAM_PRE_HZ
+    assert healthy.known_to(calm).pre_hz == TEAM_PRE_HZ
     both = Noise.of([calm, shaken])
     assert both.chatters
     first, second = both.known_to(calm), both.known_to(shaken)
     np.testing.assert_array_equal(first.smooth_hz, healthy.known_to(calm).smooth_hz)
-    assert (first.pre_hz, second.pre_hz) == (rules.TEAM_PRE_HZ, pytest.approx(45.0))
+    assert (first.pre_hz, second.pre_hz) == (TEAM_PRE_HZ, pytest.approx(45.0))
     assert second.smooth_hz is not None
-    np.testing.assert_array_equal(second.smooth_hz[1], rules.TEAM_SMOOTH_HZ)  # gimbals hardly turn with it
+    np.testing.assert_array_equal(second.smooth_hz[1], TEAM_SMOOTH_HZ)  # gimbals hardly turn with it
     np.testing.assert_allclose(second.smooth_hz[2], 45.0)
     slight = replace(calm, tau=calm.tau + 0.01 * (loud.tau - case.signals.tau))
     assert not Noise.of([slight]).chatters

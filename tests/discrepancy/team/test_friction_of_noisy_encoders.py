@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from helpers.team_case import exact
 
-from discrepancy import rules
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.friction import KEPT, _doubtful
-from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.noise import QUIET_HZ, QUIET_RAD_PER_S, Noise
+from discrepancy.team.linear.signals import TEAM_SMOOTH_HZ, Signals
 from estimator.filtering import differentiate
+from patchwork import dense
 
 RATE_HZ = 100.0
 TIME = np.arange(0.0, 40.0, 1.0 / RATE_HZ)
@@ -37,14 +37,14 @@ def test_rates_are_as_quiet_as_they_have_to_be(bits: int, sigma_steps: float) ->
     signals = read(step, sigma_steps * step, moved_and_rested(), rng)
     known = Noise.of([signals]).known_to(signals)
     assert known.smooth_hz is not None
-    assert np.all(known.smooth_hz[:2] < rules.TEAM_SMOOTH_HZ)
-    np.testing.assert_array_equal(known.smooth_hz[2], rules.TEAM_SMOOTH_HZ)
-    free = known.smooth_hz[0] > rules.QUIET_HZ
+    assert np.all(known.smooth_hz[:2] < TEAM_SMOOTH_HZ)
+    np.testing.assert_array_equal(known.smooth_hz[2], TEAM_SMOOTH_HZ)
+    free = known.smooth_hz[0] > QUIET_HZ
     white = np.hypot(sigma_steps, 1.0 / np.sqrt(12.0)) * step * rng.standard_normal((len(TIME), 3, 3))
     noise = Signals(TIME, white, white, white, RATE_HZ, smooth_hz=known.smooth_hz)
     for robot, joint in np.argwhere(free):
         rate = differentiate(noise.smooth("phi", robot, joint), RATE_HZ)
-        assert np.std(rate) == pytest.approx(rules.QUIET_RAD_PER_S, rel=0.25)
+        assert np.std(rate) == pytest.approx(QUIET_RAD_PER_S, rel=0.25)
     assert free.all() == free.any() == (bits == 17)
 
 
@@ -52,7 +52,7 @@ def test_readings_that_only_round_are_smoothed_as_usual() -> None:
     step = 2.0 * np.pi / 2**16
     signals = read(step, 0.0, moved_and_rested(), np.random.default_rng(4))
     known = Noise.of([signals]).known_to(signals)
-    np.testing.assert_array_equal(known.smooth_hz, rules.TEAM_SMOOTH_HZ)
+    np.testing.assert_array_equal(known.smooth_hz, TEAM_SMOOTH_HZ)
     np.testing.assert_array_equal(known.smooth("phi", 1, 2), signals.smooth("phi", 1, 2))
 
 
@@ -102,7 +102,7 @@ def test_what_no_encoder_shows_of_a_turn_is_open() -> None:
     assert len(turns) > 3
     assert np.abs(missed).max() > 0.5
     left = case.linear.reduction(cause.direction(case.linear, 1, 2) * missed[:, None]).ravel()
-    open_ = cause.unknowns(case.linear, 1, 2, shape).dense().reshape(len(left), -1)
+    open_ = dense(cause.unknowns(case.linear, 1, 2, shape)).reshape(len(left), -1)
     beside = left - open_ @ np.linalg.lstsq(open_, left, rcond=1e-9)[0]
     assert np.linalg.norm(beside) < 0.1 * np.linalg.norm(left)
     # Where it slides, it is known.

@@ -5,12 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.least_squares.problem import Problem
 from discrepancy.team.candidates import every_candidate, explained_by
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise
-from discrepancy.team.linear.elsewhere import found_at
 from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.linear.start import Sensed, exact_residual
 from discrepancy.team.rig import TeamRig
@@ -78,80 +75,22 @@ def test_a_deviation_of_the_robot_takes_out_what_the_column_says(case, candidate
         assert np.abs(expected).max() > 1e-7
 
 
-def test_values_are_counted_from_where_the_robots_were_believed_to_be(case):
-    """Rows at an origin, with a candidate at that value, are those that the linearisation has."""
-    rng = np.random.default_rng(3)
-    origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
-    here, there = team(case), team(case, origin)
-    candidates = there.candidates()
-    plain, moved = (next(iter(rig.rows(candidates))) for rig in (here, there))
-    back = moved.residual.copy()
-    for candidate, columns in zip(candidates, moved.causes, strict=True):
-        value = origin_of(candidate, origin)
-        if value is not None:
-            np.testing.assert_array_equal(value, origin.x[places_of(candidate)])
-            back -= columns @ value
-    np.testing.assert_allclose(back, plain.residual, atol=1e-12)
-    assert np.abs(moved.residual - plain.residual).max() > 1e-4
-
-
 @pytest.mark.parametrize("name", ["theta_zero", "sea_bias", "link_length", "base_tilt"])
-def test_exact_residual_is_counted_from_there_too(case, name):
-    """At the origin's value exactly the row without that candidate's part; away from it, by the slope."""
+def test_values_are_counted_from_where_the_robots_were_believed_to_be(case, name):
+    """At the origin's value the exact rows are those that are there; away from it, they change by the slope."""
     rng = np.random.default_rng(3)
     origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
     rig = team(case, origin)
     candidate = next(c for c in CANDIDATES if c.cause == name and c.robot == 3)
-    rows, (columns,) = next(iter(rig.rows([]))).residual, rig.columns(candidate)
-    for other in rig.candidates():
-        if origin_of(other, origin) is not None and other.key != candidate.key:
-            rows = rows + rig.columns(other)[0] @ origin_of(other, origin)
+    (rows,), (columns,) = rig.rows(), rig.columns(candidate)
     nothing = np.zeros(rig.linear[0].by_shared.shape[2]), [np.zeros(rig.local_unknowns)]
     value = origin_of(candidate, origin)
-    (at,) = rig.residual(*nothing, [(candidate, value)])
-    np.testing.assert_allclose(at, rows, atol=1e-9)
+    np.testing.assert_array_equal(value, origin.x[places_of(candidate)])
+    (at,) = rig.residual_there(*nothing, [(candidate, value)])
+    np.testing.assert_allclose(at, rows.residual, atol=1e-9)
     step = 1e-3 * candidate.units
-    (away,) = rig.residual(*nothing, [(candidate, value + step)])
+    (away,) = rig.residual_there(*nothing, [(candidate, value + step)])
     np.testing.assert_allclose(away - at, -columns @ step, atol=0.02 * np.abs(columns @ step).max())
-
-
-def test_the_fit_finds_the_robots_where_they_are(case):
-    """Readings of robots that are off: where it goes has their deviations, and straight columns miss little there."""
-    rng = np.random.default_rng(5)
-    truth = np.zeros((3, COUNT))
-    for name in ("sea_bias", "theta_zero"):
-        for candidate in CANDIDATES:
-            if candidate.cause == name:
-                truth[places_of(candidate)] = 0.05 * rng.standard_normal() * SIZES[places_of(candidate)[1]]
-    s, readings = case.signals, truth[None]
-    linear = replace(
-        case.linear,
-        signals=replace(
-            s,
-            theta=s.theta + readings[..., AT["theta_zero"]],
-            tau=s.tau + readings[..., AT["tau_zero"]],
-        ),
-    )
-    residual = exact_residual(linear.signals, case.shared, case.bases, DESIGN, case.reduction)
-    linear = replace(linear, residual=residual)
-    scale = np.r_[np.full(12, 1e-5), np.full(6, 3e-3)]  # noise of unit size
-    white = lambda x: x / scale.reshape(1, 18, *(1,) * (x.ndim - 2))  # noqa: E731
-    rig = TeamRig(
-        (case.carried.recording,), Sensed(None, (white,), ()), (linear,), default_tolerances(), frozenset()
-    )
-    candidates = [c for c in CANDIDATES if c.cause in ("sea_bias", "theta_zero")]
-    nothing = Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
-    there = found_at(rig.linear, rig.whitening, nothing, None)
-    found = [nothing.fit.part(i)[0] * c.units for i, c in enumerate(candidates)]
-    for candidate, value in zip(candidates, found, strict=True):
-        np.testing.assert_allclose(there.units.x[places_of(candidate)], value)
-        np.testing.assert_allclose(there.origin.x[places_of(candidate)], value)
-    assert there.curvature < 1.0
-    again = found_at(rig.linear, rig.whitening, nothing, ArmUnit(DESIGN, np.zeros((3, COUNT))))
-    np.testing.assert_allclose(again.units.x, there.units.x)
-    torque = AT["tau_zero"]
-    wrong = np.abs(there.units.x[:, torque] - truth[:, torque]).max()
-    assert wrong < 0.3 * np.abs(truth[:, torque]).max()
 
 
 def test_what_causes_explain_of_every_sample_is_what_they_explain_of_the_rows(case):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt, welch
 
-from discrepancy.rules import TEAM_ROWS_HZ, TEAM_TRIM_S
-from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.reduction import TEAM_ROWS_HZ, Reduction
+from discrepancy.team.linear.signals import TEAM_TRIM_S, Signals
 from estimator.errors import InputError
+from patchwork import dense
 
 QUANTUM = 2 * np.pi / 2**16
 
@@ -172,9 +172,9 @@ def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, redu
     assert not shown[0]  # before the first row
     assert shown.sum() >= 9
     np.testing.assert_allclose(
-        reduction.of_pieces(direction, pieces).dense(), expected[..., shown], atol=1e-12
+        dense(reduction.of_pieces(direction, pieces)), expected[..., shown], atol=1e-12
     )
-    assert reduction.of_pieces(direction, []).dense().shape == (len(reduction.time), 2, 0)
+    assert dense(reduction.of_pieces(direction, [])).shape == (len(reduction.time), 2, 0)
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.start import Sensed, noise_rows
 from discrepancy.team.linear.trial_linear import filtered
+from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.rigid_team.residual import balance, grasp_data
@@ -126,9 +126,9 @@ def test_a_spring_that_is_stiffer_makes_no_noise_louder(case):
     tau[:, 1, 2] /= 1.0 + scale
     signals = replace(case.signals, tau=tau).minus(-read.phi, -read.theta, -read.tau)
     (cause,) = (c for c in rig.candidates() if (c.cause, c.robot, c.joint) == ("sea_scale", 2, 3))
-    (left,) = seen_by(rig, signals).residual(*nowhere(case), [(cause, np.array([scale]))])
+    (left,) = seen_by(rig, signals).residual_there(*nowhere(case), [(cause, np.array([scale]))])
     alone = case.signals.minus(-read.phi, -read.theta, -read.tau)
-    (expected,) = seen_by(rig, alone).residual(*nowhere(case), [])
+    (expected,) = seen_by(rig, alone).residual_there(*nowhere(case), [])
     for part in (FORCE, MOMENT):
         assert np.mean(left[:, part] ** 2) == pytest.approx(np.mean(expected[:, part] ** 2), rel=0.02)
 
@@ -140,9 +140,13 @@ def test_a_payload_that_is_heavier_makes_no_noise_louder(case):
     read = next(COARSE.draws(case.signals, rng, 1))
     noisy = seen_by(rig, case.signals.minus(-read.phi, -read.theta, -read.tau))
     shared, local = nowhere(case)
-    (here,) = (a - b for a, b in zip(*(x.residual(shared, local, []) for x in (noisy, rig)), strict=True))
+    (here,) = (
+        a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True)
+    )
     shared[12] = heavier
-    (there,) = (a - b for a, b in zip(*(x.residual(shared, local, []) for x in (noisy, rig)), strict=True))
+    (there,) = (
+        a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True)
+    )
     assert np.mean(there[:, FORCE] ** 2) == pytest.approx(np.mean(here[:, FORCE] ** 2), rel=0.02)
 
 

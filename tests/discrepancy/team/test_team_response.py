@@ -9,20 +9,24 @@ import numpy as np
 import pytest
 
 import mocobot
-from discrepancy import rules
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.gain import mean_chi2
+from discrepancy.team.long import choice as choices
+from discrepancy.team.long import left as lefts
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
 from discrepancy.team.response import as_found, confirm, write_model
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload
-from hidden_quick import generated, quick_set
+from hidden_team import recorded
+from mocobot_sim.effects import make_effect
 from mocobot_sim.extended.extended import load_extended
+
+ROBOT, JOINT, BIAS_NM = 3, 2, 0.25
 
 
 def searched(recordings, *causes: str) -> TeamOutcome:
@@ -33,12 +37,10 @@ def searched(recordings, *causes: str) -> TeamOutcome:
 
 
 @cache
-def hidden() -> tuple[TeamOutcome, dict]:
-    """A torque that is off by a constant, twelve tolerances large, among healthy parts; and the truth."""
-    recordings, sealed = generated(quick_set("single", 2, "sea_bias", payload="b"))
-    outcome = searched(recordings, "sea_bias", "phi_zero")
-    (truth,) = sealed.open({"found": []})["effects"]
-    return outcome, truth
+def hidden() -> TeamOutcome:
+    """A torque that is off by a constant, a dozen tolerances large, among healthy parts."""
+    effect = make_effect("sea_bias", {"bias_Nm": BIAS_NM}, ROBOT, JOINT)
+    return searched(recorded("b", [effect], seed=2), "sea_bias", "phi_zero")
 
 
 def group_at(outcome: TeamOutcome, robot: int, joint: int):
@@ -54,11 +56,10 @@ def odds_with(chosen: Chosen, rival) -> list[Odds]:
 
 def test_the_true_cause_responds_better_than_none_and_than_another() -> None:
     """Fitted to the other trial; the other cause is no look-alike any more."""
-    outcome, truth = hidden()
+    outcome = hidden()
     (chosen,) = outcome.state.chosen
-    place = truth["robot"], truth["joint"]
-    assert chosen.group is group_at(outcome, *place)
-    other = group_at(outcome, truth["robot"] % 3 + 1, truth["joint"])
+    assert chosen.group is group_at(outcome, ROBOT, JOINT)
+    other = group_at(outcome, ROBOT % 3 + 1, JOINT)
     found = confirm(outcome, odds_with(chosen, other))
     assert found.gain.held_out
     assert len(found.gain.pairs) == 2
@@ -73,9 +74,9 @@ def test_the_true_cause_responds_better_than_none_and_than_another() -> None:
 
 
 def test_a_rival_that_responds_better_takes_the_place() -> None:
-    outcome, truth = hidden()
+    outcome = hidden()
     (chosen,) = outcome.state.chosen
-    wrong = group_at(outcome, truth["robot"] % 3 + 1, truth["joint"])
+    wrong = group_at(outcome, ROBOT % 3 + 1, JOINT)
     state = outcome.search.value([Chosen(wrong, chosen.scale)], outcome.state.posterior)
     found = confirm(replace(outcome, state=state), odds_with(state.chosen[0], chosen.group))
     assert [c.group for c in found.outcome.state.chosen] == [chosen.group]
@@ -89,7 +90,7 @@ def test_a_rival_that_responds_better_takes_the_place() -> None:
 
 def test_a_cause_that_responds_worse_is_contradicted(monkeypatch: pytest.MonkeyPatch) -> None:
     """One whose effect no simulation can have."""
-    outcome, _ = hidden()
+    outcome = hidden()
     (chosen,) = outcome.state.chosen
     monkeypatch.setattr(TeamRig, "effects", lambda self, candidate, values: None)
     found = confirm(outcome, [Odds(chosen, 1.0, 30.0, ())])
@@ -101,12 +102,12 @@ def test_a_cause_that_responds_worse_is_contradicted(monkeypatch: pytest.MonkeyP
 
 def test_models_to_take_away(tmp_path) -> None:
     """Both have the cause; the one as found has healthy parts besides."""
-    outcome, truth = hidden()
+    outcome = hidden()
     for whole in (False, True):
         write_model(outcome, outcome.state.chosen, tmp_path / f"{whole}", whole=whole)
         scene = load_extended(tmp_path / f"{whole}")
-        off = scene.units[truth["robot"] - 1].tau_zero_Nm[truth["joint"] - 1]
-        assert off == pytest.approx(truth["parameters"]["bias_Nm"], rel=0.1)
+        off = scene.units[ROBOT - 1].tau_zero_Nm[JOINT - 1]
+        assert off == pytest.approx(BIAS_NM, rel=0.1)
         causes = [effect.cause for effect in scene.effects]
         assert causes[0] == "sea_bias"
         assert ("phi_zero" in causes) == whole
@@ -114,8 +115,10 @@ def test_models_to_take_away(tmp_path) -> None:
 
 def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque is wrong in the last part only, which was not searched at first."""
-    for name, value in (("SEARCHED_S", 16.0), ("SHORTEST_PART_S", 8.0), ("ODD_WINDOW_S", 2.0)):
-        monkeypatch.setattr(rules, name, value)
+    for owner, name, value in (
+        (choices, "SEARCHED_S", 16.0), (choices, "SHORTEST_PART_S", 8.0), (lefts, "ODD_WINDOW_S", 2.0),
+    ):  # fmt: skip
+        monkeypatch.setattr(owner, name, value)
     recording = mocobot.simulate("b", "random", vias=16, seed=6)
     choice = Choice.of([recording])
     odd = choice.others[-1]

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from discrepancy.rules import MODEL_ABOVE, MODEL_BELOW_HZ, MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD
-from discrepancy.team.linear.chatter import chattering
-from discrepancy.team.linear.chatter import Fast
-from discrepancy.team.linear.noise import Noise
+from discrepancy.team.linear.chatter import MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD, Fast, chattering
+from discrepancy.team.linear.noise import MODEL_ABOVE, MODEL_BELOW_HZ, Noise
 from discrepancy.team.linear.signals import Signals
 
 RATE = 100.0

@@ -23,6 +23,10 @@ TEAM_PUSH_EDGE_S = 0.05
 0.1 s off costs 276 of 1483 nats of a push of 0.64 N for 10 s."""
 
 
+PUSH_RAMPS = (0.25, 0.8)
+"""Ramps of a push over its length at half its height, tried first. Chosen: Gauss-Newton steps do the rest."""
+
+
 def during(trial: TrialLinear, shape: Shape) -> Array:
     """Share of a push that acts about each sample: 1 within its interval but for the ramps, 0 outside, shape (Q,).
 
@@ -63,6 +67,14 @@ class Push(Cause):
     def slope_step(self, name, number):
         most = TEAM_PUSH_EDGE_S
         return most if name == "start_s" else min(most, super().slope_step(name, number))
+
+    def finer(self, shape):
+        """As long at half its height, with ramps."""
+        ramps = [] if shape.get("ramp_s") else [share * shape["duration_s"] for share in PUSH_RAMPS]
+        return [
+            {"start_s": shape["start_s"] - 0.5 * r, "duration_s": shape["duration_s"] + r, "ramp_s": r}
+            for r in ramps
+        ]
 
     def columns(self, trial, robot, joint, shape):
         window = during(trial, shape)
