@@ -55,8 +55,8 @@ SLIDING = (
     "driven_lugre", "driven_dahl", "gimbal_lugre", "gimbal_dahl", "bouc_wen_spring", "soft_play",
 )  # fmt: skip
 """Stiction and play, in the catalogue's form and in others."""
-HOUR = Schedule(randoms=1, vias=2750, periodic_s=None, hold_s=None)
-"""One trial of an hour: 1.31 s a via."""
+HOUR = Schedule(randoms=2, vias=1375, periodic_s=None, hold_s=None)
+"""Two trials of half an hour: 1.31 s a via."""
 SHARES = (0.4, 0.25, 0.2, 0.15)
 """Of the backgrounds where they are drawn."""
 
