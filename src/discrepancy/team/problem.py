@@ -417,6 +417,7 @@ class TeamProblem:
         self.cells.truncate(count)
         names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
         shape = dict(candidate.shape) | dict(zip(names, moved.tolist(), strict=True))
+        shape = CAUSES[candidate.cause].around(self.values_of(group, posterior.mean), shape)
         try:
             return [self.group_of(candidate.in_shape(shape), group.log_prior)]
         except (ValueError, ArithmeticError):
