@@ -16,7 +16,7 @@ import tyro
 
 from calibration.campaign import run_tasks, tasks
 from calibration.tables import tables
-from hidden.store import read_results
+from sealed.store import read
 
 Part = Literal["main", "prior", "weighed", "transfer", "masses", "tilt", "robots", "nominal"]
 
@@ -49,7 +49,7 @@ class Options:
 def main(options: Options) -> None:
     """Run, or print what was run."""
     if options.tables:
-        print(tables(read_results(options.out / "results.jsonl")))
+        print(tables(read(options.out / "results.jsonl")))
         return
     listed = [
         task for part in options.part for task in tasks(part, options.seeds, options.payloads, options.robots)

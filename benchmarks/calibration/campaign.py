@@ -20,8 +20,8 @@ from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.prior import Prior
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
-from hidden.store import append_result, read_results
 from mocobot_sim.errors import TrialError
+from sealed import store
 
 HELD = Prior(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ARM_MASS_RATIO = 0.05
@@ -88,7 +88,7 @@ def run_tasks(listed: Sequence[Task], folder: Path, jobs: int) -> None:
     """Run what is not finished yet, and append each result as soon as it is there."""
     path = folder / "results.jsonl"
     folder.mkdir(parents=True, exist_ok=True)
-    finished = {(r["part"], r["key"]) for r in read_results(path) if not r["error"]}
+    finished = {(r["part"], r["key"]) for r in store.read(path) if not r["error"]}
     todo = [task for task in listed if (task.method, task.team.key) not in finished]
     # All of one team in one process: recordings are simulated once.
     by_team: dict[Team, list[Task]] = {}
@@ -99,7 +99,7 @@ def run_tasks(listed: Sequence[Task], folder: Path, jobs: int) -> None:
         done: Any = run(delayed(_run_team)(group, folder) for group in by_team.values())
         for results in tqdm(done, total=len(by_team), unit="team", dynamic_ncols=True):
             for result in results:
-                append_result(path, result)
+                store.append(path, result)
 
 
 def _run_team(group: Sequence[Task], folder: Path) -> list[dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from estimator.recording.model import Recording
 from hidden.draw import Tabled
 from hidden.logger import Logger
-from hidden.of_log import limits_of
 from hidden.schedule import Schedule
 from hidden.sealed import Sealed
 from mocobot.campaign.background import draw_background
@@ -45,8 +44,8 @@ class HiddenSet:
         preset: sensors.
         schedule: what is recorded.
         timestep_s: integration step [s].
-        logger: what stands between the sensors and the recordings, as ``mocobot convert`` makes them of its log;
-            sizes are then over the detection limits of that very log. None for samples as they are simulated.
+        logger: what stands between the sensors and the recordings, as ``mocobot convert`` makes them of its log; None
+            for samples as they are simulated.
     """
 
     kind: Kind
@@ -59,18 +58,6 @@ class HiddenSet:
     schedule: Schedule = field(default_factory=Schedule)
     timestep_s: float = TIMESTEP_S
     logger: Logger | None = None
-
-    @property
-    def key(self) -> str:
-        """Name of the set."""
-        what = ["+".join(self.causes), f"x{self.factor:g}"] if self.causes else []
-        preset = [self.preset] if self.preset != "nominal" else []
-        more = [*(["logged"] if self.logger else []), *(["tolerances"] if self.background else []), *preset]
-        return "-".join([self.kind, *what, *more, str(self.seed)])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
 
     def rng(self, purpose: str) -> np.random.Generator:
         """Independent stream for one purpose."""
@@ -88,15 +75,12 @@ def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
     team = build_team(payload)
     trajectories = request.schedule.trajectories(team, request.rng("trajectories"))
     ground = Ground.of(team, trajectories, Tabled())
-    if request.logger and request.causes:
-        clean = replace(request, kind="clean", causes=())
-        ground = replace(ground, limits=Tabled(limits_of(_recorded(clean, payload, trajectories, []))))
     hidden, background = _effects(request, ground)
     recordings = _recorded(request, payload, trajectories, [*hidden, *background])
     truth = {
         "payload": payload,
         "mass_kg": GroundTruth.of(team).mass_kg,
-        "effects": [effect_to_dict(effect) for effect in hidden],
+        "effects": [_with_answer(effect_to_dict(effect)) for effect in hidden],
         "background": [effect_to_dict(effect) for effect in background],
         "gimbal_axes_1": gimbal_axes(team),
     }
@@ -129,6 +113,12 @@ def _effects(request: HiddenSet, ground: Ground) -> tuple[list[Effect], list[Eff
     # One cause acts once at a place: what is hidden takes the place of what is tolerated there.
     taken = [_place(effect) for effect in hidden]
     return hidden, [effect for effect in background if _place(effect) not in taken]
+
+
+def _with_answer(told: dict[str, Any]) -> dict[str, Any]:
+    """An effect with its right answer, as ``mocobot.campaign.summary.match`` takes it."""
+    place = {name: told.get(name) for name in ("robot", "joint")}
+    return told | {"answer": {"cause": told["cause"], **place, "known": told["parameters"]}}
 
 
 def _place(effect: Effect) -> Sequence[Any]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 
@@ -22,26 +19,6 @@ class Sealed:
         Raises:
             ValueError: there is no verdict yet.
         """
-        if not verdict or "found" not in verdict:
+        if verdict is None:
             raise ValueError("the truth stays sealed until there is a verdict")
         return dict(self._truth)
-
-    def save(self, path: Path, request: Mapping[str, Any]) -> None:
-        """Keep it in a file, with the request it belongs to."""
-        temporary = path.with_suffix(".tmp")
-        temporary.write_text(
-            json.dumps({"request": request, "truth": self._truth}, indent=1), encoding="utf-8"
-        )
-        os.replace(temporary, path)
-
-    @classmethod
-    def load(cls, path: Path, request: Mapping[str, Any]) -> Sealed:
-        """Read it again.
-
-        Raises:
-            ValueError: it belongs to another request.
-        """
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["request"] != json.loads(json.dumps(request)):
-            raise ValueError(f"{path} belongs to another request; delete its folder or choose another one")
-        return cls(content["truth"])

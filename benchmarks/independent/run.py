@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -29,11 +28,10 @@ from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.scene.scene import build_team
 from sealed import store
 from sealed.backgrounds import BACKGROUNDS, Background
-from sealed.campaign import apart
+from sealed.campaign import apart, costs, engine, verdict_on
 from sealed.draw import largest
 from sealed.score import family_of
 from sealed.tables import misses, tables
-from sealed.verdict import engine, verdict_on
 
 Kind = Literal["clean", "single", "forms", "pairs"]
 KINDS: tuple[Kind, ...] = ("clean", "single", "forms", "single", "pairs", "single", "clean", "forms")
@@ -129,8 +127,7 @@ def diagnosed(request: IndependentSet, out: Path, noise: Noise) -> None:
     here = out / "sets" / request.key
     here.mkdir(parents=True, exist_ok=True)
     result: dict[str, Any] = {"key": request.key, "set": asdict(request), "engine": engine(), "error": None}
-    start = time.process_time()
-    hidden = list(zip(request.names, request.factors, strict=True))
+    begun, hidden = 0.0, list(zip(request.names, request.factors, strict=True))
     try:
         recordings, truth = generate(request.seed, request.background, hidden, request.payload, noise=noise)
         files = [here / f"trial{number}.parquet" for number in range(1, len(recordings) + 1)]
@@ -142,12 +139,13 @@ def diagnosed(request: IndependentSet, out: Path, noise: Noise) -> None:
             "effects": [as_scored(effect, len(recordings)) for effect in truth["effects"]],
         }
         result["truth"] = json.loads(json.dumps(truth))
-        print(f"{request.key}: {time.process_time() - start:.1f} s of CPU", flush=True)
-        result["verdict"] = verdict_on(files, closed_loop=False)
-        said = result["verdict"]["verdict"] + f", {result['verdict']['cpu_s']:.1f} s of CPU"
+        begun = costs()["cpu_s"]
+        result["verdict"], result["law_scores"] = verdict_on(files, closed_loop=False), []
+        said = result["verdict"]["verdict"]
     except Exception:
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
+    result |= costs() | {"cpu_s": costs()["cpu_s"] - begun}
     store.append(out / "results.jsonl", result)
     print(f"{request.key}: {said}", flush=True)
 

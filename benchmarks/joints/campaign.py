@@ -16,7 +16,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -35,13 +35,13 @@ from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
 from joints.foreign import make, thinned
 from mocobot_logs.joints.joint_log import JointLog
+from scoring import SURE, changed_settings, log_score, median_and_most
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
         "load_friction", "quadratic_drag")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
 """Names of one thing at one joint: no log without rests parts the first, terms of one friction are the last."""
-SURE = 0.9
 Item = dict[str, Any]
 
 
@@ -104,16 +104,13 @@ def main(options: Options) -> None:
 
 def _changes(options: Options) -> Iterator[bool]:
     """Whether each verdict changes with a setting."""
-    drawn = np.random.default_rng(options.first).permutation([f.name for f in fields(Settings)])[:10]
     for seed, factor in ((options.first, 0.5), (options.first + 1, 2.0)):
         made = _arm(options, seed)
         usual = _said(_found(*made))
         print(f"set {seed}: {sorted(usual)}", flush=True)
-        for name in drawn:
-            own = getattr(SETTINGS, name)
-            other = max(1, round(factor * own)) if isinstance(own, int) else factor * own
-            said = _said(_found(*made, replace(SETTINGS, **{str(name): other})))
-            print(f"  {name} {own:g} -> {other:g}: {sorted(said) if said != usual else 'same'}", flush=True)
+        for words, settings in changed_settings(options.first, factor):
+            said = _said(_found(*made, settings))
+            print(f"  {words}: {sorted(said) if said != usual else 'same'}", flush=True)
             yield said != usual
 
 
@@ -175,8 +172,9 @@ def score(result: Item) -> Item:
     strangers = [c for k, c in enumerate(named) if k not in right]
     sure = [c for c in strangers if c["every"][0][1] >= SURE]
     missed = [f for f, hit in zip(faults, hits, strict=True) if not hit]
+    stated = [(c["every"][0][1], k in right) for k, c in enumerate(named)]
     return {"hits": hits, "missed": missed, "certain": sure, "false": [c for c in strangers if c not in sure],
-            "right": not missed and not strangers}  # fmt: skip
+            "right": not missed and not strangers, "stated": stated}  # fmt: skip
 
 
 def told_of(result: Item) -> list[str]:
@@ -211,8 +209,8 @@ def tables(results: Sequence[Item]) -> str:
             for label in true.keys() & r["values"].keys():
                 key = label.split()[-1], r["rate_hz"]
                 bare.setdefault(key, []).append((*r["values"][label], true[label]))
-    head = "| sets | falsely certain | false below 0.9 | faults named | wholly right | errors | CPU s median, most |"
-    out = [head, "|---|---|---|---|---|---|---|"]
+    head = "| sets | falsely certain | false below 0.9 | faults named | wholly right | log score | errors | CPU s |"
+    out = [head, "|---|---|---|---|---|---|---|---|"]
     for name, own in sorted(rows.items()):
         good = [score(r) for r in own if not r["error"]]
         certain, false, hits = (sum(len(s[what]) for s in good) for what in ("certain", "false", "hits"))
@@ -221,8 +219,11 @@ def tables(results: Sequence[Item]) -> str:
             sum(s["right"] for s in good),
             len(own) - len(good),
         )
-        seconds = f"{np.median([r['cpu_s'] for r in own]):.1f}, {max(r['cpu_s'] for r in own):.1f}"
-        row = f"{certain} | {false} | {named} of {hits} | {right} | {bad} | {seconds}"
+        seconds, told = (
+            median_and_most(r["cpu_s"] for r in own),
+            log_score([x for s in good for x in s["stated"]]),
+        )
+        row = f"{certain} | {false} | {named} of {hits} | {right} | {told:.3f} | {bad} | {seconds}"
         out.append(f"| {name} ({len(own)}) | {row} |")
     out += ["", "| value | Hz | n | rms of error over se | median of se over size |", "|---|---|---|---|---|"]
     for (word, rate), numbers in sorted(bare.items()):

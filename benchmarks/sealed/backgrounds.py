@@ -24,7 +24,7 @@ OVER_NOMINAL: dict[str, tuple[float, float, float, float]] = {
     "payload_tether": (1.60, 2.19, 2.74, 2.34),
 }
 """Limit over that of ``hidden.limits`` of what has no tolerance and yet looks like what has one: a force that stays is
-a torque's zero and a tilt. Measured: ``sealed.measure``, medians of eight places on payloads (b) and (c). Masses and
+a torque's zero and a tilt. Measured: medians of eight places on payloads (b) and (c). Masses and
 what swings have 0.91 to 1.03 in all backgrounds."""
 
 

@@ -1,28 +1,102 @@
-"""Run many sets, each in a process of its own: resumable, and a broken one ends alone."""
+"""Run many sets, each in a process of its own: resumable, and one that breaks or takes too long ends alone."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import resource
+import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+from unittest.mock import patch
 
+import discrepancy
+import mocobot
+from discrepancy.team import diagnosis
 from mocobot_sim.errors import TrialError
+from scoring import AS_THEY_ARE, changed_settings
 from sealed import store
 from sealed.law_score import score_laws
 from sealed.sets import SealedSet
-from sealed.verdict import engine, verdict_on
+
+T = TypeVar("T")
+LEFT_AWAY = {"evidence", "undecidable", "detection_limits", "provenance"}
+"""Keys of a verdict that no score reads."""
 
 
-def simulate_all(requests: Sequence[SealedSet], out: Path, jobs: int) -> None:
+@dataclass(frozen=True)
+class How:
+    """How sets are diagnosed.
+
+    Attributes:
+        out: folder of the campaign.
+        label: name of the results.
+        jobs: processes.
+        cpu_s: CPU time after which a diagnosis is given up [s].
+        closed_loop: run the recorded commands again.
+        keep: keep the recordings of diagnosed sets.
+    """
+
+    out: Path
+    label: str = "results"
+    jobs: int = 1
+    cpu_s: int = 600
+    closed_loop: bool = True
+    keep: bool = True
+
+    @property
+    def path(self) -> Path:
+        """Results, a JSON line each."""
+        return self.out / f"{self.label}.jsonl"
+
+
+def simulate_all(requests: Sequence[SealedSet], how: How) -> None:
     """Simulate what is not there yet; what cannot be simulated is listed in ``not_simulated.jsonl``."""
-    failed = {line["key"] for line in store.read(out / "not_simulated.jsonl")}
-    todo = [r for r in requests if r.key not in failed and not store.is_simulated(r, out)]
-    apart(todo, lambda request: _simulate(request, out), jobs)
+    failed = {line["key"] for line in store.read(how.out / "not_simulated.jsonl")}
+    todo = [r for r in requests if r.key not in failed and not store.is_simulated(r, how.out)]
+    apart(todo, lambda request: _simulate(request, how.out), how.jobs)
+
+
+def diagnose_all(requests: Sequence[SealedSet], how: How) -> None:
+    """Diagnose what was simulated and has no result of this label yet."""
+    finished = {line["key"] for line in store.read(how.path)}
+    todo = [r for r in requests if r.key not in finished and store.is_simulated(r, how.out)]
+    apart(todo, lambda request: _diagnose(request, how), how.jobs)
+
+
+def simulate_and_diagnose(requests: Sequence[SealedSet], how: How) -> None:
+    """Set by set, so that a campaign that is cut short has verdicts on what it simulated."""
+    each = replace(how, jobs=1)
+
+    def work(request: SealedSet) -> None:
+        simulate_all([request], each)  # in a process of its own: its memory is none of the diagnosis'
+        diagnose_all([request], each)
+
+    apart(requests, work, how.jobs)
+
+
+def change_settings(requests: Sequence[SealedSet], how: How) -> None:
+    """Every other set with ten settings of the engine halved, the others with them doubled, each by the rows alone."""
+    done = {line["key"] for line in store.read(how.path)}
+    for request in requests:
+        simulate_all([request], how)
+        changes: Iterator[tuple[str, Any]] = changed_settings(
+            requests[0].seed, 2.0 if request.seed % 2 else 0.5
+        )
+        for words, settings in [(AS_THEY_ARE, None), *changes]:
+            key = f"{request.key}, {words}"
+            if key not in done:
+                apart([request], lambda one: _changed(one, how, key, words, settings), 1)  # noqa: B023
+
+
+def _changed(request: SealedSet, how: How, key: str, words: str, settings: Any) -> None:
+    with patch.object(diagnosis, "SETTINGS", settings or diagnosis.SETTINGS):
+        _diagnose(request, how, {"key": key, "change": words}, closed_loop=False)
 
 
 def _simulate(request: SealedSet, out: Path) -> None:
@@ -37,54 +111,65 @@ def _simulate(request: SealedSet, out: Path) -> None:
     print(f"{request.key}: {said}", flush=True)
 
 
-def diagnose_all(
-    requests: Sequence[SealedSet], out: Path, label: str, jobs: int, *, closed_loop: bool, keep: bool
+def _diagnose(
+    request: SealedSet, how: How, more: dict[str, Any] | None = None, *, closed_loop: bool | None = None
 ) -> None:
-    """Diagnose what was simulated and has no result of this label yet."""
-    path = out / f"{label}.jsonl"
-    finished = {line["key"] for line in store.read(path)}
-    todo = [r for r in requests if r.key not in finished and store.is_simulated(r, out)]
-    apart(todo, lambda request: _diagnose(request, out, path, closed_loop=closed_loop, keep=keep), jobs)
-
-
-def simulate_and_diagnose(
-    requests: Sequence[SealedSet], out: Path, label: str, jobs: int, *, closed_loop: bool, keep: bool
-) -> None:
-    """Set by set, so that a campaign that is cut short has verdicts on what it simulated."""
-    path = out / f"{label}.jsonl"
-    failed = {line["key"] for line in store.read(out / "not_simulated.jsonl")}
-    finished = {line["key"] for line in store.read(path)}
-
-    def work(request: SealedSet) -> None:
-        if not store.is_simulated(request, out):
-            # In a process of its own: its memory is none of the diagnosis'.
-            apart([request], lambda one: _simulate(one, out), 1)
-        if store.is_simulated(request, out):
-            _diagnose(request, out, path, closed_loop=closed_loop, keep=keep)
-
-    apart([r for r in requests if r.key not in failed | finished], work, jobs)
-
-
-def _diagnose(request: SealedSet, out: Path, path: Path, *, closed_loop: bool, keep: bool) -> None:
     result: dict[str, Any] = {"key": request.key, "set": request.to_dict(), "engine": engine(), "error": None}
     excluded = request.names if request.kind == "left-out" else ()
+    loop = how.closed_loop if closed_loop is None else closed_loop
+    _stop_after(how.cpu_s)
     try:
-        result["verdict"] = verdict_on(store.recordings_of(request, out), excluded, closed_loop=closed_loop)
-        said = result["verdict"]["verdict"] + f", {result['verdict']['cpu_s']:.1f} s of CPU"
+        result["verdict"] = verdict_on(store.recordings_of(request, how.out), excluded, closed_loop=loop)
+        said = result["verdict"]["verdict"]
     except Exception:
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
-    result["truth"] = store.truth_of(request, out)  # opened after the verdict
-    if request.kind in ("unlisted", "outside", "unlisted-pairs") and not result["error"]:
-        scores = score_laws(result, store.recordings_of(request, out))
+    result |= costs() | (more or {})
+    result["truth"] = store.truth_of(request, how.out)  # opened after the verdict
+    if not result["error"]:
+        scores = score_laws(result, store.recordings_of(request, how.out))
         result["law_scores"] = [asdict(one) for one in scores]
-    store.append(path, result)
-    if not keep:
-        store.forget(request, out)
-    print(f"{request.key}: {said}", flush=True)
+    store.append(how.path, result)
+    if not how.keep:
+        store.forget(request, how.out)
+    print(f"{result['key']}: {said}, {result['cpu_s']:.1f} s of CPU", flush=True)
 
 
-def apart(requests: Sequence[SealedSet], work: Callable[[SealedSet], None], jobs: int) -> None:
+def verdict_on(
+    trials: Sequence[Path], excluded: Sequence[str] = (), *, closed_loop: bool = True
+) -> dict[str, Any]:
+    """What the diagnosis says, through its public face."""
+    values = mocobot.diagnose(trials, exclude=excluded, closed_loop=closed_loop).to_dict()
+    return {key: value for key, value in values.items() if key not in LEFT_AWAY}
+
+
+def costs() -> dict[str, float]:
+    """CPU time [s] and peak memory [GB] of this process so far."""
+    own, others = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    cpu = own.ru_utime + own.ru_stime + others.ru_utime + others.ru_stime
+    return {"cpu_s": cpu, "peak_gb": own.ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0) / 1e9}
+
+
+def engine() -> str:
+    """Which version of the diagnosis' code this is."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(discrepancy.__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:10]
+
+
+def _stop_after(cpu_s: int) -> None:
+    """Raise TimeoutError in this process once it has had so much CPU time."""
+
+    def stop(*_: object) -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (resource.RLIM_INFINITY,) * 2)
+        raise TimeoutError(f"more than {cpu_s} s of CPU")
+
+    signal.signal(signal.SIGXCPU, stop)
+    resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, resource.RLIM_INFINITY))
+
+
+def apart(requests: Sequence[T], work: Callable[[T], None], jobs: int) -> None:
     """Do the work for each in a forked process of its own, a number of them at a time."""
     running: set[int] = set()
     try:

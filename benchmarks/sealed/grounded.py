@@ -12,7 +12,7 @@ from mocobot.campaign.summary import match
 
 Item = Mapping[str, Any]
 LARGE = 4.0
-"""Tolerances that a drawn size must exceed to be a fault of its own: as the inference has it (``LEAST_SLAB``)."""
+"""Tolerances that a drawn size must exceed to be a fault of its own: a robot within four of them needs no repair."""
 NEAR, NEAR_SE = 0.25, 3.0
 """Share or standard errors by which a named size may be off the drawn one."""
 
@@ -23,22 +23,6 @@ def of_the_background(item: Item, truth: Item) -> bool:
     At ten times the tolerances one place in three has more of a kind than four tolerances: whoever names it is right.
     """
     return any(_is(item, effect, truth) for effect in truth["background"] if effect["cause"] == item["cause"])
-
-
-def law_of_the_background(item: Item, truth: Item) -> bool:
-    """Whether a stated law is a hysteresis of the spring that the background drew there, larger than any tolerance.
-
-    The catalogue's spring has a hysteresis of its own form; a play of the same torque is what that form leaves.
-    """
-    law, here = item["law"], (item.get("robot"), item.get("joint"))
-    if law["function"] != "play" or law["of"] != f"tau_{here[0]}_{here[1]}":
-        return False
-    most = LARGE * default_tolerances()["sea_hysteresis"]["friction_Nm"]
-    return any(
-        abs(effect["parameters"]["friction_Nm"]) > most
-        for effect in truth["background"]
-        if effect["cause"] == "sea_hysteresis" and (effect["robot"], effect["joint"]) == here
-    )
 
 
 def _is(item: Item, effect: Item, truth: Item) -> bool:

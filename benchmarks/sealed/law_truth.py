@@ -16,20 +16,17 @@ from sealed.unlisted.outside import SCRATCH_RAD, SLACK_RAD, SOFT_NM, YIELD_NM
 
 Item = Mapping[str, Any]
 Series = list[np.ndarray]
-EVERY_S = 0.2
-"""Between the instants at which two laws are compared."""
 
 
 def true_series(effect: Item, recordings: Sequence[Recording]) -> Series | None:
-    """One row a component and trial; None of an effect that is no function of what is recorded."""
+    """By trial one row a component, at all samples; None of an effect that is no function of what is recorded."""
     p, here = effect["parameters"], effect["law"]["place"]
     if effect["cause"] not in SHAPES:
         return None
     out = []
     for recording in recordings:
-        at = instants(recording)
         values = SHAPES[effect["cause"]](_Seen(recording, here), p)
-        out.append(np.atleast_2d(np.asarray(values, dtype=float))[:, at])
+        out.append(np.atleast_2d(np.asarray(values, dtype=float)))
     return out
 
 
@@ -112,10 +109,3 @@ SHAPES: dict[str, Callable[[_Seen, Item], np.ndarray]] = {
     ),
 }
 """What each does, from the signals at its place and its parameters."""
-
-
-def instants(recording: Recording) -> np.ndarray:
-    """Samples at which laws are compared; the ends of a trial are left out, as the diagnosis does."""
-    step = max(1, round(EVERY_S * recording.metadata.rate_hz))
-    trim = round(2.0 * recording.metadata.rate_hz)
-    return np.arange(trim, len(recording.time) - trim, step)

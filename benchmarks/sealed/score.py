@@ -1,4 +1,10 @@
-"""Hold a result against its truth."""
+"""Hold a result against its truth.
+
+What is hidden counts as right where its cause is named at its place, or is in the told set of what is named: the causes
+that hold 90 % together, unless something that no table lists is among them. What no table lists counts as right where
+it is located: ``unlisted`` at its place, as a function of its signal. A cause that was left out counts as right where
+something is told as unlisted, or the verdict stays open.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +14,7 @@ from typing import Any
 
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.summary import Score, family_of, match
+from scoring import SURE
 from sealed.grounded import of_the_background
 
 __all__ = ["HEALTHY", "Score", "Scored", "family_of", "score"]
@@ -24,15 +31,17 @@ class Scored:
     Attributes:
         result: what was scored.
         scores: one for every hidden effect.
-        extras: what was named besides and is not there.
-        grounded: what was named besides and is there, because the background drew it (``grounded``).
-        stated: probability and rightness of everything that was named with a probability, laws left out.
+        extras: listed causes that were named besides and are not there.
+        grounded: those that were named besides and are there, because the background drew them (``grounded``).
+        strangers: what is named as unlisted and is not located right.
+        stated: probability and rightness of everything that was named.
     """
 
     result: Item
     scores: tuple[Score, ...]
     extras: tuple[Item, ...]
     grounded: tuple[Item, ...]
+    strangers: tuple[Item, ...]
     stated: tuple[tuple[float, bool], ...]
 
     @property
@@ -41,37 +50,68 @@ class Scored:
         return self.result["verdict"]["verdict"]
 
     @property
-    def laws(self) -> tuple[Item, ...]:
-        """Laws that were stated."""
-        return tuple(cause for cause in self.result["verdict"]["causes"] if cause["cause"] == "law")
+    def laws(self) -> Sequence[Item]:
+        """How well each unlisted effect was told (``law_score.LawScore``)."""
+        return self.result["law_scores"]
+
+    @property
+    def right(self) -> int:
+        """How many of the hidden effects are told right."""
+        listed = sum(one.right for one in self.scores) + sum(bool(one["which"]) for one in self.laws)
+        open_ = self.verdict in ("unexplained", "partly_explained") or "unlisted" in self._named
+        return listed + (sum(map(_is_nobodys, self.scores)) if open_ else 0)
+
+    @property
+    def _named(self) -> set[str]:
+        return {cause["cause"] for cause in self.result["verdict"]["causes"]}
+
+    @property
+    def certain(self) -> int:
+        """How much was named with certainty and is not there."""
+        return sum(p >= SURE and not right for p, right in self.stated)
 
     @property
     def whole(self) -> bool:
-        """Whether everything hidden was named right, or left unexplained if nobody lists it, and nothing else was."""
-        if self.extras or (self.laws and all(score.listed for score in self.scores)):
+        """Whether everything hidden was told right, and nothing was named that is not there."""
+        if self.extras or self.strangers:
             return False
         if not self.scores:
             return self.verdict in HEALTHY or (self.verdict == "explained" and bool(self.grounded))
-        listed = [score for score in self.scores if score.listed]
-        return all(score.right for score in listed) and (
-            len(listed) == len(self.scores)
-            or self.verdict in ("unexplained", "partly_explained")
-            or bool(self.laws)
-        )
+        return self.right == len(self.scores)
 
 
 def score(result: Item) -> Scored:
     """Score one result that ended without an error."""
-    truth = result["truth"]
-    excluded = set(result["set"]["names"]) if result["set"]["kind"] == "left-out" else set()
-    causes = [cause for cause in result["verdict"]["causes"] if cause["cause"] != "law"]
+    truth, set_ = result["truth"], result["set"]
+    excluded = set(set_["names"]) if set_["kind"] == "left-out" else set()
+    causes = [_as_told(cause) for cause in result["verdict"]["causes"] if cause["cause"] != "unlisted"]
+    unlisted = [cause for cause in result["verdict"]["causes"] if cause["cause"] == "unlisted"]
     grounded = [c for c in causes if not _hidden(c, truth) and of_the_background(c, truth)]
     found = match(
-        [c for c in causes if c not in grounded], truth, _factors(result["set"], truth["effects"]),
+        [c for c in causes if c not in grounded], truth, _factors(set_, truth["effects"]),
         lambda cause: cause in CAUSES and cause not in excluded,
     )  # fmt: skip
-    there = [(float(c["probability"]), True) for c in grounded if c.get("probability") is not None]
-    return Scored(result, found.scores, found.extras, tuple(grounded), (*found.stated, *there))
+    located = {k for law in result["law_scores"] for k in law["which"]}
+    loose = any(map(_is_nobodys, found.scores))
+    told = [(c, loose or k in located) for k, c in enumerate(unlisted)]
+    strangers = [c for c, right in told if not right]
+    more = [(c, True) for c in grounded] + told
+    there = [(float(c["probability"]), right) for c, right in more if c.get("probability") is not None]
+    return Scored(
+        result, found.scores, found.extras, tuple(grounded), tuple(strangers), (*found.stated, *there)
+    )
+
+
+def _is_nobodys(one: Score) -> bool:
+    """Whether it is a cause that was left out: it may be told as unlisted wherever it shows."""
+    return not one.listed and not one.effect.get("law")
+
+
+def _as_told(cause: Item) -> Item:
+    """A cause whose told set names none if something unlisted is in it."""
+    if all(one["cause"] != "unlisted" for one in cause.get("told", ())):
+        return cause
+    return {**cause, "alternatives": [{**rival, "ambiguous": False} for rival in cause["alternatives"]]}
 
 
 def _hidden(item: Item, truth: Item) -> bool:

@@ -9,8 +9,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from estimator.recording.model import Recording
-from hidden.generator import PAYLOADS
-from hidden.schedule import Schedule
+from hidden.generator import PAYLOADS, HiddenSet
+from hidden.generator import generate as generate_hidden
+from hidden.logger import Logger
+from hidden.schedule import SHORT, Schedule
 from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.effects.grasp_flex import GraspFlex
@@ -39,11 +41,21 @@ Kind = Literal[
     "pairs",
     "triples",
     "pushes",
+    "sliding",
+    "logs",
+    "long",
     "left-out",
     "unlisted-pairs",
     "outside",
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+SLIDING = (
+    "joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play",
+    "driven_lugre", "driven_dahl", "gimbal_lugre", "gimbal_dahl", "bouc_wen_spring", "soft_play",
+)  # fmt: skip
+"""Stiction and play, in the catalogue's form and in others."""
+HOUR = Schedule(randoms=1, vias=2750, periodic_s=None, hold_s=None)
+"""One trial of an hour: 1.31 s a via."""
 SHARES = (0.4, 0.25, 0.2, 0.15)
 """Of the backgrounds where they are drawn."""
 
@@ -119,20 +131,26 @@ def plan(
     background = background or drawn
     names = (name,) if name else _names(kind, seed, background, rng, factor or SIZES[0])
     factors = tuple(factor or _size(one, background, rng) for one in names)
-    return SealedSet(kind, seed, background, names, factors, payload, timestep_s=timestep_s)
+    if kind == "logs":
+        turn, number = divmod(seed, len(PAYLOADS))
+        return SealedSet(
+            kind, seed, "x1", (), (), PAYLOADS[number], SHORT[turn % len(SHORT)], 0.5 * TIMESTEP_S
+        )
+    schedule = HOUR if kind == "long" else SCHEDULE
+    return SealedSet(kind, seed, background, names, factors, payload, schedule, timestep_s)
 
 
 def _names(
     kind: Kind, seed: int, background: Background, rng: np.random.Generator, least: float
 ) -> tuple[str, ...]:
-    if kind == "clean":
+    if kind in ("clean", "logs"):
         return ()
     if kind == "pushes":
         return ("pushes",)
     several = {"pairs": 2, "triples": 3, "unlisted-pairs": 2}.get(kind, 1)
     pools: dict[Kind, tuple[str, ...]] = {
         "single": CATALOGUE, "left-out": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "unlisted-pairs": NOWHERE,
-        "outside": BEYOND,
+        "sliding": SLIDING, "long": ("joint_friction", "push"), "outside": BEYOND,
     }  # fmt: skip
     found: list[str] = []
     while len(found) < several:
@@ -162,6 +180,8 @@ def generate(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
     Raises:
         TrialError: the physics of a trial cannot be trusted.
     """
+    if request.kind == "logs":
+        return _logged(request)
     nominal = build_team(request.payload)
     units = units_of(request.background, nominal.robots, request.rng("units"))
     trajectories = request.schedule.trajectories(nominal, request.rng("trajectories"))
@@ -190,6 +210,17 @@ def generate(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
         "gimbal_axes_1": gimbal_axes(nominal),
     }
     return recordings, truth
+
+
+def _logged(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
+    """A healthy team as any lab's logger has it, brought onto one grid as ``mocobot convert`` does it."""
+    logger = Logger.draw(np.random.default_rng([request.seed, *b"logger"]))
+    healthy = HiddenSet(
+        "clean", request.seed, payload=request.payload, schedule=request.schedule, timestep_s=request.timestep_s,
+        logger=logger,
+    )  # fmt: skip
+    recordings, sealed = generate_hidden(healthy)
+    return recordings, sealed.open({})
 
 
 def _places(effect: Effect) -> list[tuple[Any, ...]]:

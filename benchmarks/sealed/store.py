@@ -90,4 +90,4 @@ def read(path: Path) -> list[dict[str, Any]]:
     if not path.is_file():
         return []
     lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    return list({line["key"]: line for line in lines}.values())
+    return list({(line.get("part"), line["key"]): line for line in lines}.values())

@@ -3,253 +3,185 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 
+from discrepancy.team.estimates import errors
 from mocobot.campaign.summary import interval, reliability
-from sealed.backgrounds import BACKGROUNDS
-from sealed.grounded import law_of_the_background
-from sealed.payload_table import payload_header, payload_rows
-from sealed.score import HEALTHY, Score, Scored, family_of, score
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.truth import GroundTruth
+from scoring import AS_THEY_ARE, log_score, median_and_most
+from sealed.score import Score, Scored, score
 
-SIZES = ((0.0, 3.0, "2 to 3"), (3.0, 6.0, "3 to 6"), (6.0, np.inf, "6 and more"))
+SIZES = ((0.0, 3.0, "below 3 limits"), (3.0, np.inf, "3 limits and more"))
+ESTIMATES = {
+    "mass_percent": "mass [%]",
+    "com_mm": "centre of mass [mm]",
+    "principal_inertia_percent": "inertia [%]",
+}
+HEAD = (
+    "row", "sets", "hidden effects told", "and with formula", "sets wholly right", "falsely certain", "log score",
+    "chi2/n left", "CPU median, most [s]", "memory median, most [GB]", "errors",
+)  # fmt: skip
+Result = Mapping[str, Any]
 
 
-def tables(results: Iterable[Mapping[str, Any]]) -> str:
+def tables(results: Iterable[Result]) -> str:
     """All tables there are results for."""
     results = list(results)
     scored = [score(result) for result in results if not result["error"]]
-    by_kind: dict[str, list[Scored]] = {}
-    for one in scored:
-        by_kind.setdefault(one.result["set"]["kind"], []).append(one)
-    out = [_alarms(by_kind.get("clean", []))]
-    for kind, title in (("single", "One effect, catalogue's form"), ("forms", "One effect, other forms")):
-        sets = by_kind.get(kind, [])
-        out += [_by_size(title, sets), _by_name(title, sets)]
-    out.append(_several([one for kind in ("pairs", "triples", "pushes") for one in by_kind.get(kind, [])]))
-    nobody = [one for one in scored if one.scores and not any(s.listed for s in one.scores)]
-    out += [_nobodys("Not in the catalogue", nobody), _laws(scored), _reliability(scored)]
-    payloads = payload_rows(one.result for one in scored)
-    out += [
-        _markdown("Errors of the payload's estimate, before and after", payload_header(), payloads),
-        _cost(scored),
-    ]
-    if failed := [result for result in results if result["error"]]:
-        lines = Counter(result["error"].splitlines()[-1] for result in failed)
-        out.append(
-            "\n".join([f"{len(failed)} ended in an error:", *(f"- {n} x {e}" for e, n in lines.items())])
-        )
-    return "\n\n".join(table for table in out if table)
-
-
-def _share(hits: int, of: int) -> str:
-    if not of:
-        return "-"
-    low, high = interval(hits, of)
-    return f"{hits} ({100 * low:.0f} .. {100 * high:.0f} %)"
-
-
-def _background(one: Scored) -> str:
-    return one.result["set"]["background"]
-
-
-def _alarms(sets: Sequence[Scored]) -> str:
-    rows = []
-    for background in BACKGROUNDS:
-        own = [one for one in sets if _background(one) == background]
-        if not own:
-            continue
-        named = sum(bool(one.extras) for one in own)
-        not_healthy = sum(one.verdict not in HEALTHY for one in own)
-        what = Counter(item["cause"] for one in own for item in one.extras)
-        there = Counter(item["cause"] for one in own for item in one.grounded)
-        verdicts = Counter(one.verdict for one in own)
-        shares = [_share(n, len(own)) for n in (named, not_healthy)]
-        rows.append([background, len(own), *shares, _counts(verdicts), _counts(what), _counts(there)])
-    header = [
-        "robots", "sets", "a fault named", "a fault named, or unexplained", "verdicts", "named", "of the background",
-    ]  # fmt: skip
-    return _markdown("Nothing hidden", header, rows)
-
-
-def _by_size(title: str, sets: Sequence[Scored]) -> str:
-    rows = []
-    for background in (*BACKGROUNDS, None):
-        for low, high, label in (*SIZES, (0.0, np.inf, "all")):
-            own = [
-                one
-                for one in sets
-                if background in (None, _background(one)) and low <= one.scores[0].factor < high
-            ]
-            own = [one for one in own if one.scores[0].listed]
-            if own and (background is None or label != "all"):
-                rows.append([background or "**all**", label, *_line(own)])
-    return _markdown(title, ["robots", "size over the limit", *LINE], rows)
-
-
-def _by_name(title: str, sets: Sequence[Scored]) -> str:
-    rows = []
-    names = sorted({one.scores[0].effect["cause"] for one in sets if one.scores[0].listed})
-    for name in names:
-        own = [one for one in sets if one.scores[0].effect["cause"] == name]
-        scores = [one.scores[0] for one in own]
-        errors = [100.0 * s.error for s in scores if s.error is not None]
-        deviations = [z for s in scores for z in s.deviations]
-        rows.append(
-            [
-                name,
-                *_line(own),
-                f"{np.median(errors):.1f}, {max(errors):.1f}" if errors else "-",
-                f"{np.sqrt(np.mean(np.square(deviations))):.1f} ({len(deviations)})" if deviations else "-",
-            ]
-        )
-    header = ["hidden", *LINE, "error median, worst [%]", "rms of error over se (numbers)"]
-    return _markdown(f"{title}, by name", header, rows)
-
-
-LINE = ("sets", "family", "member", "and place", "missed", "named instead", "besides", "of the background")
-
-
-def _line(own: Sequence[Scored]) -> list[Any]:
-    scores = [one.scores[0] for one in own]
-    count: Callable[[str], int] = lambda name: sum(getattr(s, name) for s in scores)  # noqa: E731
-    instead = Counter(s.named for s in scores if s.named and not s.right)
-    besides = Counter(item["cause"] for one in own for item in one.extras)
-    there = Counter(item["cause"] for one in own for item in one.grounded)
-    missed = sum(s.named is None for s in scores)
-    shares = [count("family"), sum(s.member or s.ambiguous for s in scores), count("right")]
-    return [
-        len(own),
-        *(_share(n, len(own)) for n in shares),
-        missed,
-        _counts(instead),
-        _counts(besides),
-        _counts(there),
-    ]
-
-
-def _several(sets: Sequence[Scored]) -> str:
-    rows = []
-    for kind in ("pairs", "triples", "pushes"):
-        own = [one for one in sets if one.result["set"]["kind"] == kind]
-        if own:
-            right = [sum(s.right for s in one.scores) for one in own]
-            every = sum(n == len(one.scores) for n, one in zip(right, own, strict=True))
-            counts = Counter(right)
-            besides = Counter(item["cause"] for one in own for item in one.extras)
-            extra = sum(bool(one.extras) for one in own)
-            rows.append([kind, len(own), _share(every, len(own)), _counts(counts), extra, _counts(besides)])
-    header = ["sets", "number", "all right", "how many right: sets", "sets with a wrong one", "which"]
-    return _markdown("Several effects", header, rows)
-
-
-def _nobodys(title: str, sets: Sequence[Scored]) -> str:
-    """Effects that the catalogue does not have: by nature, or because their cause was left out."""
-    groups: dict[str, list[Scored]] = {}
-    for one in sets:
-        kind = one.result["set"]["kind"]
-        name = " + ".join(s.effect["cause"] for s in one.scores)
-        groups.setdefault(f"{kind}: {name}", []).append(one)
-    rows = [[name, *_fate(own)] for name, own in sorted(groups.items())]
-    for kind in sorted({one.result["set"]["kind"] for one in sets}):
-        own = [one for one in sets if one.result["set"]["kind"] == kind]
-        rows.append([f"**{kind}**", *_fate(own)])
-    header = [
-        "hidden",
-        "sets",
-        "verdicts",
-        "none named",
-        "in the family",
-        "outside",
-        "outside with over 50 %",
-        "named",
-    ]
-    return _markdown(title, header, rows)
-
-
-def _laws(scored: Sequence[Scored]) -> str:
-    """Laws stated of unlisted effects, and of sets that have none."""
-    rows, all_scores = [], [one.result for one in scored if "law_scores" in one.result]
-    for kind in sorted({result["set"]["kind"] for result in all_scores}):
-        sets = [result["law_scores"] for result in all_scores if result["set"]["kind"] == kind]
-        own = [score for each in sets for score in each]
-        stated = [score for score in own if score["stated"]]
-        sizes = [score["amplitude"] for score in own if score["amplitude"] is not None]
-        held = [score["held_out"] for score in stated if score["held_out"] is not None]
-        counts = [
-            _share(sum(bool(s[name]) for s in own), len(own))
-            for name in ("stated", "place", "variable", "formula")
-        ]
-        one_right = _share(sum(any(s["formula"] for s in each) for each in sets), len(sets))
-        size = f"{100 * np.median(sizes):.1f}, {100 * max(sizes):.0f}" if sizes else "-"
-        gain = f"{100 * np.median(held):.0f}, {100 * min(held):.0f}" if held else "-"
-        beside = sum(each[0]["beside"] > 0 for each in sets)
-        there = sum(each[0]["grounded"] > 0 for each in sets)
-        rows.append([kind, len(sets), len(own), *counts, one_right, size, gain, beside, there])
-    header = [
-        "", "sets", "unlisted effects", "a law stated", "place", "and signal", "and formula", "one of a set right",
-        "size off, median, most [%]", "gain held out over in sample, median, least [%]",
-        "sets with a wrong one besides", "with one of the background",
-    ]  # fmt: skip
-    text = [_markdown("Laws", header, rows)] if rows else []
-    others = [one for one in scored if "law_scores" not in one.result]
-    if others:
-        false = [[not law_of_the_background(law, one.result["truth"]) for law in one.laws] for one in others]
-        there = sum(bool(each) and not any(each) for each in false)
-        text.append(
-            f"A law stated where nothing unlisted was hidden: {_share(sum(map(any, false)), len(others))} of "
-            f"{len(others)}, and {there} where only hysteresis of the background was."
-        )
-    return "\n\n".join(text)
-
-
-def _fate(own: Sequence[Scored]) -> list[Any]:
-    none = inside = outside = sure = 0
-    for one in own:
-        families = {family_of(s.effect) for s in one.scores}
-        strangers = [item for item in one.extras if item["family"] not in families]
-        none += not one.extras
-        inside += bool(one.extras) and not strangers
-        outside += bool(strangers)
-        sure += any((item.get("probability") or 0.0) > 0.5 for item in strangers)
-    verdicts = Counter(one.verdict for one in own)
-    named = Counter(item["cause"] for one in own for item in one.extras)
-    return [len(own), _counts(verdicts), none, inside, outside, sure, _counts(named)]
-
-
-def _reliability(scored: Sequence[Scored]) -> str:
     stated = [pair for one in scored for pair in one.stated]
-    if not stated:
-        return ""
-    found, rows = reliability(stated), []
-    for one in found["bins"]:
-        right, mean = one["right"], one["mean"]
-        low, high = right["interval"]
-        label = f"{100 * one['low']:.0f} to {100 * one['high']:.0f} %"
-        inside = "yes" if low <= mean <= high else "no"
-        rows.append([label, right["of"], f"{100 * mean:.1f} %", _share(right["hits"], right["of"]), inside])
-    all_right = _share(found["right"], found["number"])
-    rows.append(["**all**", found["number"], "", all_right, f"Brier {found['brier']:.4f}"])
-    header = ["stated", "causes", "mean of it", "right", "within the band"]
-    return _markdown("Stated probabilities", header, rows)
+    each = [
+        _markdown("Rows", HEAD, [_line(name, own) for name, own in rows_of(results).items()]),
+        _markdown("Effects by name", NAMES, _by_name(scored)),
+        _reliability(stated),
+        _markdown("What the verdict is worth: median before -> after, sets in which it falls", WORTH, _worth(scored)),
+        "\n".join(_changes(results)),
+        "\n".join(f"{n} x {error}" for error, n in _failures(results).items()),
+    ]  # fmt: skip
+    return "\n\n".join(table for table in each if table)
 
 
-def _cost(scored: Sequence[Scored]) -> str:
-    if not scored:
-        return ""
-    cpu = np.array([one.result["verdict"]["cpu_s"] for one in scored])
-    memory = np.array([one.result["verdict"]["peak_gb"] for one in scored])
-    engines = ", ".join(sorted({one.result["engine"] for one in scored}))
-    whole = sum(one.whole for one in scored)
-    costs = [f"{np.median(cpu):.1f}, {cpu.max():.1f}", f"{np.median(memory):.2f}, {memory.max():.2f}"]
-    row = [len(scored), _share(whole, len(scored)), *costs, engines]
-    header = ["sets", "wholly right", "CPU median, most [s]", "memory median, most [GB]", "engines"]
-    return _markdown("All sets", header, [row])
+def rows_of(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Results by what is hidden, its size and the robots, from the whole to the parts; a set may be in several."""
+    out: dict[str, list[Result]] = {}
+    for result in sorted(results, key=lambda one: (one.get("change", ""), one["set"]["kind"])):
+        kind, background = result["set"]["kind"], result["set"]["background"]
+        names = [result["change"]] if "change" in result else [kind, f"{kind}, {background}"]
+        if "change" not in result:
+            least = min(result["set"]["factors"], default=np.nan)
+            names += [f"{kind}, {words}" for low, high, words in SIZES if low <= least < high]
+            names += (
+                ["uncalibrated with a fault"]
+                if background == "uncalibrated" and result["set"]["names"]
+                else []
+            )
+        for name in names:
+            out.setdefault(name, []).append(result)
+    return out | {"all": list(results)}
 
 
-def misses(results: Iterable[Mapping[str, Any]]) -> str:
+def _line(name: str, own: Sequence[Result]) -> list[Any]:
+    good = [score(result) for result in own if not result["error"]]
+    hidden = sum(len(result.get("truth", {}).get("effects", ())) for result in own)
+    laws = [law for one in good for law in one.laws]
+    stated = [pair for one in good for pair in one.stated]
+    left = [one.result["verdict"]["residual"]["chi2_per_n"] for one in good]
+    return [
+        name, len(own),
+        f"{sum(one.right for one in good)} of {hidden}" if hidden else "-",
+        f"{sum(bool(law['which'] and law['formula']) for law in laws)} of {len(laws)}" if laws else "-",
+        _share(sum(one.whole for one in good), len(own)),
+        sum(one.certain for one in good),
+        f"{log_score(stated):.3f} ({len(stated)})" if stated else "-",
+        f"{np.median(left):.2f}" if left else "-",
+        median_and_most(result["cpu_s"] for result in own),
+        median_and_most((result["peak_gb"] for result in own), 2),
+        len(own) - len(good),
+    ]  # fmt: skip
+
+
+NAMES = (
+    "hidden",
+    "sets",
+    "told",
+    "named instead",
+    "besides",
+    "error median, worst [%]",
+    "rms of error over se",
+)
+
+
+def _by_name(scored: Sequence[Scored]) -> list[list[Any]]:
+    groups: dict[str, list[tuple[Scored, Score]]] = {}
+    for one in scored:
+        for each in one.scores:
+            groups.setdefault(each.effect["cause"], []).append((one, each))
+    rows = []
+    for name, own in sorted(groups.items()):
+        off = [100.0 * each.error for _, each in own if each.error is not None]
+        z = [value for _, each in own for value in each.deviations]
+        rows.append([
+            name, len(own),
+            sum(each.right if each.listed else one.whole for one, each in own),
+            _counts(each.named for _, each in own if each.named and not each.right),
+            _counts(item["cause"] for one, _ in own for item in (*one.extras, *one.strangers)),
+            median_and_most(off),
+            f"{np.sqrt(np.mean(np.square(z))):.1f} ({len(z)})" if z else "-",
+        ])  # fmt: skip
+    return rows
+
+
+def _reliability(stated: Sequence[tuple[float, bool]]) -> str:
+    found = reliability(stated)
+    rows = [
+        [f"{100 * b['low']:.0f} to {100 * b['high']:.0f} %", b["right"]["of"], f"{100 * b['mean']:.1f} %",
+         _share(b["right"]["hits"], b["right"]["of"])]
+        for b in found["bins"]
+    ]  # fmt: skip
+    return _markdown("Stated probabilities", ("stated", "causes", "mean of it", "right"), rows)
+
+
+WORTH = ("row", "sets", "response chi2/n", "of its excess removed", *ESTIMATES.values())
+
+
+def _worth(scored: Sequence[Scored]) -> list[list[Any]]:
+    rows = []
+    by_kind = rows_of([one.result for one in scored])
+    for kind in sorted({one.result["set"]["kind"] for one in scored}):
+        gains = [
+            (r["verdict"]["gain"], r["set"]["payload"]) for r in by_kind.get(kind, ()) if r["verdict"]["gain"]
+        ]
+        held = [g["held_out"] for g, _ in gains if g["held_out"]["before"] and g["held_out"]["after"]]
+        pairs = [[each[name]["chi2_per_n"] for name in ("before", "after")] for each in held]
+        removed = [g["removed"]["share"] for g, _ in gains if g["removed"]]
+        off = [
+            [errors(g["estimates"][w], _truth(payload)) for w in ("before", "after")] for g, payload in gains
+        ]
+        if gains:
+            rows.append([
+                kind, len(gains), _before_after(pairs), f"{np.median(removed):.0%}" if removed else "-",
+                *(_before_after([[e[name] for e in pair] for pair in off]) for name in ESTIMATES),
+            ])  # fmt: skip
+    return rows
+
+
+@cache
+def _truth(payload: str) -> dict[str, Any]:
+    return GroundTruth.of(build_team(payload)).to_dict()
+
+
+def _before_after(pairs: Sequence[Sequence[float]]) -> str:
+    if not pairs:
+        return "-"
+    before, after = np.transpose(pairs)
+    return f"{np.median(before):.2g} -> {np.median(after):.2g}, {int(np.sum(after < before))}"
+
+
+def _changes(results: Sequence[Result]) -> Iterator[str]:
+    """How many verdicts name something else with a setting changed."""
+    named = {
+        (result["key"].partition(",")[0], result["change"]):
+        sorted((c["cause"], c["place"]) for c in result["verdict"]["causes"])
+        for result in results if "change" in result and not result["error"]
+    }  # fmt: skip
+    for words in sorted({words for _, words in named} - {AS_THEY_ARE}):
+        both = [
+            (key, own)
+            for (key, change), own in named.items()
+            if change == words and (key, AS_THEY_ARE) in named
+        ]
+        yield f"{words}: {sum(named[key, AS_THEY_ARE] != own for key, own in both)} of {len(both)} verdicts change"
+
+
+def _failures(results: Iterable[Result]) -> Counter[str]:
+    return Counter(result["error"].splitlines()[-1] for result in results if result["error"])
+
+
+def misses(results: Iterable[Result]) -> str:
     """Every set that is not wholly right, in a line: what was hidden, what was named."""
     lines = []
     for result in results:
@@ -258,31 +190,33 @@ def misses(results: Iterable[Mapping[str, Any]]) -> str:
             continue
         one = score(result)
         if not one.whole:
-            named = [_named(item) for item in one.result["verdict"]["causes"]]
-            hidden = [_hidden(s) for s in one.scores]
-            left = one.result["verdict"]["residual"]["chi2_per_n"]
-            lines.append(
-                f"{result['key']}: hidden {'; '.join(hidden) or 'nothing'} | {one.verdict}: "
-                f"{'; '.join(named) or 'nothing'} | chi2/n {left:.2f}"
-            )
+            hidden = "; ".join(_hidden(each) for each in one.scores) or "nothing"
+            named = "; ".join(_named(item) for item in result["verdict"]["causes"]) or "nothing"
+            left = result["verdict"]["residual"]["chi2_per_n"]
+            lines.append(f"{result['key']}: hidden {hidden} | {one.verdict}: {named} | chi2/n {left:.2f}")
     return "\n".join(lines)
 
 
-def _named(item: Mapping[str, Any]) -> str:
-    where = "/".join(str(item[key]) for key in ("cause", "robot", "joint") if item.get(key) is not None)
-    p = item.get("probability")
-    return where if p is None else f"{where} ({100 * p:.0f} %)"
+def _named(item: Result) -> str:
+    law = item.get("law") or {}
+    words = [item["name"], law.get("formula", ""), f"{100 * (item['probability'] or 0.0):.0f} %"]
+    return ", ".join(word for word in words if word)
 
 
 def _hidden(one: Score) -> str:
     effect, answer = one.effect, one.effect["answer"]
     where = "/".join(str(effect[key]) for key in ("robot", "joint") if effect.get(key) is not None)
     said = f" = {answer['cause']}" if answer["cause"] != effect["cause"] else ""
-    return f"{effect['cause']}{said} at {where or 'the payload'} x{one.factor:.3g}{'' if one.right else ' (not found)'}"
+    return f"{effect['cause']}{said} at {where or 'the payload'} x{one.factor:.3g}"
 
 
-def _counts(counter: Mapping[Any, int]) -> str:
-    return ", ".join(f"{name} {n}" for name, n in sorted(counter.items(), key=str)) or "-"
+def _share(hits: int, of: int) -> str:
+    low, high = interval(hits, of)
+    return f"{hits} ({100 * low:.0f} .. {100 * high:.0f} %)"
+
+
+def _counts(words: Iterable[str]) -> str:
+    return ", ".join(f"{name} {n}" for name, n in sorted(Counter(words).items())) or "-"
 
 
 def _markdown(title: str, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

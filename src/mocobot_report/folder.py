@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from discrepancy.channel import Channel
-from discrepancy.result.lines import format_diagnosis
 from discrepancy.result.read import FORMAT as DIAGNOSIS
-from discrepancy.result.read import parse_diagnosis
+from discrepancy.result.read import as_now, parse_diagnosis
 from discrepancy.result.report import format_verdict
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
@@ -205,10 +204,8 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
     parse_diagnosis(values, path)
     with complete(path, "not a complete diagnosis"):
         # The text touches most keys that a report has to show.
-        if values.get("machine") == "joints" or values["prior_odds"] is None:
-            format_verdict(values, verbose=True)
-        else:
-            format_diagnosis(values)
+        values = as_now(values)
+        format_verdict(values, verbose=True)
     file = path.parent / RESIDUALS
     traces, channels = load_traces(file) if file.is_file() else ([], [])
     if traces and [trace.name for trace in traces] != list(values["recordings"]):

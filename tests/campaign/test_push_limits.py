@@ -1,26 +1,22 @@
-"""Limits of pushes, where sensors are so good that only the tolerance of a push matters."""
+"""Limits of pushes are those of the table that other campaigns hide by."""
 
-import numpy as np
 import pytest
 
-from discrepancy.team.linear.adjust import SignalNoise
-from discrepancy.team.linear.start import Sensed
-from discrepancy.team.rig import TeamRig
+from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.tolerances import default_tolerances
-from mocobot.campaign.limits import GAIN, push_limits
-from team_case import exact
+from hidden.generator import HiddenSet, generate
+from hidden.limits import LIMITS
+from hidden.schedule import Schedule
+from mocobot.campaign.limits import FORCE, push_limits
 
 
-def sharp(x):
-    """Rows as sensors with a hundred thousandth of the unit would tell them."""
-    return 1e5 * x
-
-
-def test_no_push_within_its_tolerance_is_told():
-    case, tolerances = exact(), default_tolerances()
-    sensed = Sensed(None, (sharp,), (SignalNoise((np.zeros((3, 21, 18)),) * 2),))
-    rig = TeamRig((case.carried.recording,), sensed, (case.linear,), tolerances, frozenset())
-    (limit,) = push_limits(rig, tolerances["push"])
-    assert limit["trial"] == 1
-    for name, size in limit["parameters"].items():
-        assert size == pytest.approx(np.sqrt(GAIN) * tolerances["push"][name], rel=1e-3)
+@pytest.mark.slow
+def test_a_push_is_noticed_from_the_size_that_the_table_has():
+    schedule = Schedule(randoms=1, vias=8, periodic_s=10.0, hold_s=None)
+    recordings, _ = generate(HiddenSet("clean", 6, payload="b", schedule=schedule, timestep_s=1e-3))
+    found = diagnose_team(recordings, closed_loop=False, laws="never")
+    limits = push_limits(found.outcome, default_tolerances()["push"])
+    assert [limit["trial"] for limit in limits] == [1, 2]
+    for limit in limits:
+        for name in FORCE:
+            assert limit["parameters"][name] == pytest.approx(LIMITS["push"][name], rel=0.5)

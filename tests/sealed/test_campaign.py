@@ -8,20 +8,18 @@ import pytest
 
 from discrepancy.team.causes import CAUSES
 from hidden.schedule import Schedule
+from mocobot.campaign.summary import interval
 from mocobot_sim.effects import EFFECTS
-from mocobot_sim.scene.scene import build_team
-from mocobot_sim.trial.truth import GroundTruth
-from sealed import campaign, measure, store
+from scoring import AS_THEY_ARE, log_score
+from sealed import campaign, store
 from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
-from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest, over_nominal
+from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
 from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
-from sealed.measure import Bench, limits_of
-from sealed.payload_table import payload_rows
 from sealed.registry import FORMS, LISTED, UNLISTED
 from sealed.score import score
 from sealed.sets import KINDS, generate, plan
-from sealed.tables import interval, misses, tables
+from sealed.tables import misses, tables
 
 TINY = Schedule(randoms=1, vias=1, periodic_s=None, hold_s=None)
 
@@ -71,27 +69,6 @@ def test_limits_follow_the_background():
     x1, x3, x10, uncalibrated = (limit_over_nominal("payload_tether", b) for b in BACKGROUNDS)
     assert x1 < x3 < x10
     assert x1 < uncalibrated
-
-
-@pytest.mark.slow
-def test_limits_of_cables_are_those_of_their_traces():
-    """From the simulation, whatever a diagnosis says; with the places that the tables were made with."""
-    benches = [Bench.of(payload) for payload in ("b", "c")]
-    for name, found in limits_of(["payload_tether", "stiffening_strap"], benches, draws=8).items():
-        for background, over in found.items():
-            table = over_nominal(name, background) / over_nominal(name, "x1")
-            assert over == pytest.approx(table, rel=0.1), (name, background)
-
-
-@pytest.mark.parametrize(
-    ("names", "draws", "said"),
-    [((), 8, "no name"), (("tehter",), 8, "tehter"), (("tether",), 0, "--draws 0")],
-)
-def test_limits_of_what_there_is_not_are_refused(names, draws, said, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        measure.main(names, draws)
-    assert stopped.value.code == 2
-    assert capsys.readouterr().err.startswith(f"measure.py: {said};")
 
 
 @pytest.mark.slow
@@ -173,25 +150,31 @@ def _effect(cause="joint_friction", robot=2, joint=1, **known):
     }
 
 
-def _named(cause="joint_friction", robot=2, joint=1, probability=None, alternatives=(), **values):
+def _named(cause="joint_friction", robot=2, joint=1, probability=None, alternatives=(), told=(), **values):
     values = values or {"coulomb_Nm": (0.051, 0.001), "viscous_Nms_per_rad": (0.02, 0.002)}
     parameters = {name: {"value": value, "se": se} for name, (value, se) in values.items()}
     return {
         "cause": cause, "family": CAUSES[cause].family, "robot": robot, "joint": joint, "parameters": parameters,
-        "alternatives": list(alternatives), **({} if probability is None else {"probability": probability}),
+        "alternatives": list(alternatives), "probability": probability, "name": cause, "told": list(told),
     }  # fmt: skip
 
 
 def _result(
-    effects, named, verdict="explained", kind="single", factor=4.0, names=None, background="x1", drawn=()
+    effects,
+    named,
+    verdict="explained",
+    kind="single",
+    factor=4.0,
+    names=None,
+    background="x1",
+    drawn=(),
+    laws=(),
 ):
     names = [effect["cause"] for effect in effects] if names is None else names
     return {
-        "key": f"1_{kind}", "engine": "e", "error": None,
+        "key": f"1_{kind}", "engine": "e", "error": None, "cpu_s": 10.0, "peak_gb": 0.5, "law_scores": list(laws),
         "set": {"kind": kind, "names": names, "factors": [factor] * len(names), "background": background},
-        "verdict": {
-            "verdict": verdict, "causes": named, "cpu_s": 10.0, "peak_gb": 0.5, "residual": {"chi2_per_n": 1.0}
-        },
+        "verdict": {"verdict": verdict, "causes": named, "gain": None, "residual": {"chi2_per_n": 1.0}},
         "truth": {
             "effects": effects, "background": list(drawn), "gimbal_axes_1": np.tile(np.eye(3), (3, 1, 1)).tolist()
         },
@@ -301,56 +284,91 @@ def test_what_a_wide_background_drew_is_neither_an_alarm_nor_a_miss():
     assert not parallel.grounded
 
 
-def test_what_nobody_lists_should_stay_unexplained():
-    effect = _effect() | {"cause": "cross_talk"}
+def test_a_told_set_that_something_unlisted_is_in_names_none():
+    rival = {"cause": "joint_friction", "robot": 2, "joint": 1, "ambiguous": True}
+    told = [{"cause": "sea_hysteresis"}, {"cause": "joint_friction"}]
+    named = _named("sea_hysteresis", alternatives=[rival], told=told, probability=0.6)
+    assert score(_result([_effect()], [named])).whole
+    named = _named(
+        "sea_hysteresis", alternatives=[rival], told=[*told, {"cause": "unlisted"}], probability=0.6
+    )
+    assert not score(_result([_effect()], [named])).whole
+
+
+UNLISTED_ONE = {"cause": "unlisted", "name": "something unlisted", "probability": 0.95}
+
+
+def test_what_nobody_lists_is_right_where_it_is_located():
+    effect = _effect() | {"cause": "cross_talk", "law": {"of": "tau reading"}}
     effect["answer"] = {"cause": None, "robot": 2, "joint": 1, "known": {}}
-    assert score(_result([effect], [], "unexplained", "unlisted")).whole
-    assert not score(_result([effect], [], "consistent", "unlisted")).whole
-    assert not score(_result([effect], [_named()], "explained", "unlisted")).whole
+    for which, named, whole, certain in (
+        ((0,), [UNLISTED_ONE], True, 0),
+        ((), [UNLISTED_ONE], False, 1),
+        ((), [], False, 0),
+        ((), [_named(probability=0.95)], False, 1),
+        ((0,), [UNLISTED_ONE, _named(probability=0.5)], False, 0),
+        ((0, 1), [UNLISTED_ONE, UNLISTED_ONE], True, 0),
+        ((0,), [UNLISTED_ONE, UNLISTED_ONE], False, 1),
+    ):
+        law = {"which": which, "formula": False}
+        scored = score(_result([effect], named, "unexplained", "unlisted", laws=[law]))
+        assert (scored.whole, scored.certain, scored.right) == (whole, certain, int(bool(which)))
+
+
+def test_something_unlisted_beside_a_listed_cause_is_wrong():
+    scored = score(_result([_effect()], [_named(probability=0.99), UNLISTED_ONE], "partly_explained"))
+    assert scored.scores[0].right
+    assert not scored.whole
+    assert scored.certain == 1
 
 
 def test_a_left_out_cause_is_nobodys():
-    result = _result([_effect()], [_named("sea_hysteresis", probability=0.4)], kind="left-out")
-    scored = score(result)
-    assert not scored.scores[0].listed
-    text = tables([result])
-    assert "| left-out: joint_friction | 1 | explained 1 | 0 | 1 | 0 | 0 | sea_hysteresis 1 |" in text
+    """It is right where something is told as unlisted, or the verdict stays open."""
+    wrong = _result([_effect()], [_named("sea_hysteresis", probability=0.4)], kind="left-out")
+    assert not score(wrong).scores[0].listed
+    assert not score(wrong).whole
+    assert score(_result([_effect()], [UNLISTED_ONE], kind="left-out")).whole
+    assert score(_result([_effect()], [], "unexplained", kind="left-out")).whole
 
 
 def test_tables_and_misses_of_a_small_campaign():
     results = [
         _result([], [], "consistent", "clean", names=[]),
-        _result([], [_named()], "explained", "clean", names=[], background="x10"),
+        _result([], [_named(probability=0.5)], "explained", "clean", names=[], background="x10"),
         *(_result([_effect()], [_named(probability=p)]) for p in (0.6, 0.8, 0.95, 0.95)),
-        _result([_effect()], [_named(joint=3, probability=0.65)]),
-        _result([_effect()], [], "consistent", factor=2.0) | {"error": "Traceback\nValueError: no"},
+        _result([_effect()], [_named(joint=3, probability=0.95)], background="uncalibrated"),
+        _result([_effect()], [], "consistent", factor=2.0)
+        | {"error": "Traceback\nValueError: no", "cpu_s": 70.0},
     ]
     text = tables(results)
-    assert "| x10 | 1 | 1 (2 .. 100 %) | 1 (2 .. 100 %) | explained 1 | joint_friction 1 |" in text
     assert (
-        "| x1 | 3 to 6 | 5 | 5 (48 .. 100 %) | 5 (48 .. 100 %) | 4 (28 .. 99 %) | 0 | joint_friction 1 | - |"
-        in text
+        "| clean | 2 | - | - | 1 (1 .. 99 %) | 0 | -0.693 (1) | 1.00 | 10.0, 10.0 | 0.50, 0.50 | 0 |" in text
     )
-    assert "| 50 to 70 % | 2 | 62.5 % | 1 (1 .. 99 %) | yes |" in text
-    brier = np.mean([0.4**2, 0.2**2, 0.05**2, 0.05**2, 0.65**2])
-    assert f"Brier {brier:.4f}" in text
+    told = np.mean(np.log([0.6, 0.8, 0.95, 0.95, 0.05]))
+    single = f"| single | 6 | 4 of 6 | - | 4 (22 .. 96 %) | 1 | {told:.3f} (5) | 1.00 | 10.0, 70.0 | 0.50, 0.50 | 1 |"
+    assert single in text
+    assert "| uncalibrated with a fault | 1 | 0 of 1 |" in text
+    assert "| 50 to 70 % | 2 | 55.0 % | 1 (1 .. 99 %) |" in text
     assert "1 x ValueError: no" in text
     assert len(misses(results).splitlines()) == 3
 
 
-def test_payloads_are_held_against_the_ones_that_were_simulated():
-    """One estimate that is the truth, and one that is 2 % too heavy and 3 mm off."""
-    truth = GroundTruth.of(build_team("a")).to_dict()
-    x, *others = truth["p_1c_m"]
-    worse = truth | {"mass_kg": 1.02 * truth["mass_kg"], "p_1c_m": [x + 3e-3, *others]}
-    results = [_result([], [], "miscalibrated", "clean", names=[], background="x3") for _ in range(3)]
-    for result in results:
-        result["set"]["payload"] = "a"
-        result["verdict"] = result["verdict"] | {"gain": {"estimates": {"before": worse, "after": truth}}}
-    results[0]["verdict"]["gain"] = {"estimates": {"before": truth, "after": worse}}
-    results.append(_result([], [], "consistent", "clean", names=[]))  # without estimates
-    ((name, sets, mass, com, *_),) = payload_rows(results)
-    assert (name, sets, mass, com) == ("x3", "3", "2 -> 0, 2", "3 -> 0, 2")
+def test_verdicts_that_a_setting_changes_are_counted():
+    named = [_named() | {"place": "robot 2, joint 1"}]
+    results = [
+        _result([_effect()], causes) | {"key": f"{key}, {words}", "change": words}
+        for key, words, causes in (
+            ("1", AS_THEY_ARE, named), ("1", "apart 3 -> 6", []), ("2", AS_THEY_ARE, []), ("2", "apart 3 -> 6", [])
+        )
+    ]  # fmt: skip
+    text = tables(results)
+    assert "apart 3 -> 6: 1 of 2 verdicts change" in text
+    assert "| apart 3 -> 6 | 2 | 0 of 2 |" in text
+
+
+def test_what_is_wrong_with_certainty_costs_no_more_than_a_thousandth():
+    assert log_score([(1.0, False)]) == pytest.approx(np.log(1e-3))
+    assert log_score([(0.8, True), (0.3, False)]) == pytest.approx(np.mean(np.log([0.8, 0.7])))
 
 
 def test_interval_of_none_is_clopper_and_pearsons():
@@ -366,7 +384,46 @@ def test_simulation_and_diagnosis_are_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(campaign.store, "is_simulated", lambda request, out: done.exists())
     monkeypatch.setattr(campaign, "_simulate", lambda request, out: note("simulate"))
     monkeypatch.setattr(campaign, "_diagnose", lambda *rest, **how: note("diagnose"))
-    campaign.simulate_and_diagnose([plan("clean", 0)], tmp_path, "results", 1, closed_loop=False, keep=True)
+    campaign.simulate_and_diagnose([plan("clean", 0)], campaign.How(tmp_path))
     (first, one), (second, other) = (line.split() for line in done.read_text().splitlines())
     assert (first, second) == ("simulate", "diagnose")
     assert len({one, other, str(os.getpid())}) == 3
+
+
+def test_a_diagnosis_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
+    """It has a result, and the sets after it have theirs."""
+
+    def verdict_on(trials, excluded, *, closed_loop):
+        while True:
+            sum(range(10000))
+
+    truth = _result([], [])["truth"]
+    monkeypatch.setattr(campaign, "verdict_on", verdict_on)
+    monkeypatch.setattr(campaign.store, "is_simulated", lambda request, out: True)
+    monkeypatch.setattr(campaign.store, "truth_of", lambda request, out: truth)
+    how = campaign.How(tmp_path, cpu_s=1)
+    campaign.diagnose_all([plan("clean", 0), plan("clean", 1)], how)
+    results = store.read(how.path)
+    assert len(results) == 2
+    assert all("TimeoutError" in result["error"] for result in results)
+    assert all(result["cpu_s"] > 0.9 for result in results)
+
+
+def test_settings_are_halved_and_doubled_one_by_one(tmp_path, monkeypatch):
+    seen = tmp_path / "seen"
+    own = campaign.diagnosis.SETTINGS
+    monkeypatch.setattr(campaign, "simulate_all", lambda requests, how: None)
+
+    def diagnosed(request, how, more, *, closed_loop):
+        now = campaign.diagnosis.SETTINGS
+        changed = [n for n, x in vars(now).items() if x != getattr(own, n)]
+        seen.open("a").write(f"{request.seed} {more['change']} {changed}\n")
+
+    monkeypatch.setattr(campaign, "_diagnose", diagnosed)
+    campaign.change_settings([plan("clean", 0), plan("clean", 1)], campaign.How(tmp_path))
+    lines = seen.read_text().splitlines()
+    assert len(lines) == 22
+    assert [line.endswith("[]") for line in lines].count(True) >= 2
+    first, other = (line.split() for line in (lines[1], lines[12]))
+    assert first[1] == other[1]
+    assert float(first[4]) < float(first[2]) < float(other[4])

@@ -115,3 +115,23 @@ def probability_words(probability: float) -> str:
 def wrapped(text: str, indent: str = "    ") -> Sequence[str]:
     """Lines of at most ``WIDTH`` columns."""
     return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
+    return [entry for entry in strongest if entry["nats"] >= 1.0]
+
+
+def label(entry: Mapping[str, Any]) -> str:
+    """An entry in words, for a plot."""
+    if entry["at"] is None:
+        return name_of(entry)
+    return f"{kind_of(entry)} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
+
+
+def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:
+    """What an entry is to the named causes: ``named``, of their ``family``, or ``other``."""
+    place = ("cause", "robot", "joint")
+    if any(all(entry[key] == cause[key] for key in place) for cause in causes):
+        return "named"
+    return "family" if any(entry["family"] == cause["family"] for cause in causes) else "other"

@@ -83,6 +83,35 @@ def read_diagnosis(folder: Path) -> WrittenDiagnosis:
     return parse_diagnosis(read_json(path, "a diagnosis"), path)
 
 
+def as_now(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a file as they are written now: versions before had fewer keys, and a team had no told sets."""
+
+    def finding(entry: Mapping[str, Any]) -> dict[str, Any]:
+        rivals = entry.get("alternatives", [])
+        told = [x for x in (entry, *rivals) if x is entry or x.get("ambiguous")]
+        new: dict[str, Any] = {
+            "members": [],
+            "event": None,
+            "at": None,
+            "folds": [],
+            "alternatives": [],
+            "law": None,
+        }
+        new["told"] = [{key: x[key] for key in ("cause", "place", "name")} for x in told]
+        new |= {
+            "explained": {"in_sample": 0.0, "held_out": None},
+            "separate": "",
+            "parameters": {},
+            "shape": {},
+        }
+        return new | {"instead": {"nothing": 0.0, "unlisted": 0.0}} | dict(entry)
+
+    machine = "joints" if is_of_joints(values) else "team"
+    lists = {name: [finding(entry) for entry in values.get(name, [])] for name in ("causes", "suspected")}
+    new = {"machine": machine, "finished": True, "reference": [], "rollouts": None, "places": []}
+    return new | dict(values) | lists
+
+
 def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
     """The values of a diagnosis' file (``path``, for messages).
 

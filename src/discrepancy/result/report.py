@@ -14,11 +14,11 @@ from discrepancy.result.lines import (
     NOTHING_WRONG_HERE,
     WIDTH,
     cause_lines,
+    label,
     limit_lines,
     probability_words,
     wrapped,
 )
-from discrepancy.result.pictures.plots_evidence import label
 from discrepancy.result.read import VERDICTS, is_of_joints
 from discrepancy.result.remains import remedy
 from discrepancy.result.text_gain import gain_lines

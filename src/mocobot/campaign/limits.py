@@ -43,7 +43,7 @@ def pushes(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Candidate]:
 
 
 def push_limits(outcome: TeamOutcome, tolerance: Mapping[str, float]) -> list[Json]:
-    """Detection limit of a push of a second in every trial, the median over its instants.
+    """Detection limit of a push of a second in every trial, beyond its tolerance, the median over its instants.
 
     Returns:
         {trial, parameters: {name: size or None}} for every trial that is long enough; trials count from 1.
@@ -55,7 +55,9 @@ def push_limits(outcome: TeamOutcome, tolerance: Mapping[str, float]) -> list[Js
     wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
     for event, group in zip(events, placed, strict=True):
         assert event.transient is not None
-        found.setdefault(event.transient.trial + 1, []).append(np.sqrt(GAIN) * wider.errors_of(group.columns))
+        tolerated = [parameter.tolerance for parameter in event.parameters]
+        size = np.sqrt(GAIN) * np.hypot(wider.errors_of(group.columns), tolerated)
+        found.setdefault(event.transient.trial + 1, []).append(size)
     cells.truncate(count)
     names = [parameter.name for parameter in events[0].parameters] if events else []
     return [

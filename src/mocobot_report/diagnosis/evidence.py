@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from discrepancy.result.evidence_list import drawn, label, relation
 
 from discrepancy.numbers import Shown
+from discrepancy.result.lines import drawn, label, relation
 from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.read import is_of_joints
 from discrepancy.result.text_rollouts import blocks, diverged_sentences, lost, shown_units

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from discrepancy.result.evidence_list import label
 from scipy.spatial.transform import Rotation
 
 from discrepancy.numbers import one_each, parameter
-from discrepancy.result.lines import NEAREST, NOTHING_WRONG_HERE, SAID
+from discrepancy.result.lines import NEAREST, NOTHING_WRONG_HERE, SAID, label
 from discrepancy.result.read import (
     AS_FOUND,
     EXTENDED,

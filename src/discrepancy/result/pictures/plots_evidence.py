@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from discrepancy.result.lines import drawn, label, relation
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
-from discrepancy.result.read import kind_of, name_of
 from discrepancy.result.text_gain import floor_words, foretold_torques, response_units
 from mocobot_sim.plots_plain import plain_numbers
 
@@ -108,23 +108,3 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
     else:
         title = "Recorded commands, simulated again: error of the response"
     return titled(figure, title, handles, labels)
-
-
-def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
-    return [entry for entry in strongest if entry["nats"] >= 1.0]
-
-
-def label(entry: Mapping[str, Any]) -> str:
-    """An entry in words, for a plot."""
-    if entry["at"] is None:
-        return name_of(entry)
-    return f"{kind_of(entry)} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
-
-
-def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:
-    """What an entry is to the named causes: ``named``, of their ``family``, or ``other``."""
-    place = ("cause", "robot", "joint")
-    if any(all(entry[key] == cause[key] for key in place) for cause in causes):
-        return "named"
-    return "family" if any(entry["family"] == cause["family"] for cause in causes) else "other"

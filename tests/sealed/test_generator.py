@@ -1,0 +1,48 @@
+"""The blind generator of hidden sets: equal requests give equal bits, and nothing tells what is hidden."""
+
+import numpy as np
+import pytest
+
+from discrepancy.team.causes import CAUSES
+from hidden.draw import ground_of
+from hidden.generator import HiddenSet, generate
+from hidden.limits import LIMITS, pendulum_limit_kg
+from hidden.schedule import Schedule
+from hidden.sealed import Sealed
+from mocobot.campaign.draw import draw_effect
+from mocobot_sim.effects import EFFECTS
+
+
+def tiny_set(seed: int) -> HiddenSet:
+    """Hardly a second of motion."""
+    schedule = Schedule(randoms=1, vias=1, periodic_s=4.0, hold_s=None)
+    return HiddenSet("single", seed, ("sea_bias",), schedule=schedule, timestep_s=1e-3)
+
+
+def test_equal_requests_give_equal_bits_and_recordings_do_not_say_what_is_hidden():
+    first, second, other = generate(tiny_set(3)), generate(tiny_set(3)), generate(tiny_set(4))
+    assert first[1].open({}) == second[1].open({})
+    assert all((a.tau == b.tau).all() for a, b in zip(first[0], second[0], strict=True))
+    assert other[1].open({}) != first[1].open({})
+    assert len(first[0]) == 2
+    for recording in first[0]:
+        assert not [cause for cause in EFFECTS if cause in recording.metadata.to_json() + recording.name]
+
+
+def test_truth_is_sealed_without_a_verdict():
+    with pytest.raises(ValueError, match="sealed"):
+        Sealed({"effects": []}).open(None)
+
+
+def test_pendulum_is_measured_by_the_limit_of_its_own_length():
+    """A slow one is hardly excited, and has to be twice as heavy to be seen."""
+    assert pendulum_limit_kg(0.2) == LIMITS["slosh"]["mass_kg"]
+    assert pendulum_limit_kg(0.5) > 1.9 * LIMITS["slosh"]["mass_kg"]
+    ground = ground_of(3, np.zeros(3), [])
+    for seed in range(5):
+        effect = draw_effect("slosh", 4.0, ground, np.random.default_rng(seed))
+        assert effect.mass_kg == pytest.approx(4.0 * pendulum_limit_kg(effect.length_m))
+
+
+def test_every_cause_has_a_limit_and_an_effect():
+    assert set(LIMITS) == set(CAUSES) == set(EFFECTS) - {"law"}
