@@ -16,7 +16,7 @@ from sealed.forms.base import Form
 from sealed.forms.pushes import HalfSinePush, RampPush, in_every_trial
 from sealed.ground import Ground
 from sealed.limits import LIMITS
-from sealed.registry import FORMS, LISTED, OUTSIDE, UNLISTED
+from sealed.registry import FAULTS, FORMS, LISTED, OUTSIDE, UNLISTED
 
 SIZES = (2.0, 20.0)
 """Over the limit; drawn evenly in logarithm."""
@@ -28,6 +28,7 @@ MOST: dict[str, float] = {
     "second_order_torque_lag": 5.0, "single_torque_lag": 5.0, "turning_grasp": 15.0, "slow_grasp": 20.0,
     "soft_play": 20.0, "bouc_wen_spring": 12.0, "driven_lugre": 40.0, "driven_dahl": 40.0, "gimbal_lugre": 25.0,
     "gimbal_dahl": 25.0, "slow_base_compliance": 40.0, "late_creep": 100.0, "cubic_spring": 6.0,
+    "dropouts_phi": 8.0, "dropouts_theta": 8.0,
 }  # fmt: skip
 """Largest size over the limit within tolerances with which a trial runs: a torque loop with 9 ms of lag does not."""
 
@@ -83,3 +84,4 @@ CATALOGUE = tuple(name for name in CAUSES if name in EFFECTS)
 OTHER = tuple(form.cause for form in LISTED)
 NOWHERE = tuple(form.cause for form in UNLISTED)
 BEYOND = tuple(form.cause for form in OUTSIDE)
+WORN = tuple(form.cause for form in FAULTS)

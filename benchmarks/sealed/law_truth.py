@@ -88,6 +88,8 @@ SHAPES: dict[str, Callable[[_Seen, Item], np.ndarray]] = {
     "encoder_backlash": lambda s, p: _behind(s.phi, p["half_width_rad"]),
     "soft_encoder_mount": lambda s, p: p["rad_per_Nm"] * s.tau,
     "slipping_zero": lambda s, p: p["rate_radps"] * s.t,
+    "torque_ramp": lambda s, p: p["rate_Nmps"] * s.t,
+    "dead_band": lambda s, p: -np.clip(s.tau - p["centre_Nm"], -p["half_width_Nm"], p["half_width_Nm"]),
     "cogging": lambda s, p: p["amplitude_Nm"] * np.sin(p["times"] * s.phi + p["phase_rad"]),
     "cubic_spring": lambda s, p: -p["cubic_Nm_per_rad3"] * s.theta**3,
     "cable_spring": lambda s, p: -p["stiffness_Nm_per_rad"] * (s.theta - p["rest_rad"]),

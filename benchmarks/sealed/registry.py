@@ -21,6 +21,7 @@ from sealed.unlisted.encoders import (
     SlippingZero,
     SoftEncoderMount,
 )
+from sealed.unlisted.faults import DeadBand, DropoutsPhi, DropoutsTheta, TorqueRamp, TorqueWalk
 from sealed.unlisted.outside import FineInterpolation, LooseBridge, ScratchedDisc, SlackHose, SoftSaturation
 from sealed.unlisted.readings import (
     AngleInTorque,
@@ -87,6 +88,10 @@ UNLISTED: tuple[type[Form], ...] = (
 )
 OUTSIDE: tuple[type[Form], ...] = (ScratchedDisc, SoftSaturation, LooseBridge, FineInterpolation, SlackHose)
 """Unlisted ones whose formula the dictionary of laws does not have either."""
+FAULTY: tuple[type[Form], ...] = (DropoutsPhi, DropoutsTheta, TorqueRamp, TorqueWalk, DeadBand)
+"""Unlisted ones of which sensors wear out."""
+FAULTS = (*FAULTY, CrossTalk, EccentricPhi, EccentricTheta, MassDrift, HalfSinePush)
+"""These, and others that come with use: drawn by themselves."""
 KNOWN: tuple[type[Form], ...] = (QuadraticDrag, TorqueBacklash)
 """Listed ones whose law the catalogue has by now: hidden by name only."""
-FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE)}
+FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE, *FAULTY)}

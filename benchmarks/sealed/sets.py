@@ -25,7 +25,7 @@ from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
 from sealed.backgrounds import BACKGROUNDS, Background, tolerated, units_of
-from sealed.draw import BEYOND, CATALOGUE, NOWHERE, OTHER, SIZES, draw, family, largest, possible
+from sealed.draw import BEYOND, CATALOGUE, NOWHERE, OTHER, SIZES, WORN, draw, family, largest, possible
 from sealed.forms.base import Form
 from sealed.ground import Ground
 
@@ -47,6 +47,7 @@ Kind = Literal[
     "left-out",
     "unlisted-pairs",
     "outside",
+    "faults",
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 SLIDING = (
@@ -150,7 +151,7 @@ def _names(
     several = {"pairs": 2, "triples": 3, "unlisted-pairs": 2}.get(kind, 1)
     pools: dict[Kind, tuple[str, ...]] = {
         "single": CATALOGUE, "left-out": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "unlisted-pairs": NOWHERE,
-        "sliding": SLIDING, "long": ("joint_friction", "push"), "outside": BEYOND,
+        "sliding": SLIDING, "long": ("joint_friction", "push"), "outside": BEYOND, "faults": WORN,
     }  # fmt: skip
     found: list[str] = []
     while len(found) < several:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
+    from discrepancy.formulas.law import Law
     from discrepancy.result.traces import Trace
 
 Word = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
@@ -73,6 +74,7 @@ class Finding:
         members: the places with their values; more than one only of a kind.
         shape: numbers inside its columns, such as ``share`` of the typical speed.
         of: signal of the joint that something unlisted is a function of; empty where that is not known.
+        law: of something unlisted, what it is a function of, and which.
         event: when it acted, if it did so once.
         probability: that it is this cause, at this place.
         over_nothing: by how much it is likelier than nothing in its place [nats].
@@ -96,6 +98,7 @@ class Finding:
     partner: int | None = None
     shape: Mapping[str, float] = field(default_factory=dict)
     of: str = ""
+    law: Law | None = None
     event: Event | None = None
     rivals: tuple[Rival, ...] = ()
     told: tuple[tuple[str, str], ...] = ()

@@ -122,7 +122,7 @@ class Judge(ABC):
             cause=c.cause,
             place=c.place,
             joint=self.joint(*c.key),
-            members=() if c.cause == "unlisted" else self.members(c, values or self.whole),
+            members=self.members(c, values or self.whole) if c.columns else (),
             probability=probability + kin,
             over_nothing=o.over_nothing,
             nothing=nothing,
@@ -135,6 +135,11 @@ class Judge(ABC):
         if not off or 2 * len(off) >= len(plain.members):
             return [plain]
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
+
+    def fit_of(self, group: Group) -> tuple[Array, Array, Array]:
+        """Mean and covariance of a group's values, and the variances, which shrink nothing, of their prior."""
+        at, (mean, covariance) = self.parts.columns_of(group.columns), self.whole
+        return mean[at], covariance[np.ix_(at, at)], self.parts.prior[at]
 
     def _is_off(self, columns: Sequence[int]) -> bool:
         """Whether a value is beyond its standard error and a healthy machine's tolerance."""

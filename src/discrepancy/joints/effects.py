@@ -31,7 +31,8 @@ def effects_of(finding: Finding, model: SerialModel) -> list[RobotEffect]:
         finding: with values in physical units.
         model: that it is about.
     """
-    members = finding.members or (Member(finding.place, finding.joint, {}, {}),)
+    members = () if finding.law else finding.members
+    members = members or (Member(finding.place, finding.joint, {}, {}),)
     effects = [_effect(finding, member, model) for member in members]
     return [part for effect in effects for part in _parts(effect)]
 

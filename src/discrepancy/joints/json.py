@@ -60,6 +60,9 @@ class JointTold(Told):
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         """What a finding does, with its numbers; for a kind with their medians."""
+        if f.law is not None:
+            what = "position reading" if f.law.place == "joint position" else "torque"
+            return f"{f.law.sentence(f'The {what} of {place}')}."
         numbers = {name: entry["value"] for name, entry in parameters.items()}
         errors = {name: entry["se"] for name, entry in parameters.items() if entry["se"] is not None}
         when = {"start_s": f.event.start_s, "duration_s": f.event.duration_s} if f.event else {}

@@ -3,26 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import rankdata
 
+from discrepancy.formulas.formula import Curve, Kind, formula_of
+from discrepancy.formulas.law import Law, Of, traces
 from discrepancy.joints.causes import JointSignals
 from estimator.arrays import Array
 
 TERMS = 7
 """Cosines of a function: periods down to a quarter of the signal's range."""
-SIGNALS: Mapping[str, tuple[Callable[[JointSignals, JointSignals], Array], bool]] = {
-    "position": (lambda s, before: s.q, False),
-    "position and direction": (lambda s, before: s.q, True),
-    "speed": (lambda s, before: np.abs(s.v), True),
-    "load": (lambda s, before: s.load, False),
-    "load and direction": (lambda s, before: s.load, True),
-    "time": (lambda s, before: s.t, False),
-    "neighbour's torque": (lambda s, before: before.asked, False),
-    "reading": (lambda s, before: s.q, False),
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What a function is of.
+
+    Attributes:
+        of: values at one joint, of its signals and of those of the joint before it.
+        turns: whether the function turns with the direction of motion.
+        name: as the simulator has it, but for the joint's number.
+        symbol: in a formula.
+        unit: of a joint that turns.
+    """
+
+    of: Callable[[JointSignals, JointSignals], Array]
+    turns: bool
+    name: str
+    symbol: str
+    unit: str
+
+
+SIGNALS: Mapping[str, Signal] = {
+    "position": Signal(lambda s, before: s.q, False, "q", "q", "rad"),
+    "position and direction": Signal(lambda s, before: s.q, True, "q", "q", "rad"),
+    "speed": Signal(lambda s, before: np.abs(s.v), True, "dq", "|v|", "rad/s"),
+    "load": Signal(lambda s, before: s.load, False, "load", "L", "N m"),
+    "load and direction": Signal(lambda s, before: s.load, True, "load", "L", "N m"),
+    "time": Signal(lambda s, before: s.t, False, "time", "t", "s"),
+    "neighbour's torque": Signal(lambda s, before: before.asked, False, "torque", "tau", "N m"),
+    "reading": Signal(lambda s, before: s.q, False, "q", "q", "rad"),
 }
-"""What a function is of, and whether it turns with the direction of motion; the last is an error of a position."""
+"""What a function is of; the last is an error of a position."""
+SLIDES = {"rad": "m", "rad/s": "m/s", "N m": "N", "s": "s"}
+"""Units of a joint that slides."""
 SIZES = 1.0 / (1.0 + np.arange(TERMS)) / np.sqrt(np.sum(1.0 / (1.0 + np.arange(TERMS)) ** 2))
 """Standard deviations of the terms over that of the function: those of a function with a square integrable slope."""
 
@@ -40,14 +66,58 @@ def functions(
         For each signal its name, and series (W,) a log of each term.
     """
     edges = np.cumsum([len(s.q) for s in signals])[:-1]
-    for name, (signal, turns) in SIGNALS.items():
-        every = np.concatenate([signal(s, b) for s, b in zip(signals, before, strict=True)])
-        even = (every - every.min()) / (np.ptp(every) + 1e-9)  # what is differentiated is smooth
-        place = np.split(even if name == "reading" else (rankdata(every) - 0.5) / len(every), edges)
-        terms = []
-        for k in range(TERMS):
-            series = [np.cos(np.pi * (k + 1) * u) for u in place]
-            if name == "neighbour's torque" and not k:  # a sensor that reads some of it
-                series = np.split(every / (np.std(every) + 1e-9), edges)
-            terms.append([x * s.direction for x, s in zip(series, signals, strict=True)] if turns else series)
-        yield name, terms
+    for name, signal in SIGNALS.items():
+        turns = np.concatenate([s.direction for s in signals]) if signal.turns else 1.0
+        terms = basis(name, every(name, signals, before)).T * turns
+        yield name, [np.split(term, edges) for term in terms]
+
+
+def every(name: str, signals: Sequence[JointSignals], before: Sequence[JointSignals]) -> Array:
+    """A signal in all logs one after another, shape (Q,)."""
+    return np.concatenate([SIGNALS[name].of(s, b) for s, b in zip(signals, before, strict=True)])
+
+
+def basis(name: str, x: Array) -> Array:
+    """Terms of a function at values of its signal, shape (Q,) -> (Q, TERMS)."""
+    even = (x - x.min()) / (np.ptp(x) + 1e-9)  # what is differentiated is smooth
+    place = even if name == "reading" else (rankdata(x) - 0.5) / len(x)
+    terms = np.cos(np.pi * np.outer(place, 1.0 + np.arange(TERMS)))
+    if name == "neighbour's torque":  # a sensor that reads some of it
+        terms[:, 0] = x / (np.std(x) + 1e-9)
+    return terms
+
+
+def law_of(
+    name: str, joint: int, slides: Sequence[bool], signals: Sequence[JointSignals],
+    before: Sequence[JointSignals], fit: tuple[Array, Array, Array],
+) -> Law:  # fmt: skip
+    """An unlisted error with its formula.
+
+    Args:
+        name: of the signal.
+        joint: which, from 0.
+        slides: whether each joint slides.
+        signals, before: of the joint and of the joint before it, a log each.
+        fit: mean (k,) and covariance (k, k) of its terms, and the variances (k,) with which they were fitted.
+    """
+    signal, x = SIGNALS[name], every(name, signals, before)
+    other = joint - 1 if name == "neighbour's torque" else joint
+    unit = SLIDES[signal.unit] if slides[other] else signal.unit
+    way: Kind = "way" if slides[joint] else "angle"
+    kind: Kind = "time" if name == "time" else way if signal.unit == "rad" else "other"
+    f = basis(name, x)
+    formula = formula_of(Curve(x, f, *fit, kind))
+    number = "" if name == "time" else f"_{other + 1}"
+    words = {"dq": "speed", "q": "position", "torque": f"torque of joint {joint}"}.get(
+        signal.name, signal.name
+    )
+    of = Of(f"{signal.name}{number}", words, signal.symbol, unit)
+    times = Of(f"direction_{joint + 1}", "direction of motion", "sign(v)", "1") if signal.turns else None
+    w = np.concatenate([s.direction for s in signals]) if signal.turns else np.ones(len(x))
+    read, torque = name == "reading", "N" if slides[joint] else "N m"
+    place, target = ("joint position", "position") if read else ("joint torque", "torque")
+    own = traces(
+        [s.t for s in signals], x, w, f @ fit[0], np.sqrt(np.einsum("qk,kl,ql->q", f, fit[1], f)), formula
+    )
+    error = SLIDES["rad"] if read and slides[joint] else "rad" if read else torque
+    return Law(place, None, joint + 1, f"{target}_{joint + 1}", error, of, times, formula, own)

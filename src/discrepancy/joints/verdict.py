@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.evidence.until import Until
+from discrepancy.formulas.law import Law
 from discrepancy.joints.causes import LINKS
 from discrepancy.joints.diagnose import Outcome, diagnose
 from discrepancy.joints.findings import Foretold, JointVerdict
@@ -29,7 +31,7 @@ from discrepancy.joints.problem import JointProblem
 from discrepancy.joints.servo.loop import loop_laws, sentences
 from discrepancy.joints.servo.motor import driven_by_voltage
 from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
-from discrepancy.joints.unlisted import SIGNALS
+from discrepancy.joints.unlisted import SIGNALS, law_of
 from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
 from estimator.arrays import Array
@@ -132,9 +134,21 @@ class _JointJudge(Judge):
         return {
             "partner": joint - 1 if group.cause == "coupled_drive" and joint else None,
             "shape": {} if group.event or unlisted else absolute(self.problem, group),
-            "of": list(SIGNALS)[int(dict(group.shape)["signal"])] if unlisted else "",
+            "of": self._signal(group) if unlisted else "",
+            "law": self._law(group) if unlisted and group.columns else None,
             "event": self._event(group),
         }
+
+    @staticmethod
+    def _signal(group: Group) -> str:
+        return list(SIGNALS)[int(dict(group.shape)["signal"])]
+
+    @cache  # noqa: B019
+    def _law(self, group: Group) -> Law:
+        """What no table lists, with its formula."""
+        j, signals = self.model.joints.index(group.place), self.problem.joints
+        slides = [bool(x) for x in self.model.slides]
+        return law_of(self._signal(group), j, slides, signals[j], signals[j - 1], self.fit_of(group))
 
     def _event(self, group: Group) -> Event | None:
         if not group.event:
@@ -147,6 +161,8 @@ class _JointJudge(Judge):
         return Event(part, float(s.time[0] + begin), shape["duration_s"])
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
+        if group.cause == "unlisted":
+            return (self._law(group).member(group.place),)
         out, (mean, covariance) = [], values
         known = {int(j) for j in self.trials.joints}
         places = (

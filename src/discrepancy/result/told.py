@@ -95,6 +95,7 @@ class Told(ABC):
     def finding(self, f: Finding) -> Values:
         """An entry of ``causes`` and ``suspected``."""
         at, event = self.at(f.cause, f.place, f.joint, f.partner), f.event
+        at |= {"robot": f.law.robot, "joint": f.law.joint} if f.law else {}
         if f.of:
             at |= {key: f"{at[key]} by its {f.of}" for key in ("kind", "name")}
         members = [self.member(f, member, at) for member in f.members]
@@ -108,7 +109,8 @@ class Told(ABC):
             "explained": {"in_sample": f.in_sample, "held_out": f.held_out},
             "probability": f.probability, "over_nothing": f.over_nothing, "share_left": None,
             "instead": {"nothing": f.nothing, "unlisted": f.unlisted},
-            "folds": list(f.folds), "law": None, "shape": dict(f.shape), "separate": self.separate(f.cause),
+            "folds": list(f.folds), "law": f.law and f.law.to_dict(), "shape": dict(f.shape),
+            "separate": self.separate(f.cause),
             "told": [self.one_of_told(f, cause, place, at) for cause, place in f.told],
             "alternatives": [self.rival(rival, (rival.cause, rival.place) in f.told) for rival in f.rivals],
         }  # fmt: skip

@@ -16,6 +16,7 @@ from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_matrix
+from estimator.held import without_held
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Bases, Shared
 from mocobot_sim.effects.base import Effect
@@ -150,7 +151,7 @@ def resimulation_errors(
         log = resimulate(recording, replace(scene), timestep_s=TEAM_TIMESTEP_S, trial_number=number)
     except (TrialError, InputError):
         return None
-    simulated = predicted(log)
+    simulated, (recording, *_) = predicted(log), without_held(recording)
     return {
         name: (getattr(recording, name) - getattr(simulated, name))[keep] for name in ("phi", "theta", "tau")
     }

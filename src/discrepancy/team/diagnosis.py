@@ -15,6 +15,7 @@ from discrepancy.evidence.until import Until
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.estimates import errors, seen_by
+from discrepancy.team.held import with_held
 from discrepancy.team.linear.chatter import chattering
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
@@ -107,7 +108,7 @@ def diagnose_team(
     if units is not None and in_encoder_frames(units):
         loops = (*loops, f"The payload's centre of mass and grasps are in {ENCODERS}.")
     verdict = judged_team(outcome, weighed, (*notes, *choice.notes, *loops), contradicted=contradicted)
-    return TeamDiagnosed(verdict, outcome, gain, why_not)
+    return TeamDiagnosed(with_held(verdict, choice.searched), outcome, gain, why_not)
 
 
 def against_truth(found: TeamDiagnosed, truth: Mapping[str, Any]) -> TeamDiagnosed:

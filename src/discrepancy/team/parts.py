@@ -18,7 +18,7 @@ def parts_of(problem: TeamProblem, state: State) -> Parts:
     events = [
         k
         for c in state.chosen
-        if problem.candidates[c.group.identity].of_trials
+        if c.group.identity in problem.candidates and problem.candidates[c.group.identity].of_trials
         for k in (*c.group.columns, *c.forms)
     ]
     return Parts.of(state, _each(problem, state), [*problem.shared, *local], local, events)

@@ -240,9 +240,8 @@ class TeamProblem:
 
     def place(self, group: Group) -> Group:
         """A shape or a law with its columns, which are added to the problem."""
-        law = self.laws_of.laws.get(group.identity) if group.late else None
-        if law is not None:
-            pairs = zip(self.rig.whitening, self.laws_of.columns(law), strict=True)
+        if group.late:
+            pairs = zip(self.rig.whitening, self.laws_of.columns(self.laws_of.of(group)), strict=True)
             return replace(group, columns=tuple(self.add(self.rows_of([w(x) for w, x in pairs]))))
         return replace(group, columns=tuple(self.add(self.columns_of(self.candidates[group.identity]))))
 
@@ -251,7 +250,7 @@ class TeamProblem:
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest shapes and pushes; or, late, laws that no table lists."""
         if late:
-            v = posterior.variance
+            v = np.maximum(posterior.variance, posterior.left[0] / np.maximum(self.cells.rows, 1.0))
             noise = 0.5 * float(np.sum(self.cells.rows * (v - 1.0 - np.log(v))))
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
             return self.laws_of.proposed(self.left(posterior), self._white) if noise > least else []
@@ -367,7 +366,7 @@ class TeamProblem:
     def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
         """The same cause in neighbouring shapes, the likeliest by the linear problem without it."""
         if group.late:
-            return []
+            return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
         near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
         out = self._stepped(candidate, group, posterior)
@@ -413,9 +412,16 @@ class TeamProblem:
             return []
         prior = np.append(posterior.prior, np.zeros(self.cells.count - len(posterior.prior)))
         prior[index] = np.square(size)
-        moved = numbers + Posterior(self.cells, prior, posterior.variance).mean[index]
+        step = Posterior(self.cells, prior, posterior.variance).mean[index]
         self.cells.truncate(count)
-        names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
+        cause = CAUSES[candidate.cause]
+        names = [n for n in cause.determined if n in candidate.shape]
+        # A time, a mass or a frequency has no other sign: its logarithm takes the step, by its prior at most.
+        scale = np.array(
+            [not cause.slope_step(n, 0.0) and bool(x) for n, x in zip(names, numbers, strict=True)]
+        )
+        share = np.divide(step, numbers, out=np.zeros_like(step), where=scale).clip(-STEP_SHARE, STEP_SHARE)
+        moved = np.where(scale, numbers * np.exp(share), numbers + step)
         shape = dict(candidate.shape) | dict(zip(names, moved.tolist(), strict=True))
         shape = CAUSES[candidate.cause].around(self.values_of(group, posterior.mean), shape)
         try:

@@ -17,6 +17,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Key, Search, State
+from discrepancy.formulas.law import Law
 from discrepancy.numbers import three_digits
 from discrepancy.team.around import found_in, robots_at
 from discrepancy.team.closed_loop import named_effects, posture, team_of
@@ -26,6 +27,8 @@ from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arrays import Array
 from estimator.processes import ends_with_this
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.law import Law as LawEffect
 from mocobot_sim.extended.extended import write_extended
 
 TOLD_NATS = 5.0
@@ -46,12 +49,14 @@ class Told:
         shared, local: displacements of the unknowns of all trials and of this one.
         active: causes.
         healthy: other parts, and by how much they are off.
+        laws: effects of what no table lists.
     """
 
     shared: Array
     local: Array
     active: Active
     healthy: Active
+    laws: Sequence[Effect]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +81,20 @@ class Hypothesis:
 
     @cached_property
     def causes(self) -> list[tuple[Candidate, Group]]:
-        """Those of the set that a simulation can have: what no table lists has no effect."""
+        """Those of the set that tables list."""
         known = self.problem.candidates
         groups = [c.group for c in self.state.chosen if c.group.identity in known]
         return [(known[g.identity], g) for g in groups]
+
+    @cached_property
+    def laws(self) -> list[tuple[Group, Law]]:
+        """What no table lists, with its formula by all trials."""
+        out, p = [], self.state.posterior
+        for group in (c.group for c in self.state.chosen if c.group.late):
+            k = list(group.columns)
+            fit = p.mean[k], p.covariance[np.ix_(k, k)], p.prior[k]
+            out.append((group, self.problem.laws_of.told(group, *fit)))
+        return out
 
     @property
     def of_trials(self) -> bool:
@@ -100,7 +115,7 @@ class Hypothesis:
     def alone(self) -> NDArray[np.intp]:
         """Columns of unknowns and causes."""
         p = self.problem
-        own = [k for _, group in self.causes for k in group.columns]
+        own = [k for group, _ in (*self.laws, *((g, c) for c, g in self.causes)) for k in group.columns]
         return np.array([*p.shared, *(k for local in p.local for k in local), *own], dtype=np.intp)
 
     @cached_property
@@ -160,9 +175,13 @@ class Hypothesis:
         every[self.columns] = x
         p = self.problem
         active = [(candidate, p.values_of(group, every)) for candidate, group in self.causes]
-        return Told(
-            -every[p.shared], -every[p.local[t]][: self.rig.local_unknowns], active, self._healthy(every)
-        )
+        laws = [
+            LawEffect(**piece)
+            for group, law in self.laws
+            for piece in p.laws_of.pieces(group, law, every[list(group.columns)])
+        ]
+        local = -every[p.local[t]][: self.rig.local_unknowns]
+        return Told(-every[p.shared], local, active, self._healthy(every), laws)
 
     def _healthy(self, x: Array) -> Active:
         out = []
@@ -200,7 +219,7 @@ def responses(
     tasks = [(h.rig, t, h.told(t)) for h in hypotheses for t in h.rig.resimulated]
     run = Parallel(n_jobs=jobs, return_as="generator", **ends_with_this())
     simulations = (
-        delayed(rig.simulation(t, told.shared, told.local, told.active, told.healthy))()
+        delayed(rig.simulation(t, told.shared, told.local, told.active, told.healthy, told.laws))()
         for rig, t, told in tasks
     )
     done = []
@@ -266,14 +285,15 @@ def confirm(
 
     Args:
         outcome: of a search; its rig can simulate.
-        odds: of the causes that are named; other causes of the set, and what no table lists, are not simulated.
+        odds: of the causes that are named; other causes of the set are not simulated.
         jobs: parallel processes.
         simulated: called with 1 for every simulated trial.
     """
     search, problem = outcome.search, outcome.problem
     others = tuple(o for o in odds if o.chosen.group.identity not in problem.candidates)
     odds = [o for o in odds if o not in others]
-    chosen = [o.chosen for o in odds]
+    unlisted = [o.chosen for o in others]
+    chosen = [*(o.chosen for o in odds), *unlisted]
     plain = outcome.nothing[0].problem
     assert isinstance(plain, TeamProblem)
     nothing = Hypothesis(plain, outcome.nothing[1])
@@ -302,7 +322,7 @@ def confirm(
         now = winner.rival.key
         tried = {(now if a == winner.own.key else a, b): x for (a, b), x in values.items() if b != now}
         tried[now, winner.own.key] = first
-        state = _only(outcome, [o.chosen for o in odds])
+        state = _only(outcome, [*(o.chosen for o in odds), *unlisted])
     else:
         best = first
     none = mean_chi2(before)
@@ -313,7 +333,10 @@ def confirm(
             if np.isfinite(best)
             else "cannot be simulated with the recorded commands"
         )
-        labels = ", ".join(problem.candidates[o.chosen.group.identity].label for o in odds)
+        known = problem.candidates
+        labels = ", ".join(
+            known[c.group.identity].label if c.group.identity in known else c.group.name for c in chosen
+        )
         notes.append(f"{labels[:1].upper()}{labels[1:]}: {loop}, which speaks against it.")
     worse = {pair for pair, x in tried.items() if x > best * (1.0 + MARGIN_SHARE)}
     odds = [_revised(o, worse, CONTRADICTED if contradicted else 1.0) for o in odds]
@@ -409,12 +432,16 @@ def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *,
     """
     found = Hypothesis(outcome.problem, _only(outcome, chosen), whole)
     rig, told = found.rig, found.told(None)
-    effects, causes = [], [cause for cause, _ in found.causes]
+    effects, causes = list(told.laws), [cause for cause, _ in found.causes]
     for cause, group in found.causes:  # as large as they are told, beside what is healthy
         values = outcome.problem.values_of(group, found.state.posterior.mean)
         effects += named_effects(cause, rig.effects(cause, values))
     parts = rig.of_healthy(0, causes, told.healthy) if whole else []
     shared, bases = rig.linear[0].shared.moved(told.shared), rig.linear[0].bases.moved(told.local)
     scene = team_of(shared, bases, [*effects, *parts], *posture(rig.robots_of(0, told.healthy)))
-    extra = {"recordings": list(rig.trials), "causes": [cause.label for cause in causes]}
+    labels = [
+        *(f"something unlisted at {group.place}" for group, _ in found.laws),
+        *(cause.label for cause in causes),
+    ]
+    extra = {"recordings": list(rig.trials), "causes": labels}
     write_extended(scene, effects, folder, extra, parts)

@@ -340,7 +340,7 @@ class TeamRig:
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
-        healthy: Sequence[tuple[Candidate, Array]] = (),
+        healthy: Sequence[tuple[Candidate, Array]] = (), laws: Sequence[Effect] = (),
     ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
@@ -348,7 +348,7 @@ class TeamRig:
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
-        effects: list[Effect] = []
+        effects = [*laws]
         for candidate, values in active:
             own = self.effects(candidate, values)
             if own is None:

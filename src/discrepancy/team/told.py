@@ -20,6 +20,7 @@ from discrepancy.result.told import Told, Values
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.gain import Gain, Response
+from discrepancy.team.held import words_of
 from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.signature import signature
@@ -50,8 +51,13 @@ class TeamTold(Told):
         return {"cause": cause, "kind": kind, "name": f"{kind} at {place}", "family": cause, "robot": None,
                 "joint": joint, "place": place}  # fmt: skip
 
+    def finding(self, f: Finding) -> Values:
+        return super().finding(f) | words_of(f)
+
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
         candidate = self.verdict.candidates.get((f.cause, f.place))
+        if f.law is not None:
+            return f"{f.law.sentence(place[:1].upper() + place[1:])}."
         if candidate is None or not parameters:
             return f"Something that no table lists acts at {place}."
         numbers = {name: entry["value"] for name, entry in parameters.items()}
@@ -119,7 +125,7 @@ class TeamDiagnosed:
             InputError: something cannot be written.
         """
         values, found = self._values, {(f.cause, f.place) for f in self.verdict.findings}
-        chosen = [c for c in self.outcome.state.chosen if c.group.key in found and not c.group.late]
+        chosen = [c for c in self.outcome.state.chosen if c.group.key in found]
         models = [(EXTENDED, False)] if chosen else []
         if self.gain is not None and self.gain.is_better_as_found:
             models.append((AS_FOUND, True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from discrepancy.evidence.judge import Judge, Side
 from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.formulas.law import Law
 from discrepancy.result.traces import Trace
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
@@ -110,13 +112,22 @@ class _TeamJudge(Judge):
         return candidate and candidate.joint
 
     def more(self, group: Group) -> Mapping[str, Any]:
+        if group.late and group.columns:
+            return {"law": self._law(group)}
         candidate = self.problem.candidates.get(group.identity)
         at = candidate and candidate.transient
         if candidate is None or at is None:
             return {"shape": dict(candidate.shape) if candidate else {}}
         return {"event": Event(at.trial, float(at.start_s), float(at.duration_s))}
 
+    @cache  # noqa: B019
+    def _law(self, group: Group) -> Law:
+        """What no table lists, with its formula."""
+        return self.problem.laws_of.told(group, *self.fit_of(group))
+
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
+        if group.late:
+            return (self._law(group).member(group.place),)
         candidate = self.problem.candidates[group.identity]
         covariance, at = values[1], self.parts.columns_of(group.columns)
         x, C = np.zeros(len(candidate.parameters)), np.zeros((len(candidate.parameters),) * 2)

@@ -33,6 +33,8 @@ from estimator.estimate.statics import (
 )
 from estimator.estimate.uncertainty import WINDOW_S
 from estimator.estimate.withheld import withheld
+from estimator.filtering import trim_slice
+from estimator.held import doubtful, without_held
 from estimator.leftover.contradiction import contradiction
 from estimator.leftover.leftover import left_over
 from estimator.leftover.steps import steps_of
@@ -152,16 +154,13 @@ def within_arithmetic(names: Sequence[str]) -> Iterator[None]:
 def trial_of(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> Trial:
     """A recording processed for ``estimate_from_trials``; arguments and errors as for ``estimate_payload``."""
     check_carries(recording, "estimated")
-    labels = recording.metadata
-    return Trial(
-        recording.name,
-        labels.trial,
-        labels.payload,
-        process_recording(recording, cutoff_hz, trim_s),
-        steps_of(recording, cutoff_hz),
-        labels.team,
-        labels.units,
-    )
+    labels, steps = recording.metadata, steps_of(recording, cutoff_hz)
+    recording, held, doubt = without_held(recording)
+    data = process_recording(recording, cutoff_hz, trim_s)
+    if held:
+        left_out = doubtful(doubt, labels.rate_hz, cutoff_hz)[trim_slice(len(doubt), labels.rate_hz, trim_s)]
+        data = data.at(~left_out)
+    return Trial(recording.name, labels.trial, labels.payload, data, steps, labels.team, labels.units)
 
 
 def estimate_from_trials(

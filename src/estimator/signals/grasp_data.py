@@ -1,6 +1,11 @@
 """The paper's data points D_iq: pose, twist, twist derivative and wrench of every grasp at every sample."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from estimator.arrays import Array
 
@@ -42,3 +47,8 @@ class GraspData:
     def samples(self) -> int:
         """Number of samples Q."""
         return self.twist.shape[0]
+
+    def at(self, kept: NDArray[np.bool_]) -> GraspData:
+        """Some of the samples, shape (Q,)."""
+        names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
+        return replace(self, **{name: getattr(self, name)[kept] for name in names})

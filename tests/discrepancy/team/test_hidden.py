@@ -105,7 +105,7 @@ def _check_line(told: Mapping[str, float], tied: np.ndarray) -> None:
     along = away / np.linalg.norm(away)
     assert np.degrees(np.arccos(along @ AWAY_M / np.linalg.norm(AWAY_M))) < 3.0
     assert np.linalg.norm(np.cross(tied - start, along)) < 0.02
-    assert np.linalg.norm(away) - told["length_m"] == pytest.approx(STRETCH_M, abs=0.003)
+    assert np.linalg.norm(away) - told["length_m"] == pytest.approx(STRETCH_M, abs=0.006)
 
 
 def test_a_spring_of_bouc_and_wen_gives_way_before_it_slips() -> None:

@@ -15,6 +15,7 @@ from discrepancy.team.linear.patches import Patch, Patches
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+from estimator.held import doubtful
 
 SHORTEST_HOLD_S = 1.2
 """Left of a hold, to be one row. Chosen."""
@@ -44,7 +45,7 @@ class Reduction:
 
     In motion the residual is filtered at 5 Hz and taken at 12.5 Hz, which leaves it nearly white. While
     everything rests, an encoder repeats one rounding error for seconds, so a hold counts as one row: its mean; rests
-    too short for that are left out.
+    too short for that are left out, and so is every row to which held readings may give more than noise does.
 
     Attributes:
         operator: rows from samples, shape (n, Q); moving rows first.
@@ -153,10 +154,13 @@ class Reduction:
         half = len(kernel) // 2
         step = max(1, round(rate / TEAM_ROWS_HZ))
         holds, in_hold = _holds(signals)
+        left_out = in_hold.copy()
+        if signals.doubt is not None:
+            left_out |= doubtful(signals.doubt, rate, TEAM_CUTOFF_HZ)
         rows, columns, values, sample = [], [], [], []
         first, last = max(keep.start, half), min(keep.stop, len(signals.time) - half)
         for centre in range(first, last, step):
-            if not in_hold[centre]:
+            if not left_out[centre]:
                 rows.append(np.full(len(kernel), len(sample)))
                 columns.append(np.arange(centre - half, centre + half + 1))
                 values.append(kernel)

@@ -10,6 +10,7 @@ import numpy as np
 from estimator.arm.arms import true_joints
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass, trim_slice
+from estimator.held import without_held
 from estimator.recording.model import Recording
 from estimator.recording.sampling import Sampling
 
@@ -34,6 +35,7 @@ class Signals:
         sampling: how each robot's sensors were read, where the samples are not as they were read.
         smooth_hz: cut-off at which rates tell rest from sliding, shape (3, N, 3): phi, theta, tau; None: as usual.
         pre_hz: cut-off before the nonlinear formulas, above what chatters: the mean of a product is not that of means.
+        doubt: over a reading's rounding, how wrong what stands for held readings may be, shape (Q,); None: none is.
     """
 
     time: Array
@@ -44,14 +46,19 @@ class Signals:
     sampling: tuple[Sampling, ...] | None = None
     smooth_hz: Array | None = None
     pre_hz: float = TEAM_PRE_HZ
+    doubt: Array | None = None
     _last: dict[tuple[str, int, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
-        """The signals of a recording: untouched, or true ones where its metadata know the robots as they are."""
+        """The signals of a recording: untouched, or true ones where its metadata know the robots as they are.
+
+        Where an encoder holds its value they are interpolated.
+        """
+        recording, held, doubt = without_held(recording)
         known = recording.metadata
         signals = true_joints(known.arms, recording.phi, recording.theta, recording.tau)
-        return cls(recording.time, *signals, known.rate_hz, known.sampling)
+        return cls(recording.time, *signals, known.rate_hz, known.sampling, doubt=doubt if held else None)
 
     def minus(
         self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0

@@ -1,0 +1,347 @@
+"""A formula for a function of one signal that was fitted as a free curve: the fewest terms that say the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from discrepancy.evidence.settings import SETTINGS
+from discrepancy.formulas.terms import (
+    ABOVE,
+    BELOW,
+    HUM,
+    KNOTS,
+    OF_TIME,
+    PLAIN,
+    SIGNED,
+    SINE,
+    SPLINE,
+    STEP_S,
+    TRIED,
+    TURNING,
+    Numbers,
+    Shape,
+)
+from discrepancy.numbers import number
+from estimator.arrays import Array
+
+MISSING = 0.2
+"""Share of a formula's power from which on the basis does not hold it. Chosen: what is left shows as another term."""
+BEGUN, SAMPLES = 12, 1000
+"""Likeliest terms that a second joins; samples at which formulas are compared."""
+Kind = Literal["angle", "way", "time", "other"]
+Piece = dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A free function of a signal as data have it.
+
+    Attributes:
+        x: the signal at samples, shape (Q,).
+        basis: functions of it there, shape (Q, K); a constant is the first of them, or is left out of all.
+        mean, covariance: of their amplitudes, shapes (K,) and (K, K).
+        prior: variances with which these were fitted, shape (K,).
+        kind: of signal. What is a function of an angle [rad] comes again a whole number of times in a turn; on a way or
+            in time [s] it may come again; of others it does not.
+    """
+
+    x: Array
+    basis: Array
+    mean: Array
+    covariance: Array
+    prior: Array
+    kind: Kind = "other"
+
+    @cached_property
+    def constant(self) -> bool:
+        """Whether the data tell a constant."""
+        return bool(np.ptp(self.basis[:, 0]) == 0.0)
+
+    @cached_property
+    def told(self) -> tuple[Array, Array, float]:
+        """Precision and score of the amplitudes by the data alone, shapes (K, K) and (K,), and what they gain."""
+        root = np.sqrt(self.prior)
+        inverse = np.linalg.inv(self.covariance / np.outer(root, root))
+        size, turn = np.linalg.eigh(inverse - np.eye(len(root)))
+        seen = size > 1.0  # of the others the prior says more than the data
+        turn = turn[:, seen] / root[:, None]
+        precision = (turn * size[seen]) @ turn.T
+        score = turn @ (turn.T @ (root**2 * (np.linalg.inv(self.covariance) @ self.mean)))
+        return precision, score, 0.5 * float(score @ np.linalg.pinv(precision, hermitian=True) @ score)
+
+    @cached_property
+    def project(self) -> Array:
+        """Amplitudes of the basis that are nearest to series, shape (K, Q)."""
+        if self.constant:
+            return np.linalg.pinv(self.basis)
+        return np.linalg.pinv(np.column_stack([np.ones(len(self.x)), self.basis]))[1:]
+
+    @property
+    def thinned(self) -> Curve:
+        """The same at few of its samples, as dense as these."""
+        few = np.argsort(self.x, kind="stable")[:: max(len(self.x) // SAMPLES, 1)]
+        return replace(self, x=self.x[few], basis=self.basis[few])
+
+    def rows(self, x: Array) -> Array:
+        """The basis at values of the signal, shape (Q, K)."""
+        order = np.argsort(self.x)
+        return np.stack([np.interp(x, self.x[order], b[order]) for b in self.basis.T], axis=1)
+
+    def at(self, x: Array) -> tuple[Array, Array]:
+        """The free function and its standard error at values of the signal, shape (Q,) each."""
+        rows = self.rows(x)
+        return rows @ self.mean, np.sqrt(
+            np.maximum(np.einsum("qk,kl,ql->q", rows, self.covariance, rows), 0.0)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Formula:
+    """Terms with their amplitudes.
+
+    Attributes:
+        terms: shapes, and the numbers inside each.
+        values: amplitudes of all terms, then a constant where that is told, then the fitted numbers inside.
+        covariance: of these.
+        constant: whether there is one.
+        loss: by how much the free curve is likelier [nats].
+        missing: share of the formula's power that the curve's basis does not hold.
+    """
+
+    terms: tuple[tuple[Shape, Numbers], ...]
+    values: Array
+    covariance: Array
+    constant: bool
+    loss: float = 0.0
+    missing: float = 0.0
+
+    @property
+    def function(self) -> str:
+        """Names of the terms."""
+        return " + ".join(shape.name for shape, _ in self.terms) or "constant"
+
+    def at(self, x: Array) -> Array:
+        """Values at those of the signal, shape (Q,)."""
+        columns = _columns(self.terms, x, self.constant)
+        return columns @ self.values[: columns.shape[1]]
+
+    def through(self, x: Array, f: Array) -> Formula:
+        """The same terms through values f of a function at x, shape (Q,) each, up to a constant that is not its own."""
+        G = _columns(self.terms, x, constant=True)
+        values = np.linalg.lstsq(G, f, rcond=None)[0]
+        kept = G.shape[1] - (not self.constant)
+        return replace(self, values=np.append(values[:kept], self.values[kept:]))
+
+    @property
+    def _each(self) -> Iterator[tuple[str, Shape, Numbers, slice, Sequence[int]]]:
+        """Ending of a term's names, the term, where its amplitudes and its fitted numbers are."""
+        k, inside = 0, sum(shape.width for shape, _ in self.terms) + self.constant
+        for n, (shape, numbers) in enumerate(self.terms):
+            fitted = list(range(inside, inside + len(numbers))) if inside < len(self.values) else []
+            yield f"_{n + 1}" if n else "", shape, numbers, slice(k, k + shape.width), fitted
+            k, inside = k + shape.width, inside + len(fitted)
+
+    @property
+    def parameters(self) -> dict[str, tuple[float, float | None]]:
+        """Amplitudes, phases, offset and numbers inside, each with its standard error, None of what was chosen."""
+        out: dict[str, tuple[float, float | None]] = {}
+        se = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        for end, shape, numbers, at, fitted in self._each:
+            a, C = self.values[at], self.covariance[at, at]
+            if len(a) == 2:
+                size = max(float(np.hypot(*a)), 1e-300)
+                along, across = a / size, np.array([-a[1], a[0]]) / size
+                out[f"amplitude{end}"] = size, float(np.sqrt(along @ C @ along))
+                out[f"phase_rad{end}"] = (
+                    float(np.arctan2(a[1], a[0])),
+                    float(np.sqrt(across @ C @ across)) / size,
+                )
+            elif shape is SPLINE:
+                out |= {
+                    f"at_knot_{k + 1}": (float(x), float(e))
+                    for k, (x, e) in enumerate(zip(a, se, strict=False))
+                }
+            else:
+                out[f"amplitude{end}"] = float(a[0]), float(np.sqrt(C[0, 0]))
+            for name, x, k in zip(shape.inside, numbers, fitted or [None] * len(numbers), strict=True):
+                out[f"{name}{end}"] = float(x), None if k is None else float(se[k])
+        if self.constant:
+            k = sum(shape.width for shape, _ in self.terms)
+            out["offset" if self.terms else "amplitude"] = float(self.values[k]), float(se[k])
+        return out
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers inside the terms."""
+        each = (
+            (f"{n}{end}", x)
+            for end, shape, numbers, _, _ in self._each
+            for n, x in zip(shape.inside, numbers, strict=True)
+        )
+        return dict(each)
+
+    def text(self, symbol: str, *, unit: Callable[[int], str] | None = None, scale: float = 1.0) -> str:
+        """The formula in symbols, or with its amplitudes.
+
+        Args:
+            symbol: of the signal.
+            unit: of an amplitude by the signal's power that it multiplies; None: amplitudes are symbols.
+            scale: shown units of the error per own one.
+        """
+        known, out = self.parameters, []
+
+        def shown(name: str, power: int) -> str:
+            return number(*known[name], unit(power), scale) if unit else name.replace("amplitude", "a")
+
+        for end, shape, numbers, _, _ in self._each:
+            a = "" if shape is SPLINE else shown(f"amplitude{end}", shape.power)
+            angle = known.get(f"phase_rad{end}", (0.0, None))[0]
+            phase = f"{'+' if angle >= 0 else '-'} {abs(angle):.2f}" if unit else f"+ phase{end}"
+            n = f"{numbers[0]:.4g}" if numbers else ""
+            out.append(shape.text.format(a=a, x=symbol, n=n, p=phase))
+        if self.constant:
+            out.append(shown("offset" if out else "amplitude", 0))
+        return " + ".join(out)
+
+    def pieces(self) -> Iterator[Piece]:
+        """Functions of one amplitude each, as ``mocobot_sim.laws.functions`` has them."""
+        for _, shape, numbers, at, _ in self._each:
+            a, n = self.values[at], [*numbers, 0.0]
+            if len(a) == 2:
+                yield _piece(shape.name, np.hypot(*a), n[0], 0.0, np.arctan2(a[1], a[0]))
+            elif shape is SPLINE:
+                names = ["first_hat", *["hat"] * (KNOTS - 2), "last_hat"]
+                yield from (
+                    _piece(h, x, n[0] + k * n[1], n[1]) for k, (h, x) in enumerate(zip(names, a, strict=True))
+                )
+            elif shape.name == "step":
+                yield _piece("last_hat", a[0], n[0], STEP_S)
+            else:
+                yield _piece(shape.name, a[0], n[0])
+        if self.constant:
+            yield _piece("constant", self.values[sum(shape.width for shape, _ in self.terms)])
+
+
+def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
+    """The sparsest formula that says what a curve does, about as well; where there is none, the curve by its knots.
+
+    As well is within what the curve's further amplitudes cost (half the logarithm of the samples each), or within a
+    law's own error (``form_share``) and what of a formula the basis does not hold.
+
+    Args:
+        curve: what data have of it.
+        hum_hz: of a sine and a cosine of time that are the basis, their frequency [Hz].
+    """
+    if hum_hz is not None:
+        return Formula(((HUM, (hum_hz,)),), curve.mean, curve.covariance, constant=False)
+    cost, whole, curve = 0.5 * math.log(len(curve.x)), curve, curve.thinned
+    fits: list[Formula] = [_fitted(curve, ())] if curve.constant else []
+    singles = [_fitted(curve, (term,)) for term in _terms(curve)]
+    fits += singles
+    found = _best(curve, fits, cost)
+    if found is None:
+        begun = sorted(singles, key=lambda f: f.loss)[:BEGUN]
+        pairs = [
+            (a.terms[0], b.terms[0]) for a in begun for b in singles if a.terms[0][0] is not b.terms[0][0]
+        ]
+        found = _best(curve, [_fitted(curve, pair) for pair in pairs], cost)
+    return found or _knots(whole)
+
+
+def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
+    """The likeliest that is good enough, the plainest of some that are alike; with its numbers inside fitted."""
+    sizes = [len(f.values) + sum(shape.fitted for shape, _ in f.terms) for f in fits]
+    free, seen = curve.told[2], int(np.linalg.matrix_rank(curve.told[0], hermitian=True))
+    good = [
+        (-f.loss - cost * size, f)
+        for f, size in zip(fits, sizes, strict=True)
+        if f.missing < MISSING
+        and f.loss <= max(cost * (seen - size), (SETTINGS.form_share**2 + f.missing) * free)
+    ]
+    most = max((worth for worth, _ in good), default=0.0)
+    return next((_settled(curve, f) for worth, f in good if worth > most - 1.0), None)
+
+
+def _terms(curve: Curve) -> Iterator[tuple[Shape, Numbers]]:
+    """Every term with every number inside that is tried."""
+    signed = np.min(curve.x) < 0.0 < np.max(curve.x)
+    shapes = [*PLAIN, *(OF_TIME if curve.kind == "time" else SIGNED if signed else ()), ABOVE, BELOW]
+    yield from ((shape, numbers) for shape in shapes for numbers in shape.tried(curve.x))
+    least = math.pi / max(float(np.ptp(curve.x)), 1e-300)  # half a wave
+    most = least * curve.basis.shape[1]
+    if curve.kind == "angle":
+        yield from ((TURNING, (float(w),)) for w in np.arange(1.0, most + 1.0))
+    elif curve.kind != "other":
+        yield from ((SINE, (float(w),)) for w in np.linspace(least, most, TRIED))
+
+
+def _columns(terms: Sequence[tuple[Shape, Numbers]], x: Array, constant: bool) -> Array:
+    each = [shape.of(x, numbers) for shape, numbers in terms]
+    return np.concatenate([*each, *([np.ones((len(x), 1))] if constant else [])], axis=1)
+
+
+def _fitted(curve: Curve, terms: Sequence[tuple[Shape, Numbers]], more: Array | None = None) -> Formula:
+    """Terms with the amplitudes that data give them; ``more``: columns by the numbers inside, shape (Q, m)."""
+    G = _columns(terms, curve.x, curve.constant)
+    G = G if more is None else np.column_stack([G, more])
+    P, (precision, score, free) = curve.project @ G, curve.told
+    scale = 1.0 / np.maximum(np.linalg.norm(P, axis=0), 1e-300)
+    P = P * scale
+    covariance = np.linalg.pinv(P.T @ precision @ P, rcond=1e-9, hermitian=True)
+    a = covariance @ (P.T @ score)
+    series, held = G @ (scale * a), curve.basis @ (P @ a)
+    missing = float(np.var(series - held) / np.var(series)) if np.ptp(series) else 0.0
+    loss = max(free - 0.5 * float(a @ (P.T @ score)), 0.0)
+    return Formula(
+        tuple(terms), scale * a, covariance * np.outer(scale, scale), curve.constant, loss, missing
+    )
+
+
+def _settled(curve: Curve, found: Formula, rounds: int = 8) -> Formula:
+    """The same with the numbers inside fitted, by Gauss-Newton steps that do not make it less likely."""
+    free = [k for k, (shape, _) in enumerate(found.terms) if shape.fitted]
+    for _ in range(rounds if free else 0):
+        slopes = [_slope(curve, found, k) for k in free]
+        both = _fitted(curve, found.terms, np.stack(slopes, axis=1))
+        steps = dict(zip(free, both.values[-len(free) :], strict=True))
+        terms = [
+            (s, (n[0] + float(steps.get(k, 0.0)), *n[1:]) if n else n) for k, (s, n) in enumerate(found.terms)
+        ]
+        moved = _fitted(curve, terms)
+        if moved.loss > found.loss - 1e-3:
+            values = np.append(found.values, [found.terms[k][1][0] for k in free])
+            return replace(found, values=values, covariance=both.covariance)
+        found = moved
+    return found
+
+
+def _slope(curve: Curve, found: Formula, k: int) -> Array:
+    """Change of the formula by the number inside its k-th term, shape (Q,)."""
+    (shape, numbers), step = (
+        found.terms[k],
+        1e-4 * (abs(found.terms[k][1][0]) + 1e-3 * float(np.std(curve.x))),
+    )
+    ends = [shape.of(curve.x, (numbers[0] + sign * step,)) for sign in (-0.5, 0.5)]
+    first = sum(s.width for s, _ in found.terms[:k])
+    return np.asarray((ends[1] - ends[0]) @ found.values[first : first + shape.width] / step)
+
+
+def _knots(curve: Curve) -> Formula:
+    """The curve by its values at knots."""
+    low, high = np.quantile(curve.x, [0.01, 0.99])
+    step = float(high - low) / (KNOTS - 1)
+    rows = curve.rows(low + step * np.arange(KNOTS))
+    return Formula(
+        ((SPLINE, (float(low), step)),), rows @ curve.mean, rows @ curve.covariance @ rows.T, constant=False
+    )
+
+
+def _piece(function: str, amplitude: float, n: float = 0.0, second: float = 0.0, phase: float = 0.0) -> Piece:
+    return {"function": function, "amplitude": float(amplitude), "number": float(n), "second": float(second),
+            "phase_rad": float(phase)}  # fmt: skip
