@@ -39,9 +39,7 @@ CABLE = {"stiffness_N_per_m": 20.0, "length_m": float(np.linalg.norm(AWAY_M)) - 
 HIDDEN = {
     "link_length": ("a", {"proximal_m": 1.2e-3, "rod_m": -8e-4, "base_radius_m": 6e-4}, 3, 1),
     "sea_bias": ("b", {"bias_Nm": -0.2}, 1, 3),
-    "clock_delay": ("c", {"delay_s": 1e-3}, 2, None),
     "grasp_flex": ("d", {"compliance_m_per_N": 8e-6, "relaxation_s": 0.02}, 2, None),
-    "drag": ("a", {"coefficient_Ns_per_m": 4.0, "turning_Nms_per_rad": 1.0}, None, None),
     "joint_friction": ("b", {"coulomb_Nm": 0.08, "viscous_Nms_per_rad": 0.03}, 2, 1),
     "slosh": ("b", {"mass_kg": 0.12, "length_m": 0.2, "damping_ratio": 0.05,
               **xyz("point", np.array([0.2, 0.1, 0.0]))}, None, None),
@@ -136,7 +134,7 @@ def test_a_push_like_half_a_sine_is_a_push() -> None:
 @pytest.mark.parametrize("kind", ["clean", "tolerance"])
 def test_nothing_is_named_where_nothing_is_hidden(kind: str) -> None:
     off = cheaper(draw_background(3, np.random.default_rng(5))) if kind == "tolerance" else []
-    values = verdict(trials("b", *off, seed=14))
+    values = verdict(trials("b" if off else "a", *off))
     assert (values["verdict"], values["causes"], values["suspected"]) == ("consistent", [], [])
     assert values["residual"]["chi2_per_n"] < 1.2
 
