@@ -18,7 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from discrepancy.evidence.findings import Finding, Member
+from discrepancy.evidence.findings import Finding
+from discrepancy.evidence.member import Member
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import load_model
 from discrepancy.joints.rolled.closed import LoopDrive

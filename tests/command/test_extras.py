@@ -60,12 +60,12 @@ def test_only_what_composes_a_team_needs_dm_control(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_diagnosis_without_dm_control_says_what_it_left_out(biased_trials: list[Path]) -> None:
-    done = without_dm_control(COMMAND, "diagnose", biased_trials[0], "--laws", "never")
+    done = without_dm_control(COMMAND, "diagnose", biased_trials[0], "--laws", "never", "--verbose")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("EXPLAINED. ")
+    assert done.stdout.startswith("EXPLAINED: ")
     assert "simulated again" not in done.stdout
     said = " ".join(done.stdout.split())
-    assert "not tried in closed loop (a team's scene cannot be composed without dm-control (" in said
+    assert "The closed loop was not simulated: a team's scene cannot be composed without dm-control (" in said
 
 
 @pytest.mark.slow

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.evidence.findings import Event, Finding, Limit, Member, Offer, Rival, Scatter
+from discrepancy.evidence.findings import Event, Finding, Limit, Offer, Rival, Scatter
+from discrepancy.evidence.member import Member
 from discrepancy.joints.findings import Foretold, JointVerdict
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.result.traces import Trace

@@ -62,6 +62,17 @@ def test_search_and_reports_know_no_machine_and_machines_not_each_other(
         assert not {name.split(".")[1] for name in taken} & set(never), module
 
 
+@pytest.mark.parametrize(
+    ("package", "forbidden"),
+    [("discrepancy.team.causes", "mocobot_sim"), ("mocobot_sim.effects", "discrepancy")],
+)
+def test_what_hides_and_what_finds_share_no_code(package: str, forbidden: str) -> None:
+    files = module_files(package)
+    assert files
+    for module, path in files.items():
+        assert forbidden not in roots(imported_modules(path)), module
+
+
 def test_no_module_imports_itself_through_others() -> None:
     """Imports for type checkers count: who has to know whom is the same question."""
     graph = project_imports()

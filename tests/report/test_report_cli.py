@@ -118,7 +118,7 @@ BROKEN = [
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"causes": [{}]}),
      ("not a complete diagnosis",)),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"detection_limits": [{}]}),
-     ("not complete", "'cause' is missing")),
+     ("not a complete diagnosis", "'cause' is missing")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"undecidable": 3}),
      ("not a complete diagnosis",)),
     (diagnosis_folder, cut("residuals.npz"), ("residuals.npz", "damaged")),

@@ -493,7 +493,7 @@ def test_evidence_is_dots_on_one_scale(pages: dict[str, Reader]) -> None:
     (before,) = shown  # with the cause in the model nothing is left that has 1
     assert {trace["type"] for trace in before["data"]} == {"scatter"}
     rings, *dots = before["data"]
-    assert rings["x"] == [10.5, 10.5, 15.2]
+    assert rings["x"] == [7.0, 7.0, 7.0]
     assert sorted(x for trace in dots for x in trace["x"]) == [1.4, 150.0, 180.0]
     assert before["layout"]["xaxis"]["range"][0] == pytest.approx(np.log10(1.4) - 0.15)
 

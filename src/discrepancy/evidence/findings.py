@@ -6,28 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from discrepancy.evidence.member import Member
+
 if TYPE_CHECKING:
     from discrepancy.formulas.law import Law
     from discrepancy.result.traces import Trace
 
 Word = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
-
-
-@dataclass(frozen=True)
-class Member:
-    """One place of a finding.
-
-    Attributes:
-        place: name of the joint, link or base.
-        joint: which joint, from 1; None of links and of the base.
-        values: by parameter name, with the unit as suffix.
-        errors: standard errors by the same names.
-    """
-
-    place: str
-    joint: int | None
-    values: Mapping[str, float]
-    errors: Mapping[str, float]
 
 
 @dataclass(frozen=True)

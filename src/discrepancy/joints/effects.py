@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from discrepancy.evidence.findings import Finding, Member
+from discrepancy.evidence.findings import Finding
+from discrepancy.evidence.member import Member
 from discrepancy.joints.causes import WORDS
 from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import SerialModel, load_spec

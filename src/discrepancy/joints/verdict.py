@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from discrepancy.cause_names import excluded_from
-from discrepancy.evidence.findings import Event, Finding, Member
+from discrepancy.evidence.findings import Event, Finding
 from discrepancy.evidence.held import with_held
 from discrepancy.evidence.judge import Judge
+from discrepancy.evidence.member import Member
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group

@@ -327,7 +327,10 @@ def _rest(values: Values) -> Iterable[str]:
         yield from ("", f"[[What would {when}, nine times in ten]]", *limit_lines(values["detection_limits"]))
     open_ = (f"{entry['what']}: {entry['why']}; needs {entry['remedy']}." for entry in values["undecidable"])
     yield from _section("What such logs cannot decide", open_)
-    yield from _section("Notes", values["notes"])
+    why = values["not_simulated"]
+    yield from _section(
+        "Notes", [*values["notes"], *([f"The closed loop was not simulated: {why}."] if why else [])]
+    )
 
 
 def _section(title: str, texts: Iterable[str]) -> Iterable[str]:

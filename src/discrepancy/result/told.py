@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from discrepancy.evidence.findings import Finding, Limit, Member, Offer, Rival, Scatter, Verdict
+from discrepancy.evidence.findings import Finding, Limit, Offer, Rival, Scatter, Verdict
+from discrepancy.evidence.member import Member
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.numbers import three_digits
 from discrepancy.result.json import plain

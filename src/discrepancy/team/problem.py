@@ -423,6 +423,7 @@ class TeamProblem:
         share = np.divide(step, numbers, out=np.zeros_like(step), where=scale).clip(-STEP_SHARE, STEP_SHARE)
         moved = np.where(scale, numbers * np.exp(share), numbers + step)
         shape = dict(candidate.shape) | dict(zip(names, moved.tolist(), strict=True))
+        shape = CAUSES[candidate.cause].around(self.values_of(group, posterior.mean), shape)
         try:
             return [self.group_of(candidate.in_shape(shape), group.log_prior)]
         except (ValueError, ArithmeticError):

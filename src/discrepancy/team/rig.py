@@ -23,6 +23,7 @@ from discrepancy.team.candidates import (
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
+from discrepancy.team.channels import channels_of, directions_of, quantities_of
 from discrepancy.team.closed_loop import (
     effect_of,
     impossible,
@@ -42,7 +43,6 @@ from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.linear.unsearched import trial_at, without_bases
 from discrepancy.team.linear.whitening import Whitening, whitened
 from discrepancy.team.long.parts import LaterPart
-from discrepancy.team.signature import channels_of, directions_of, quantities_of
 from discrepancy.team.words import statements
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array

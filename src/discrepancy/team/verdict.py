@@ -11,8 +11,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from discrepancy.candidate import Candidate
-from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
+from discrepancy.evidence.findings import Event, Scatter, Verdict
 from discrepancy.evidence.judge import Judge, Side
+from discrepancy.evidence.member import Member
 from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group, Posterior

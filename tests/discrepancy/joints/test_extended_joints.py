@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.evidence.findings import Event, Finding, Member
+from discrepancy.evidence.findings import Event, Finding
+from discrepancy.evidence.member import Member
 from discrepancy.joints.effects import effects_of, write_extended
 from discrepancy.joints.given import Given
 from discrepancy.joints.mechanics.nominal import inverse_torque

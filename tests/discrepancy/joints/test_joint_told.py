@@ -13,6 +13,7 @@ import pytest
 
 from command import refused, run
 from diagnosed import check_finite, small_diagnosis
+from discrepancy.cause_names import JOINTS as EXCLUDABLE
 from discrepancy.evidence.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS
@@ -71,7 +72,7 @@ def made(folder: Path, findings: Sequence[Finding] = (), **more: Any) -> Diagnos
 def test_names_of_the_tables_are_those_that_can_be_excluded() -> None:
     names = [cause.name for cause in (*CAUSES, *OTHERS)]
     assert len(names) == len(set(names))
-    assert set(names) == {*JOINTS, "unlisted"}
+    assert set(names) == {*EXCLUDABLE, "unlisted"}
 
 
 @pytest.mark.parametrize("slide", [False, True])

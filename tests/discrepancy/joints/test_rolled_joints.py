@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.evidence.findings import Event, Finding, Member
+from discrepancy.evidence.findings import Event, Finding
+from discrepancy.evidence.member import Member
 from discrepancy.joints.mechanics.nominal import inverse_torque
 from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel, load_model

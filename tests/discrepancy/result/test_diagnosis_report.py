@@ -83,6 +83,14 @@ def test_the_payload_is_told_without_and_with_what_is_off(verdict: str, shown: b
     assert ["mass", "[%]", "4", *(["0.25"] if shown else [])] in lines
 
 
+def test_why_nothing_was_simulated_is_told() -> None:
+    why = "trial 1 has no commands"
+    assert f"A note. The closed loop was not simulated: {why}." in report(
+        small_diagnosis() | {"not_simulated": why}
+    )
+    assert "not simulated" not in report(small_diagnosis())
+
+
 def test_a_suspicion_is_told_with_its_probability() -> None:
     values = small_diagnosis("consistent")
     values["suspected"] = [small_diagnosis()["causes"][0] | {"probability": 0.41, "over_nothing": 4.0}]

@@ -154,6 +154,10 @@ class Cause(ABC):
         """The same shape with a number more that the data determine, nought so far; none where that is all."""
         return []
 
+    def around(self, values: Array, shape: Shape) -> Shape:
+        """The shape, its columns linear around values."""
+        return shape
+
     def alike(self, shape: Shape) -> int:
         """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
         return self.among

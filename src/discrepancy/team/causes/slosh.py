@@ -35,6 +35,9 @@ SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
 """Length across over that along of what swings on two lengths, tried first. Measured (tuning set 99300, damping ratio
 0.04): a length 25 % off still helps."""
 
+SLOSH_REACH_M = 1.5
+"""From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+
 SLOSH_MOST_DAMPED = 0.3
 """Largest damping ratio tried. Chosen."""
 
@@ -118,6 +121,11 @@ class Slosh(Cause):
         # Its moments are about the centre of mass, wherever it was swung.
         wrench[..., 0] -= wrench[..., 1:] @ off
         return trial.of_wrench(wrench[:, :3], wrench[:, 3:])
+
+    def around(self, values, shape):
+        """Swung about where it is found to hang."""
+        at = np.clip(values[1:] / max(values[0], 1e-6), -SLOSH_REACH_M, SLOSH_REACH_M)
+        return {**shape, **dict(zip(OFF, at.tolist(), strict=True))}
 
     def finer(self, shape):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
