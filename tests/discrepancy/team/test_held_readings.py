@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hidden_quick import generated, quick_set
 
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
 from estimator.recording.model import Recording
-from hidden_quick import generated, quick_set
 
 ROBOT, JOINT = 2, 1
 FIRST, EVERY, HELD = 331, 170, 13
