@@ -33,7 +33,7 @@ BEND = "bend"
 
 INERTIA_SHARE, JOINT_SHARE, SCALE_SHARE = 0.1, 0.03, 0.02
 ZERO_RAD, LENGTH_M, DELAY_S, LEVEL_RAD = 2e-3, 1e-3, 5e-4, 5e-3
-"""A healthy arm: standard deviations of what its model has wrong, as ``docs/serial/method.md`` says."""
+"""A healthy arm: standard deviations of what its model has wrong, as ``docs/diagnosis/method.md`` says."""
 
 
 @dataclass(frozen=True)

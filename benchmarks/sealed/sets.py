@@ -30,7 +30,7 @@ from sealed.forms.base import Form
 from sealed.ground import Ground
 
 TIMESTEP_S = 1e-3
-"""As the diagnosis: the integrator's error is below the sensors' noise (docs/diagnosis/validation-history.md)."""
+"""As the diagnosis: the integrator's error is below the sensors' noise."""
 SCHEDULE = Schedule(randoms=2, vias=22, periodic_s=35.0, hold_s=3.0)
 """146 s or a little more: two random trials, a periodic one, a static one."""
 Kind = Literal[

@@ -1,6 +1,6 @@
 """Pictures of results in docs/img, made anew: python docs/site/result_pictures.py [FOLDER]
 
-Runs the two scenarios of the diagnosis, copies what their verdicts show, and photographs report pages in an installed
+Runs the scenario of a hidden effect, copies what its verdict shows, and photographs report pages in an installed
 Chromium. FOLDER (out/pictures) keeps verdicts and pages. Of the paper's experiment the page that `make paper` left in
 out/paper is taken.
 """
@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
         sys.exit(f"{paper} is not there; run 'make paper' first")
     folder.mkdir(parents=True, exist_ok=True)
     results(folder)
-    copied(folder / "verdict", folder / "law")
+    copied(folder / "verdict")
     with sync_playwright() as started:
         path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
         browser = started.chromium.launch(executable_path=path, args=FLAGS)
@@ -57,8 +57,7 @@ def main(folder: Path) -> None:
 
 
 def results(folder: Path) -> None:
-    """An estimate of a healthy team, and the verdicts of both scenarios; pages name files relative to the folder."""
-    shutil.rmtree(folder / "law", ignore_errors=True)
+    """An estimate of a healthy team, and the verdict of the scenario; pages name files relative to the folder."""
     healthy = [f"healthy/trial{k}_{kind}.parquet" for k, kind in ((1, "random"), (2, "periodic"))]
     faulty = [f"hidden/trial{k}.parquet" for k in (1, 2)]
     mocobot = ("-m", "mocobot")
@@ -77,20 +76,17 @@ def results(folder: Path) -> None:
         [*mocobot, "estimate", *healthy, "--out", "estimate/est.json", "--force"],
         [str(SCENARIOS / "hidden_effect.py"), "hidden"],
         [*mocobot, "diagnose", *faulty, "--out", "verdict", "--force"],
-        [str(SCENARIOS / "unlisted_law.py"), "law"],
         *([*mocobot, "report", part, "--force"] for part in ("estimate", "verdict")),
     ):
         subprocess.run([sys.executable, *words], check=True, cwd=folder)
 
 
-def copied(verdict: Path, law: Path) -> None:
-    """Plots of the verdicts, as wide as a page shows them."""
+def copied(verdict: Path) -> None:
+    """Plots of the verdict, as wide as a page shows them."""
     residual = next(p for p in sorted(verdict.glob("residual_*.png")) if p.stem != "residual_against")
     sources = {
         "diagnosis_residual.png": residual,
-        "diagnosis_evidence.png": verdict / "evidence.png",
         "diagnosis_closed_loop.png": verdict / "closed_loop.png",
-        "diagnosis_law.png": law / "law.png",
     }
     for name, source in sources.items():
         picture = Image.open(source).convert("RGB")

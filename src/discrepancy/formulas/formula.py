@@ -79,8 +79,9 @@ class Curve:
     def project(self) -> Array:
         """Amplitudes of the basis that are nearest to series, shape (K, Q)."""
         if self.constant:
-            return np.linalg.pinv(self.basis)
-        return np.linalg.pinv(np.column_stack([np.ones(len(self.x)), self.basis]))[1:]
+            return np.asarray(np.linalg.pinv(self.basis), dtype=np.float64)
+        rows = np.linalg.pinv(np.column_stack([np.ones(len(self.x)), self.basis]))[1:]
+        return np.asarray(rows, dtype=np.float64)
 
     @property
     def thinned(self) -> Curve:

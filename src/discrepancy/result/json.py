@@ -55,7 +55,7 @@ scatter             kinds of which all places are off by more than the tolerance
                                    off first
 foretold            {as_designed, as_found}: chi2/n of trials left out, the machine as designed and as the other trials
                     find it; null where nothing scatters, or for a single trial
-evidence            the strongest candidates, see ``evidence_list``: {before, after} with nothing found and with what
+evidence            the strongest candidates: {before, after} with nothing found and with what
                     is found (null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed;

@@ -30,7 +30,7 @@ class Law(Effect):
     are as seen. A sum of signals is one, too: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
 
     ``number``, ``second`` and ``phase_rad`` are what the function has inside: a knee, the periods a turn of a sine, a
-    time constant, half the width of a play (docs/diagnosis/laws.md).
+    time constant, half the width of a play (docs/effects.md).
     """
 
     repeats = True

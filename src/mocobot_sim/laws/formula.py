@@ -26,7 +26,7 @@ class Formula:
         function: as in ``functions.FUNCTIONS``.
         of, times: signals, all in SI; ``times`` is empty where there is none.
         amplitude: in the target's unit over those of the signals.
-        number, second, phase_rad: what the function has inside (docs/diagnosis/laws.md).
+        number, second, phase_rad: what the function has inside (docs/effects.md).
     """
 
     targets: ClassVar[tuple[re.Pattern[str], str]]

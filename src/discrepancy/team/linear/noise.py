@@ -43,7 +43,7 @@ CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
 """Cut-off of signals in which something chatters, over its frequency, and at most over the sampling rate. Derived: the
 mean of a torque times the angle at which it acts is that of both oscillating together, of which the square of the
 filter's gain is left: at 27 Hz and 100 Hz 0.4 % with the usual cut-off and all with 45 Hz, at 1 kHz 97 % with 54 Hz.
-Measured: of torques of +- 7 N m it is up to 49 mN (docs/diagnosis/validation.md, 'Robots that chatter')."""
+Measured: of torques of +- 7 N m it is up to 49 mN."""
 
 MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
 """Up to where, and the share of it that is left above. Measured: of the same, a twentieth of the power from 3 Hz on,
