@@ -250,7 +250,7 @@ class TeamProblem:
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest shapes and pushes; or, late, laws that no table lists."""
         if late:
-            v = np.maximum(posterior.variance, posterior.left[0] / np.maximum(self.cells.rows, 1.0))
+            v = posterior.variance
             noise = 0.5 * float(np.sum(self.cells.rows * (v - 1.0 - np.log(v))))
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
             return self.laws_of.proposed(self.left(posterior), self._white) if noise > least else []
