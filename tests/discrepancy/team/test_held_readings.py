@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_quick import generated, quick_set
 
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
 from estimator.recording.model import Recording
+from hidden_team import recorded
 
 ROBOT, JOINT = 2, 1
 FIRST, EVERY, HELD = 331, 170, 13
@@ -28,8 +28,7 @@ def holding(recording: Recording) -> Recording:
 
 @pytest.fixture(scope="module")
 def found() -> TeamDiagnosed:
-    recordings, _ = generated(quick_set("clean", 6, payload="b"))
-    return diagnose_team([holding(r) for r in recordings], closed_loop=False)
+    return diagnose_team([holding(r) for r in recorded("b", seed=6)], closed_loop=False)
 
 
 def test_the_encoder_is_told_and_nothing_besides(found):
