@@ -57,15 +57,21 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     first, stop = edges[:-1], edges[1:]
     there = (stop - first >= LEAST) & (stop + 3 * PERIODS <= len(x))
     first, stop = first[there], stop[there]
-    stops, leaves = np.zeros((2, len(first)), dtype=bool)
-    for p in range(PERIODS, 0, -1):
+
+    def changes(p: int) -> tuple[Array, Array, Array, Array, Array]:
+        """The most that a joint at rest changes in p periods, and what it does before the span and after it."""
         most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
-        before, back = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0)
-        into, earlier = np.abs(x[first] - x[before]), np.abs(x[before] - x[back])
-        out, after = np.abs(x[stop - 1 + p] - x[stop - 1]), np.abs(x[stop - 1 + 2 * p] - x[stop - 1 + p])
+        before, back, end = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0), stop - 1
+        each = ((first, before), (before, back), (end + p, end), (end + 2 * p, end + p))
+        into, earlier, out, after = (np.abs(x[b] - x[a]) for a, b in each)
+        return most, into, earlier, out, after
+
+    stops, leaves = np.zeros((2, len(first)), dtype=bool)
+    for most, into, earlier, out, after in map(changes, range(1, PERIODS + 1)):
         # Twice a change less another: two more roundings.
         enters = (2.0 * into - earlier > most + 2.0 * step) & (earlier > most)
         stops, leaves = stops | enters, leaves | (2.0 * out - after > most + 2.0 * step)
+    most, into, _, out, after = changes(1)
     if not np.any((into > most) & (out > most + after)):
         return []
     # Where it stood before, too: from rest with one acceleration, it takes twice as long as at the speed at the end,
@@ -79,7 +85,7 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
 
-def filled(x: Array, steps: Sequence[float]) -> tuple[Array, tuple[Held, ...], Array]:
+def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held, ...], Array]:
     """Readings with held ones interpolated, which these are, and how wrong the interpolation may be.
 
     The last is the difference between two orders of interpolation over the standard deviation of the reading's

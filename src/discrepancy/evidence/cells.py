@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,13 +142,13 @@ class Cells:
         self.count += len(series)
         return list(range(first, self.count))
 
-    def add_rows(self, X: Array) -> list[int]:
+    def add_rows(self, X: NDArray[Any]) -> list[int]:
         """Append columns given by their rows in each channel, in the order of the cells, shape (C, n, k)."""
         first, self._last = self.count, None
         for channel, own in zip(self.channels, X, strict=True):
             seen = np.flatnonzero(own.any(axis=0))
             if len(seen):
-                self._append(channel, (first + seen).tolist(), own[:, seen])
+                self._append(channel, (first + seen).tolist(), own[:, seen].astype(np.float64))
         self.count += X.shape[2]
         return list(range(first, self.count))
 

@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 from discrepancy.evidence.findings import Event, Finding, Verdict
 
 V = TypeVar("V", bound=Verdict)
-TOLD = 3
-"""Times that are told. Chosen: as many as a sentence takes."""
 KIND = "held readings"
 
 
@@ -46,7 +44,7 @@ class HeldReadings:
     def note(self) -> str:
         """A sentence on how often, how long and when."""
         lengths = [1e3 * event.duration_s for event in self.events]
-        when = ", ".join(f"{event.start_s:.2f} s of trial {event.trial + 1}" for event in self.events[:TOLD])
+        when = ", ".join(f"{event.start_s:.2f} s of trial {event.trial + 1}" for event in self.events[:3])
         return (
             f"The encoder of {self.of} holds its last value {len(lengths)} times, for {min(lengths):.0f} to "
             f"{max(lengths):.0f} ms, in all {100.0 * self.share:.1f} % of the time, first from {when}. Rows that it "

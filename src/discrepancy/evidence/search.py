@@ -204,7 +204,7 @@ class Search:
         cells, listed = self.problem.cells, self._grown(state)
         if listed is None:
             return None
-        count, p = cells.count, state.posterior
+        self.best, count, p = listed, cells.count, state.posterior
         wider = replace(p, prior=np.append(p.prior, np.zeros(count - len(p.prior))))
         late = self._grown(replace(state, posterior=wider), late=True)
         if late and late.evidence - state.evidence > 2.0 * (listed.evidence - state.evidence):
@@ -289,7 +289,11 @@ class Search:
         cells, p = self.problem.cells, state.posterior
         proposed = [g for g in self.problem.proposals(p, late=late) if fits(g)]
         count, placed = cells.count, [self.problem.place(g) for g in proposed]
-        wider = Posterior(cells, np.append(p.prior, np.zeros(cells.count - len(p.prior))), p.variance)
+        prior = np.zeros(
+            cells.count
+        )  # a search that was broken off may have left columns, or taken some away
+        prior[: len(p.prior)] = p.prior[: cells.count]
+        wider = Posterior(cells, prior, p.variance)
         pairs = [*((g, g) for g in self.problem.groups if fits(g)), *zip(proposed, placed, strict=True)]
         out = []
         for plain, g in pairs:
