@@ -250,8 +250,10 @@ class TeamProblem:
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest shapes and pushes; or, late, laws that no table lists."""
         if late:
-            v = posterior.variance
-            noise = 0.5 * float(np.sum(self.cells.rows * (v - 1.0 - np.log(v))))
+            rows = self.cells.rows
+            v = np.maximum(posterior.variance, posterior.left[0] / np.maximum(rows, 1.0))
+            each = 0.5 * (rows * (v - 1.0 - np.log(v)) - 1.0)  # chance alone makes half a nat of every band
+            noise = float(np.sum(each[rows > 0.0]))
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
             return self.laws_of.proposed(self.left(posterior), self._white) if noise > least else []
         out: list[Group] = []
@@ -368,8 +370,10 @@ class TeamProblem:
         if group.late:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
-        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
         out = self._stepped(candidate, group, posterior)
+        if group.event and out and self._far(candidate, self.candidates[out[0].identity]):
+            return out  # other shapes would only make up for the wrong times
+        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
         for more in self.rig.grown(candidate):  # the same columns, until its further number has moved
             of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
             out += self._stepped(more, of_more, posterior)
@@ -403,6 +407,12 @@ class TeamProblem:
             numbers,
             np.array(size),
         )
+
+    @staticmethod
+    def _far(one: Candidate, other: Candidate) -> bool:
+        """Whether a number of the shape differs by more than a step over which slopes are taken."""
+        step = CAUSES[one.cause].slope_step
+        return any(abs(x - other.shape[name]) > step(name, x) for name, x in one.shape.items())
 
     def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
         """The cause with the numbers of its shape a Gauss-Newton step further."""
