@@ -39,6 +39,8 @@ NEAR = 3
 """Shapes nearby whose evidence is computed in each step."""
 BLOCK = 64
 """Columns at a time of which copies are made. Chosen: memory."""
+ENDS = 3
+"""Times that each end of a push is set where its linear gain is largest. Chosen: twice is nearly always enough."""
 STEP_SHARE = 1.0
 """Standard deviation of a step of a number of a shape, in that number."""
 EXACT = (
@@ -305,28 +307,41 @@ class TeamProblem:
         """The likeliest push of each duration: force and moment on the payload, constant for a while."""
         if "push" in self.rig.excluded:
             return []
-        found, windows = [], 0
+        found: dict[tuple[int, int, int], float] = {}
+        windows = 0
         for t, (score, D) in enumerate(zip(self.left(posterior), self.wrenches, strict=True)):
-            linear = self.rig.linear[t]
-            m, rate, time = linear.reduction.moving, self.cells.bands.rates_hz[t], linear.reduction.time
+            m, rate = self.rig.linear[t].reduction.moving, self.cells.bands.rates_hz[t]
             Q = np.einsum("nck,nc->nk", D[:m], score[:m, -6:])
             R = np.einsum("nck,ncl->nkl", D[:m], D[:m])
             q, r = (np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)]) for x in (Q, R))
-            ridge = 1e-6 * np.eye(6) * np.trace(r[-1]) / max(m, 1)
+            r = r + np.arange(m + 1.0)[:, None, None] * 1e-6 * np.eye(6) * np.trace(r[-1]) / max(m, 1) ** 2
+
+            def gains(starts: NDArray[np.intp], ends: NDArray[np.intp], q: Array = q, r: Array = r) -> Array:
+                dq, dr = q[ends] - q[starts], r[ends] - r[starts]
+                return 0.5 * np.einsum("wk,wk->w", dq, np.linalg.solve(dr, dq[..., None])[..., 0])
+
             for seconds in TEAM_PUSH_S:
                 n = max(2, round(seconds * rate))
                 if 2 * n > m:
                     continue
-                dq, dr = q[n:] - q[:-n], r[n:] - r[:-n] + ridge
-                gain = 0.5 * np.einsum("wk,wk->w", dq, np.linalg.solve(dr, dq[..., None])[..., 0])
-                windows += 2 * len(gain) // n
-                best = int(np.argmax(gain))
-                found.append((float(gain[best]), t, float(time[best]), seconds))
+                starts = np.arange(m + 1 - n)
+                windows += 2 * len(starts) // n
+                first = int(np.argmax(gains(starts, starts + n)))
+                stop = first + n
+                for _ in range(ENDS):  # the octaves are where a search for its ends begins
+                    stop = (
+                        first
+                        + 2
+                        + int(np.argmax(gains(np.full(m - first - 1, first), np.arange(first + 2, m + 1))))
+                    )
+                    first = int(np.argmax(gains(np.arange(stop - 1), np.full(stop - 1, stop))))
+                found[t, first, stop] = float(gains(np.array([first]), np.array([stop]))[0])
+        events = []
+        for t, first, stop in sorted(found, key=lambda key: -found[key])[:NEAR]:
+            start = float(self.rig.linear[t].reduction.time[first])
+            events.append(Transient(t, start, (stop - first) / self.cells.bands.rates_hz[t]))
         given = self.rig.tolerances.get("push", {})
-        return [
-            self.group_of(CAUSES["push"].event(given, Transient(t, start, seconds)), -math.log(windows))
-            for _, t, start, seconds in sorted(found, reverse=True)[:NEAR]
-        ]
+        return [self.group_of(CAUSES["push"].event(given, when), -math.log(windows)) for when in events]
 
     @property
     def wrenches(self) -> list[Array]:
@@ -371,8 +386,6 @@ class TeamProblem:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
         out = self._stepped(candidate, group, posterior)
-        if group.event and out and self._far(candidate, self.candidates[out[0].identity]):
-            return out  # other shapes would only make up for the wrong times
         near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
         for more in self.rig.grown(candidate):  # the same columns, until its further number has moved
             of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
@@ -407,12 +420,6 @@ class TeamProblem:
             numbers,
             np.array(size),
         )
-
-    @staticmethod
-    def _far(one: Candidate, other: Candidate) -> bool:
-        """Whether a number of the shape differs by more than a step over which slopes are taken."""
-        step = CAUSES[one.cause].slope_step
-        return any(abs(x - other.shape[name]) > step(name, x) for name, x in one.shape.items())
 
     def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
         """The cause with the numbers of its shape a Gauss-Newton step further."""

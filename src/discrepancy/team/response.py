@@ -112,16 +112,22 @@ class Hypothesis:
         return out
 
     @cached_property
+    def beside(self) -> list[int]:
+        """Columns of parts and laws that have the values that all in the model together gives them."""
+        parts = [k for part in self.carried.values() for k in part]
+        return [*parts, *(k for group, _ in self.laws for k in group.columns)]
+
+    @cached_property
     def alone(self) -> NDArray[np.intp]:
         """Columns of unknowns and causes."""
         p = self.problem
-        own = [k for group, _ in (*self.laws, *((g, c) for c, g in self.causes)) for k in group.columns]
+        own = [k for _, group in self.causes for k in group.columns]
         return np.array([*p.shared, *(k for local in p.local for k in local), *own], dtype=np.intp)
 
     @cached_property
     def columns(self) -> NDArray[np.intp]:
         """Columns that a fit needs: where healthy parts are carried, of all that is in the model."""
-        return np.flatnonzero(self.state.posterior.prior) if self.carried else np.sort(self.alone)
+        return np.flatnonzero(self.state.posterior.prior) if len(self.beside) else np.sort(self.alone)
 
     @cached_property
     def _all(self) -> tuple[Array, Array]:
@@ -155,12 +161,9 @@ class Hypothesis:
         if own and len(self.problem.local) > 1 and not self.of_trials:
             G, b = G - own[0], b - own[1]
         prior = self.state.posterior.prior[self.columns]
-        x, carried = (
-            np.zeros(len(self.columns)),
-            self._at([k for part in self.carried.values() for k in part]),
-        )
-        if self.carried:
-            x[carried] = _mean(G, b, prior)[carried]
+        x, beside = np.zeros(len(self.columns)), self._at(self.beside)
+        if len(beside):
+            x[beside] = _mean(G, b, prior)[beside]
         # Causes are what they are beside that: what else may be off has no share of what they do.
         prior = np.where(np.isin(self.columns, self.alone), prior, 0.0)
         x += _mean(G, b - G @ x, prior)

@@ -231,8 +231,8 @@ def test_what_is_in_another_part_is_found(recording) -> None:
     assert (friction["robot"], friction["joint"]) == (2, 1)
     coulomb, viscous = (friction["parameters"][name] for name in FRICTION)
     assert coulomb["value"] == pytest.approx(FRICTION["coulomb_Nm"], rel=0.06)
-    # Of one recording a minute long it is known to 5.4 %.
-    assert viscous["se"] < 0.06 * FRICTION["viscous_Nms_per_rad"]
+    # Three parts of 13 s tell it to 9 %, the error of its law included.
+    assert viscous["se"] < 0.1 * FRICTION["viscous_Nms_per_rad"]
     assert viscous["value"] == pytest.approx(FRICTION["viscous_Nms_per_rad"], abs=2.0 * viscous["se"])
     assert push["parameters"]["force_y_N"]["value"] == pytest.approx(2.0, rel=0.1)
     assert push["parameters"]["start_s"]["value"] == pytest.approx(41.0, abs=0.03)
