@@ -15,7 +15,7 @@ CEILINGS = {
     "mocobot_logs": 6_830,
     "mocobot_inspect": 3_410,
     "mocobot_sim": 6_280,
-    "discrepancy": 12_100,
+    "discrepancy": 12_300,
     "mocobot_view": 2_200,
     "mocobot_report": 3_570,
     "mocobot": 4_800,
