@@ -113,9 +113,9 @@ class Diagnose:
     strict: Flag = False
     """Exit with 1 if the verdict is neither consistent nor explained."""
     verbose: Flag = False
-    """With --model: print all that report.txt says."""
+    """Print all that report.txt says."""
     seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
-    """With --model: end after this time with the best verdict so far, as Ctrl-C does."""
+    """End after this time with the best verdict so far, as Ctrl-C does."""
     jobs: int = 2
     """Parallel processes of a diagnosis without --model, which needs one."""
     scheduler: Scheduler = None
@@ -127,7 +127,7 @@ class Diagnose:
     closed_loop: bool = True
     """Run the recorded commands again, without and with what is found."""
     laws: Literal["auto", "always", "never"] = "auto"
-    """Look for laws that the catalogue lacks: where something unlisted is left or a cause is unsure, always, never."""
+    """Look for laws that no table lists: where the noise is louder than the sensors', always, or never."""
     odds: float = ODDS
     """Odds of any cause being there before the data are seen; more where a fault is suspected."""
     whole: bool = False

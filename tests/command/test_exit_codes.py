@@ -46,7 +46,7 @@ def test_a_verdict(
         def __str__(self) -> str:
             return "what was found"
 
-    found = Found(diagnosis=SimpleNamespace(verdict=verdict), estimates=None)
+    found = Found(to_dict=lambda: {"verdict": verdict})
     monkeypatch.setattr("mocobot.commands.diagnose.diagnose_team", lambda *_, **__: found)
     assert run(capsys, "diagnose", brief) == (0, "what was found\n", "")
     said = f"mocobot: the verdict is {verdict.replace('_', ' ')}" if strict else ""

@@ -117,7 +117,6 @@ REFUSED = {
     "no time": (
         ["diagnose", "{log}", "--model", "{model}", "--seconds", "0"], "--seconds is 0; it must be above 0", []
     ),
-    "time of a team": (["diagnose", "{log}", "--seconds", "5"], "--seconds goes with --model", []),
     "jobs": (["diagnose", "{log}", "--model", "{model}", "--jobs", "0"], "jobs is 0; it must be at least 1", []),
     "output over the model": (["inspect", "{log}", "--model", "{model}", "--json", "{model}"], "is an input", []),
     "design": (["inspect", "{log}", "--model", "{model}", "--design", "d.toml"], "--design is of a team's robots", []),

@@ -190,7 +190,7 @@ class Search:
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
             self.say(f"{len(state.chosen)} found, looking for more")
-            grown = self._first(state) or self._exchanged(state) or self._grown(state, late=True)
+            grown = self._grown(state) or self._exchanged(state) or self._grown(state, late=True)
             settled = None if grown is None else self.settled(grown)
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
                 break  # one objective that rises, or a search would go round in circles
@@ -198,19 +198,6 @@ class Search:
             if any(cause in early for cause, _ in state.keys - before.keys):
                 break
         return self._pruned(self._named(state), fresh=False)
-
-    def _first(self, state: State) -> State | None:
-        """A likelier set with one cause more: with a late one if no other does half as much."""
-        cells, listed = self.problem.cells, self._grown(state)
-        if listed is None:
-            return None
-        self.best, count, p = listed, cells.count, state.posterior
-        wider = replace(p, prior=np.append(p.prior, np.zeros(count - len(p.prior))))
-        late = self._grown(replace(state, posterior=wider), late=True)
-        if late and late.evidence - state.evidence > 2.0 * (listed.evidence - state.evidence):
-            return late
-        cells.truncate(count)
-        return listed
 
     def settled(self, state: State) -> State:
         """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
