@@ -74,9 +74,9 @@ def _without(search: Search, state: State, own: Chosen) -> State:
 
 
 def _nothing(search: Search, state: State, own: Chosen, without: State) -> float:
-    """Log evidence of nothing in a cause's place: it is within its tolerance, or laws of the others leave it.
+    """Log evidence that a cause is not there: its trace is within its tolerance, or an error of the others' laws.
 
-    They leave nothing that is worth more than they are, be that taken up by its tolerance.
+    Laws are off by less than they explain. So what the tolerance has to take up is subtracted from their worth.
     """
     empty = search.settled(search.value((), without.posterior))
     worth = without.evidence - empty.evidence - search.tolerated(state, own)

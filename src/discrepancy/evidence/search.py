@@ -395,7 +395,7 @@ class Search:
         return state
 
     def tolerated(self, state: State, own: Chosen) -> float:
-        """Log evidence that a tolerance adds in place of its cause, at the noise with that."""
+        """Log evidence that a cause's columns add within their tolerance, at the noise learnt with the cause."""
         columns = sorted(own.group.columns)
         healthy = self.prior([c for c in state.chosen if c is not own], None)[columns]
         worth = state.posterior.worth

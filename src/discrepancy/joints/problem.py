@@ -534,7 +534,7 @@ class _Builder:
         for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
             if signal == "neighbour's torque" and not j:
                 continue
-            # What gives way to gravity is off by a function of the position, too: that spans elasticity.
+            # Gravity bends an elastic joint by a function of its position: an error of the reading spans that.
             read, slab = signal == "reading", READ_RAD if signal == "reading" else self.spans[j].torque
             index = [
                 self.add(f"{n} unlisted {signal} {k}", 0.0, self.out.displaced(j, x) if read else {j: x})
