@@ -29,7 +29,7 @@ class Group:
         shape: numbers inside the columns.
         least: smallest possible value of each, -inf without a bound; empty where none has a bound.
         event: whether it acts for a while; its columns exist only while it is in the set.
-        late: whether it is offered only where no other group is worth adding.
+        late: whether no table lists it.
         family: groups of one family span each other and exclude each other; empty of those that have none.
         members: of a kind, the columns of each of its members; their values are alike by half of their variance.
     """
@@ -50,6 +50,11 @@ class Group:
     def key(self) -> tuple[str, str]:
         """Cause and place."""
         return self.cause, self.place
+
+    @property
+    def second(self) -> bool:
+        """Whether it is offered only where no listed cause that lasts is worth adding."""
+        return self.event or self.late
 
     @property
     def identity(self) -> tuple[str, str, tuple[tuple[str, float], ...]]:

@@ -69,7 +69,7 @@ class Linear(Protocol):
         ...
 
     def proposals(self, posterior: Posterior, *, late: bool = False) -> Sequence[Group]:
-        """Events and shapes whose columns are not in the problem, the likeliest first; or those that are late."""
+        """Events and shapes whose columns are not in the problem, the likeliest first; ``late``: and laws."""
         ...
 
     def place(self, group: Group) -> Group:
@@ -103,6 +103,10 @@ class State:
     def keys(self) -> set[Key]:
         """What and where the causes are."""
         return {c.group.key for c in self.chosen}
+
+
+Bent = Callable[[State, frozenset[str]], bool]
+"""Whether a problem is not linear any more around a state with some new causes."""
 
 
 @dataclass(eq=False)
@@ -184,7 +188,7 @@ class Search:
             state = self._with_errors(state, one)
         return self._pruned(self.settled(state), fresh=False)
 
-    def run(self, state: State, early: Collection[str] = ()) -> State:
+    def run(self, state: State, bent: Bent = lambda state, new: False) -> State:
         """The likeliest set from another on; it ends early with a cause from which on the problem is not linear."""
         state = self._pruned(self.settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes and not self.stop():
@@ -195,7 +199,7 @@ class Search:
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
                 break  # one objective that rises, or a search would go round in circles
             state, before = settled, state
-            if any(cause in early for cause, _ in state.keys - before.keys):
+            if bent(state, frozenset(cause for cause, _ in state.keys - before.keys)):
                 break
         return self._pruned(self._named(state), fresh=False)
 
@@ -218,7 +222,7 @@ class Search:
                 self.say(f"{out.group.name} -> members: {parts.evidence - state.evidence:.0f} nats")
                 return parts
             cells.truncate(count)
-            rivals = [c for c in self.rivals(without, out.group) if out.group.late or not c.group.late]
+            rivals = [c for c in self.rivals(without, out.group) if out.group.second or not c.group.late]
             for chosen in rivals[: self.settings.tried]:
                 count = cells.count
                 other = self.with_one(rest, chosen, without.posterior)
@@ -262,7 +266,7 @@ class Search:
         gain = without.posterior.gain(own, self.settings.octaves)[0] + own.log_prior - self.against
         least = gain - self.settings.within_nats
         return [
-            c for g, c in self.offers(without)
+            c for g, c in self.offers(without, late=own.second)
             if g >= least and c.group.name != own.name and not (own.event and c.group.cause == own.cause)
         ]  # fmt: skip
 
@@ -329,7 +333,7 @@ class Search:
             offers = [
                 (gain, c)
                 for gain, c in self.offers(where, late=late)
-                if c.group.late == late and gain > least
+                if c.group.second == late and gain > least
             ]
             known = {c.group.name for c in out}
             out += [c for _, c in offers[:most] if c.group.name not in known]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection
 from dataclasses import dataclass
 
-from discrepancy.evidence.search import Search, State
+from discrepancy.evidence.search import Bent, Search, State
 
 
 @dataclass
@@ -27,10 +26,10 @@ class Until:
         self.broken = self.broken or time.monotonic() > self.end_s
         return self.broken
 
-    def run(self, search: Search, state: State, early: Collection[str] = ()) -> State:
+    def run(self, search: Search, state: State, bent: Bent = lambda state, new: False) -> State:
         """The likeliest set; the best so far where it is broken off."""
         try:
-            return search.run(state, early)
+            return search.run(state, bent)
         except KeyboardInterrupt:
             self.broken = True
             return search.best or state

@@ -132,12 +132,19 @@ class Formula:
         columns = _columns(self.terms, x, self.constant)
         return columns @ self.values[: columns.shape[1]]
 
-    def through(self, x: Array, f: Array) -> Formula:
-        """The same terms through values f of a function at x, shape (Q,) each, up to a constant that is not its own."""
-        G = _columns(self.terms, x, constant=True)
-        values = np.linalg.lstsq(G, f, rcond=None)[0]
-        kept = G.shape[1] - (not self.constant)
-        return replace(self, values=np.append(values[:kept], self.values[kept:]))
+    def through(self, x: Array, basis: Array, mean: Array) -> Formula:
+        """The same terms with amplitudes by other data.
+
+        Args:
+            x: the signal, shape (Q,).
+            basis, mean: functions of it there (Q, K) and their amplitudes (K,); a formula has more than they hold.
+        """
+        G = _columns(self.terms, x, self.constant)
+        if not self.constant:
+            G, basis = G - G.mean(axis=0), basis - basis.mean(axis=0)
+        held = basis @ (np.linalg.pinv(basis) @ G)
+        values = np.linalg.lstsq(held, basis @ mean, rcond=None)[0]
+        return replace(self, values=np.append(values, self.values[len(values) :]))
 
     @property
     def _each(self) -> Iterator[tuple[str, Shape, Numbers, slice, Sequence[int]]]:

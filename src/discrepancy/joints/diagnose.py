@@ -68,8 +68,11 @@ def diagnose(
     smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
-    early = CURVED if given.changed is None else ()
-    first = Outcome(problem, search, until.run(search, search.fixed(()), early), finished=not until.broken)
+
+    def bent(state: State, new: frozenset[str]) -> bool:
+        return given.changed is None and not new.isdisjoint(CURVED)
+
+    first = Outcome(problem, search, until.run(search, search.fixed(()), bent), finished=not until.broken)
     if given.changed is not None or until():
         return first  # what is wrong in all logs has no values of its own to be linear around
     again = partial(_around, smooth=smooth, given=given)

@@ -157,8 +157,6 @@ class JointProblem:
 
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
         """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
-        if late:
-            return []
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]

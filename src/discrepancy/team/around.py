@@ -122,6 +122,19 @@ def resting_of(found: Found) -> dict[str, float]:
     return {kind: max(1.0, float(np.median(x)) / NORMAL_MEDIAN) if x else 1.0 for kind, x in sizes.items()}
 
 
+def bent(problem: TeamProblem, state: State) -> bool:
+    """Whether straight columns miss too much where a state finds robots and unknowns.
+
+    Raises:
+        InputError: there are no such robots.
+    """
+    found = found_in(problem, state)
+    units, _, shared = robots_at(problem.rig, found)
+    return curvature(problem, state, found, units, shared) >= (
+        STRAIGHT_BESIDE_CHI2_PER_N if found.active else STRAIGHT_CHI2_PER_N
+    )
+
+
 def around(problem: TeamProblem, state: State) -> TeamProblem | None:
     """The problem around where a state finds the robots; None where columns are straight that far.
 
@@ -132,9 +145,7 @@ def around(problem: TeamProblem, state: State) -> TeamProblem | None:
     units, origin, shared = robots_at(rig, found)
     resting = resting_of(found)
     same = all(0.5 < resting[kind] / rig.resting.get(kind, 1.0) < 2.0 for kind in resting)
-    straight = curvature(problem, state, found, units, shared) < (
-        STRAIGHT_BESIDE_CHI2_PER_N if found.active else STRAIGHT_CHI2_PER_N
-    )
+    straight = not bent(problem, state)
     if straight and same:
         return None
     sensed, limits = rig.sensed, limits_of(rig.tolerances, resting)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
@@ -12,6 +13,7 @@ from discrepancy.team.around import (
     STRAIGHT_BESIDE_CHI2_PER_N,
     STRAIGHT_CHI2_PER_N,
     around,
+    bent,
     exact,
     opened_by,
     placed,
@@ -62,11 +64,13 @@ def search_team(
         if moved is None:
             break
         say("linear around the robots as they are found")
-        problem = moved
-        search = replace(search, problem=problem)
-        state = search.fixed(())
+        there = replace(search, problem=moved)
+        found = there.fixed(())
+        if found.evidence < state.evidence:
+            break  # something else pulls at the robots: where they are shows beside it only
+        problem, search, state = moved, there, found
     nothing = search, state
-    state = until.run(search, state, LEAVE_OPEN)
+    state = until.run(search, state, partial(_beyond, problem))
     for _ in range(2 * settings.rounds):
         if not state.chosen or until():
             break
@@ -74,10 +78,18 @@ def search_team(
         problem, search, state, same = _beside(problem, search, state)
         if same:
             break
-        state = until.run(search, state, LEAVE_OPEN)
-        if state.keys == before:
+        state = until.run(search, state, partial(_beyond, problem))
+        if state.keys == before and not _beyond(problem, state, frozenset()):
             break
     return TeamOutcome(problem, search, state, nothing, not until.broken)
+
+
+def _beyond(problem: TeamProblem, state: State, new: frozenset[str]) -> bool:
+    """Whether a search goes on only in another problem: beside what causes leave open, or linear elsewhere."""
+    try:
+        return not new.isdisjoint(LEAVE_OPEN) or bent(problem, state)
+    except InputError:  # no such robots: what acts on these is not found yet
+        return False
 
 
 def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:

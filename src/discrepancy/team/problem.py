@@ -250,22 +250,24 @@ class TeamProblem:
     # --- proposals
 
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
-        """The likeliest shapes and pushes; or, late, laws that no table lists."""
+        """The likeliest shapes and pushes; ``late``: and laws that no table lists."""
+        out: list[Group] = []
         if late:
             rows = self.cells.rows
             v = np.maximum(posterior.variance, posterior.left[0] / np.maximum(rows, 1.0))
             each = 0.5 * (rows * (v - 1.0 - np.log(v)) - 1.0)  # chance alone makes half a nat of every band
             noise = float(np.sum(each[rows > 0.0]))
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
-            return self.laws_of.proposed(self.left(posterior), self._white) if noise > least else []
-        out: list[Group] = []
+            # In learnt noise a law hides that is told beside that of the sensors.
+            quiet = replace(posterior, variance=np.minimum(v, self.sensors))
+            out += self.laws_of.proposed(self.left(quiet), self._white) if noise > least else []
         if self.listed is not None:
-            gains = self.gains(posterior, self.listed)
+            gains, most = self.gains(posterior, self.listed), len(out) + LIKELIEST
             for i in np.argsort(-gains):
                 group = self.listed.groups[i]
                 if sum(g.key == group.key for g in out) < 2:
                     out.append(group)
-                if len(out) == LIKELIEST:
+                if len(out) == most:
                     break
         return [*out, *self.pushes(posterior)]
 

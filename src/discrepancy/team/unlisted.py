@@ -265,7 +265,7 @@ class Laws:
         """
         own = self.of(group)
         x = self.signal(own.variable)
-        formula = law.formula.through(x, self.functions(own) @ mean)
+        formula = law.formula.through(x, self.functions(own), mean)
         yield from replace(law, formula=formula).pieces()
         if own.first and own.times is None:
             yield {
