@@ -97,7 +97,8 @@ def _as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
 def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, shared: Shared) -> float:
     """Mean square of what straight columns miss of robots and unknowns, in units of the noise's variance."""
     x = np.zeros(len(state.posterior.mean))
-    moved = [k for k, label in enumerate(problem.labels) if label is None or places_of(label[0]) is not None]
+    moved = [k for k, label in enumerate(problem.labels) if label and places_of(label[0]) is not None]
+    moved += [*problem.shared, *(k for own in problem.local for k in own)]
     x[moved] = state.posterior.mean[moved]
     exact = []
     for trial, white, local in zip(problem.rig.linear, problem.rig.whitening, found.local, strict=True):

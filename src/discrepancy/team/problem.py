@@ -29,7 +29,7 @@ TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 
 EDGES_HZ = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
 """Octaves of the noise; rows come 12.5 times a second. What rests is a band of its own."""
-UNKNOWN = 1e4
+UNKNOWN = 1e6
 """Standard deviations that the data alone would leave of an unknown, in which its prior is as wide as none."""
 SLAB = 64.0
 """Largest size of a fault that is expected, in tolerances or typical sizes."""

@@ -14,7 +14,7 @@ from discrepancy.numbers import Numbers, number
 from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.design import OmnidDesign
+from estimator.arm.arms import Arms
 from estimator.arrays import Array
 
 Shape = Mapping[str, float]
@@ -217,19 +217,20 @@ class ReadingError(Cause):
 
     @abstractmethod
     def errors(
-        self, signals: Signals, robot: int, joint: int, shape: Shape, design: OmnidDesign
+        self, signals: Signals, robot: int, joint: int, shape: Shape, arm: Arms
     ) -> Sequence[Mapping[str, Array]]:
         """Per parameter what one unit adds to ``phi``, ``theta``, ``tau`` of the robot, shape (Q, 3) or (3,)."""
 
     def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
         signals = trial.adjusted if self.adjusted else trial.signals
-        errors = self.errors(signals, robot, joint, shape, trial.design)
+        errors = self.errors(signals, robot, joint, shape, trial.arm(robot))
         return stack([trial.of_signals(robot, **error) for error in errors])
 
     def undo(
         self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
     ) -> Signals:
-        for value, error in zip(values, self.errors(signals, robot, joint, shape, trial.design), strict=True):
+        errors = self.errors(signals, robot, joint, shape, trial.arm(robot))
+        for value, error in zip(values, errors, strict=True):
             scaled = {name: np.broadcast_to(value * x, (len(signals.time), 3)) for name, x in error.items()}
             signals = signals.minus(**{n: one_robot(x, trial.robots, robot) for n, x in scaled.items()})
         return signals

@@ -1,5 +1,7 @@
 """Lengths of links and tilts of bases."""
 
+from functools import partial
+
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, ReadingError, one_joint, stack
@@ -33,17 +35,17 @@ class LinkLength(ReadingError):
         ]
         return "the leg deviates from its design: " + (", ".join(words) or "by nothing that shows")
 
-    def errors(self, signals, robot, joint, shape, design):
-        angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, design)
+    def errors(self, signals, robot, joint, shape, arm):
+        angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, arm)
         return [{"phi": one_joint(a, joint), "tau": t} for a, t in zip(angle, torque, strict=True)]
 
 
-def _errors(phi, tau, joint, design):
-    """Readings minus those of a leg of design lengths, per metre: angles (3, Q) and torques (3, Q, 3)."""
-    angle, slopes = _phi_error(phi, joint, design)
-    gravity, at = design.gravity_mps2, phi[:, joint]
-    at_knee = 0.5 * design.rod_mass_kg * gravity
-    weight = design.proximal_mass_kg * gravity * design.proximal_com_m + at_knee * design.proximal_length_m
+def _errors(phi, tau, joint, arm):
+    """Readings minus those of a leg of the arm's lengths, per metre: angles (3, Q) and torques (3, Q, 3)."""
+    angle, slopes = _phi_error(phi, joint, arm)
+    at, leg = phi[:, joint], partial(_of_leg, joint=joint)
+    at_knee = 0.5 * arm.gravity_mps2 * leg(arm.rod_mass_kg)
+    weight = arm.gravity_mps2 * leg(arm.proximal_mass_kg) * arm.proximal_com_m + at_knee * leg(arm.proximal_length_m)
     # (I - d(error)/d(phi))^-T on what drives the wrist, to first order ...
     torque = -slopes * (tau[:, joint] - weight * np.cos(at))[:, None]
     # ... and the weight of link and knee at another angle, and of the knee on a longer lever.
@@ -52,18 +54,23 @@ def _errors(phi, tau, joint, design):
     return angle, torque
 
 
-def _phi_error(phi, joint, design):
-    """Reading minus the angle at which a leg of design lengths would reach the same wrist, per metre, shape (3, Q).
+def _of_leg(values, joint):
+    """A number of one leg: as designed all are alike."""
+    return np.broadcast_to(values, 3)[joint]
+
+
+def _phi_error(phi, joint, arm):
+    """Reading minus the angle at which a leg of the arm's lengths would reach the same wrist, per metre, shape (3, Q).
 
     And its derivative by the three angles, (3, Q, 3). It is minus what the rod has of a longer link, a longer rod or a
     wider base, over the rod's leverage.
     """
-    legs, own = leg_geometry(phi, design), np.eye(3)[joint]
+    legs, own = leg_geometry(phi, arm), np.eye(3)[joint]
     rod, knee, lever = legs.rod[:, joint], legs.knee_d1[:, joint], legs.leverage[:, joint]
     u, up, angle = LEG_DIRECTIONS[joint], np.eye(3)[2], phi[:, joint]
     along = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * up
     across = np.cos(angle)[:, None] * up - np.sin(angle)[:, None] * u
-    length = np.full(len(phi), design.rod_length_m)
+    length = np.full(len(phi), _of_leg(arm.rod_length_m, joint))
     shares = np.stack([np.sum(rod * along, axis=1), length, rod @ u])
     # By every angle the wrist moves, and by the leg's own the knee does.
     rod_moves = jacobian_of(legs) - knee[..., None] * own  # (Q, 3, 3)
@@ -97,7 +104,7 @@ class BaseTilt(Cause):
 
     @staticmethod
     def _column(trial, robot, rho):
-        grasps, bases, data, design = trial.shared.grasps, trial.bases, trial.data, trial.design
+        grasps, bases, data, arm = trial.shared.grasps, trial.bases, trial.data, trial.arm(robot)
         samples = len(trial.s)
         raw = np.zeros((samples, trial.channels))
         turn = bases.R[robot] @ rho  # in {b1}
@@ -116,12 +123,12 @@ class BaseTilt(Cause):
         raw[:, -6:-3] = mass * g * up
         raw[:, -3:] = np.cross(mass_c, g * up)
         # The arm's own weight, which the balance takes off the torques.
-        legs = leg_geometry(trial.s[:, robot, PHI], trial.arm(robot))
+        legs = leg_geometry(trial.s[:, robot, PHI], arm)
         at_knee = (
-            design.proximal_mass_kg * design.proximal_com_m / design.proximal_length_m
-            + 0.5 * design.rod_mass_kg
+            arm.proximal_mass_kg * arm.proximal_com_m / arm.proximal_length_m
+            + 0.5 * arm.rod_mass_kg
         )
-        at_wrist = design.wrist_mass_kg + 1.5 * design.rod_mass_kg
+        at_wrist = arm.wrist_mass_kg + 0.5 * np.sum(np.broadcast_to(arm.rod_mass_kg, 3))
         torque = g * (
             at_knee * (legs.knee_d1 @ up_b) + at_wrist * np.einsum("qij,i->qj", jacobian_of(legs), up_b)
         )

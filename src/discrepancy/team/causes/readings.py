@@ -4,6 +4,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import ReadingError, one_joint, one_robot
+from estimator.arm.arms import design_of
 
 
 class Late(ReadingError):
@@ -17,7 +18,7 @@ class Late(ReadingError):
     at = "robot"
     readings = ("tau",)
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         rates = {x: signals.with_rates(getattr(signals, x)[:, robot])[1] for x in self.readings}
         return [{x: -rate for x, rate in rates.items()}]
 
@@ -47,7 +48,7 @@ class PhiZero(ReadingError):
         much = n.either("zero_rad", "too much", "too little")
         return f"the encoder of the driven joint reads {n('zero_rad', 'mrad', 1e3)} {much}"
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         return [{"phi": np.eye(3)[joint]}]
 
 
@@ -68,7 +69,7 @@ class ThetaZero(ReadingError):
         much = n.either("zero_rad", "too much", "too little")
         return f"the encoder of the gimbal joint reads {n('zero_rad', 'mrad', 1e3)} {much}"
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         return [{"theta": np.eye(3)[joint]}]
 
 
@@ -89,7 +90,7 @@ class SeaScale(ReadingError):
         stiffer, small = n.either("scale", "stiffer", "softer"), n.either("scale", "too small", "too large")
         return f"the spring is {n('scale', '%', 1e2)} {stiffer} than assumed, so the torque is read {small}"
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         return [{"tau": one_joint(-signals.tau[:, robot, joint], joint)}]
 
 
@@ -107,7 +108,7 @@ class SeaBias(ReadingError):
             f"the torque sensor reads {n('bias_Nm', 'N m')} {n.either('bias_Nm', 'too much', 'too little')}"
         )
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         return [{"tau": np.eye(3)[joint]}]
 
 
@@ -125,8 +126,8 @@ class SeaHardening(ReadingError):
         hardens = n.either("cubic_Nm_per_rad3", "hardens", "softens")
         return f"the spring {hardens} with its deflection, by {n('cubic_Nm_per_rad3', 'N m/rad^3')} (cubic)"
 
-    def errors(self, signals, robot, joint, shape, design):
-        deflection = signals.tau[:, robot, joint] / design.sea_stiffness_Nm_per_rad
+    def errors(self, signals, robot, joint, shape, arm):
+        deflection = signals.tau[:, robot, joint] / design_of(arm).sea_stiffness_Nm_per_rad
         return [{"tau": one_joint(-(deflection**3), joint)}]
 
 
@@ -156,7 +157,7 @@ class TorqueLag(ReadingError):
     def sentence(self, n):
         return f"the torque sensor follows with a time constant of {n('time_constant_s', 'ms', 1e3, signed=True)}"
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         # truth = reading + T d(reading)/dt
         return [{"tau": -signals.with_rates(signals.tau[:, robot])[1]}]
 
@@ -174,7 +175,7 @@ class SensorLag(ReadingError):
     def sentence(self, n):
         return f"the torque sensor follows with a time constant of {n('time_constant_s', 'ms', 1e3, signed=True)}"
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
         # truth = reading + T d(reading)/dt
         return [{"tau": -one_joint(signals.with_rates(signals.tau[:, robot, joint])[1], joint)}]
 
