@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -21,6 +23,8 @@ MOST = 0.5
 """Share of an angle's readings that repeat others, beyond which its encoder is no worse than slow. Chosen."""
 DIES_CYCLES = 4.0
 """Periods of its cut-off after which the low-pass filter's response is below 1e-4 of its peak. Derived."""
+TYPICAL = 0.8
+"""Share of readings that are neither held nor next to such, of those that move. Chosen."""
 FINEST = 2e-6
 """Step [rad or m] of a reading that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
 
@@ -85,6 +89,25 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
 
+def scatter(x: Array) -> float:
+    """Rounding step that would make the noise of moving readings, from their fourth differences [rad or m].
+
+    Args:
+        x: readings, shape (Q,), of a joint whose own fourth differences are below that.
+    """
+    apart = np.abs(np.diff(x, 4))
+    typical = np.quantile(apart[apart > 0.0], TYPICAL) if apart.any() else 0.0
+    return float(typical / norm.ppf(0.5 + 0.5 * TYPICAL) * math.sqrt(12.0 / 70.0))
+
+
+def _there(spans: Sequence[tuple[int, int]], count: int) -> NDArray[np.bool_]:
+    """Which of so many readings lie in spans."""
+    out = np.zeros(count, dtype=bool)
+    for start, stop in spans:
+        out[start:stop] = True
+    return out
+
+
 def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held, ...], Array]:
     """Readings with held ones interpolated, which these are, and how wrong the interpolation may be.
 
@@ -98,11 +121,12 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
     found, doubt, out = [], np.zeros(len(x)), x
     for column, (own, size) in enumerate(zip(x.T, steps, strict=True)):
         step = size or FINEST
+        if _there(held_spans(own, step), len(own)).mean() > MOST:
+            continue
+        step = max(step, scatter(own)) if size else step
         spans = held_spans(own, step)
-        there = np.zeros(len(own), dtype=bool)
-        for start, stop in spans:
-            there[start:stop] = True
-        if not spans or there.mean() > MOST:
+        there = _there(spans, len(own))
+        if not spans:
             continue
         # Of readings that may have had any value on the joint's way.
         nats = sum((b - a) * np.log1p(abs(own[b] - own[a]) / step) for a, b in spans)

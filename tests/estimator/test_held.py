@@ -119,6 +119,14 @@ def test_a_team_that_moves_is_as_it_was_read():
     np.testing.assert_array_equal(same.phi, recording.phi)
 
 
+def test_readings_that_scatter_by_more_than_their_steps_are_none_that_are_held():
+    """Some are equal by chance, where the joint is about to turn."""
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        recording = moving_team(rounded(sways() + rng.normal(0.0, STEP, len(TIME))))
+        assert not without_held(recording)[1]
+
+
 def test_an_encoder_slower_than_the_log_is_left_as_it_is():
     slow = rounded(sways())[np.arange(len(TIME)) // 10 * 10]
     assert not without_held(moving_team(slow))[1]
