@@ -161,19 +161,15 @@ def _kept(rate: Array, slow: float) -> Array:
 
 
 def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
-    """Where a joint may move against the direction that is kept, or turns round, shape (Q,).
+    """Where a joint rests, turns round, or may move against the direction that is kept, shape (Q,).
 
-    Dry friction is reversed only once a joint has moved by more than it gives way, be that less than encoders show: a
+    At rest friction holds what it has to. Dry friction is reversed only once a joint has moved by more than it gives way, be that less than encoders show: a
     law that reverses it at once takes that for a late torque sensor.
     """
     starts, fastest = _motions(rate)
     counts = np.diff([*starts, len(rate)])
     fast = np.concatenate([np.zeros(len(rate) - int(counts.sum())), np.repeat(fastest, counts)])
-    slow = np.abs(rate) < TURN_RAD_PER_S
-    stretch = np.cumsum(np.diff(slow, prepend=False))
-    turns = np.flatnonzero(np.diff(kept))
-    turning = slow & np.isin(stretch, stretch[[turns, turns + 1]])
-    return turning | ((kept * rate < 0.0) & (fast >= REST_RAD_PER_S))
+    return (np.abs(rate) < TURN_RAD_PER_S) | ((kept * rate < 0.0) & (fast >= REST_RAD_PER_S))
 
 
 def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:
