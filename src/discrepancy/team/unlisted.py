@@ -34,7 +34,7 @@ SLAB = 16.0
 """Largest such error that is expected, in these."""
 UNLISTED_NATS = 5.0
 """Log odds of a listed cause over something that no table lists."""
-OPEN_NATS = 30.0
+OPEN_NATS = 150.0
 """What the noise must be worth beyond that of the sensors, before something unlisted is looked for."""
 LIKELIEST = 8
 """Places and signals whose exact linear gain is computed."""
