@@ -163,8 +163,8 @@ def _kept(rate: Array, slow: float) -> Array:
 def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
     """Where a joint rests, turns round, or may move against the direction that is kept, shape (Q,).
 
-    At rest friction holds what it has to. Dry friction is reversed only once a joint has moved by more than it gives way, be that less than encoders show: a
-    law that reverses it at once takes that for a late torque sensor.
+    At rest friction holds what it has to. It is reversed only once a joint has moved by more than it gives way, be
+    that less than encoders show: a law that reverses it at once takes that for a late torque sensor.
     """
     starts, fastest = _motions(rate)
     counts = np.diff([*starts, len(rate)])

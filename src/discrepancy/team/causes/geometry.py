@@ -45,7 +45,9 @@ def _errors(phi, tau, joint, arm):
     angle, slopes = _phi_error(phi, joint, arm)
     at, leg = phi[:, joint], partial(_of_leg, joint=joint)
     at_knee = 0.5 * arm.gravity_mps2 * leg(arm.rod_mass_kg)
-    weight = arm.gravity_mps2 * leg(arm.proximal_mass_kg) * arm.proximal_com_m + at_knee * leg(arm.proximal_length_m)
+    weight = arm.gravity_mps2 * leg(arm.proximal_mass_kg) * arm.proximal_com_m + at_knee * leg(
+        arm.proximal_length_m
+    )
     # (I - d(error)/d(phi))^-T on what drives the wrist, to first order ...
     torque = -slopes * (tau[:, joint] - weight * np.cos(at))[:, None]
     # ... and the weight of link and knee at another angle, and of the knee on a longer lever.
@@ -124,10 +126,7 @@ class BaseTilt(Cause):
         raw[:, -3:] = np.cross(mass_c, g * up)
         # The arm's own weight, which the balance takes off the torques.
         legs = leg_geometry(trial.s[:, robot, PHI], arm)
-        at_knee = (
-            arm.proximal_mass_kg * arm.proximal_com_m / arm.proximal_length_m
-            + 0.5 * arm.rod_mass_kg
-        )
+        at_knee = arm.proximal_mass_kg * arm.proximal_com_m / arm.proximal_length_m + 0.5 * arm.rod_mass_kg
         at_wrist = arm.wrist_mass_kg + 0.5 * np.sum(np.broadcast_to(arm.rod_mass_kg, 3))
         torque = g * (
             at_knee * (legs.knee_d1 @ up_b) + at_wrist * np.einsum("qij,i->qj", jacobian_of(legs), up_b)
