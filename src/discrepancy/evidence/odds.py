@@ -98,6 +98,8 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     logs = np.array([state.evidence, *(w[0] for w in weighed)])
     share = np.exp(logs - logs.max())
     share /= share.sum()
+    if search.is_usual(state, own):
+        share = np.eye(len(share))[1]  # what its tolerances are for is no fault
     merged: dict[tuple[str, str] | None, Rival] = {}
     for (_, group), p in zip(weighed, share[1:], strict=True):
         key = None if group is None else group.key

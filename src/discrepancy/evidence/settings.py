@@ -30,7 +30,7 @@ class Settings:
         floor_change: relative change of its variances below which that has settled.
         rounds: times the problem is made linear again.
         event_steps: times the instants of an event are moved.
-        apart: standard errors from which a member of a kind stands out.
+        apart: standard errors, or learnt tolerances, from which one of a kind stands out.
         within_nats: linear gain below that of a cause beyond which a rival is not weighed (15: 3e-7 of its odds).
         most_rivals: rivals that are weighed exactly.
         named: least probability of the told set of a cause that is named.
