@@ -1,6 +1,7 @@
 """The trace of that spring: the torque sensor reads what the hose takes besides what the link gets."""
 
 from discrepancy.team.causes.base import ReadingError, one_joint
+from estimator.arm.arms import design_of
 from estimator.arm.delta import inverse_kinematics
 
 
@@ -17,7 +18,8 @@ class JointSpring(ReadingError):
     def sentence(self, n):
         return f"a hose pulls the {self.at} back with {n('stiffness_Nm_per_rad', 'N m/rad')}"
 
-    def errors(self, signals, robot, joint, shape, design):
+    def errors(self, signals, robot, joint, shape, arm):
+        design = design_of(arm)
         home = inverse_kinematics([0.0, 0.0, design.home_height_m], design)[0]
         # All driven joints stand at the same angle at home.
         return [{"tau": one_joint(signals.phi[:, robot, joint] - home, joint)}]
