@@ -222,7 +222,7 @@ class Search:
                 self.say(f"{out.group.name} -> members: {parts.evidence - state.evidence:.0f} nats")
                 return parts
             cells.truncate(count)
-            rivals = [c for c in self.rivals(without, out.group) if out.group.second or not c.group.late]
+            rivals = [c for c in self.rivals(without, out.group) if out.group.second or not c.group.second]
             for chosen in rivals[: self.settings.tried]:
                 count = cells.count
                 other = self.with_one(rest, chosen, without.posterior)

@@ -22,12 +22,8 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.rigid_team.residual import Shared
 
-STRAIGHT_BESIDE_CHI2_PER_N = 0.1
-"""The same beside causes, where a step takes 6 to 10 s. Chosen. Measured: a tether's pull down, known to 0.09 N, is
-0.67 N off where columns miss 34 in chi-square per n, and 0.34, 0.18 and 0.11 N where they miss 2.0, 0.45 and 0.07."""
-
-STRAIGHT_CHI2_PER_N = 0.01
-"""What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
+STRAIGHT_CHI2_PER_N = 1e-3
+"""What curvature adds to chi-square, from which all is linearised again. Chosen: some ten nats of four trials' rows."""
 
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a normal number. Derived."""
@@ -131,9 +127,7 @@ def bent(problem: TeamProblem, state: State) -> bool:
     """
     found = found_in(problem, state)
     units, _, shared = robots_at(problem.rig, found)
-    return curvature(problem, state, found, units, shared) >= (
-        STRAIGHT_BESIDE_CHI2_PER_N if found.active else STRAIGHT_CHI2_PER_N
-    )
+    return curvature(problem, state, found, units, shared) >= STRAIGHT_CHI2_PER_N
 
 
 def around(problem: TeamProblem, state: State) -> TeamProblem | None:

@@ -10,7 +10,6 @@ from discrepancy.evidence.search import Search, State
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.evidence.until import Until
 from discrepancy.team.around import (
-    STRAIGHT_BESIDE_CHI2_PER_N,
     STRAIGHT_CHI2_PER_N,
     around,
     bent,
@@ -114,5 +113,5 @@ def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem
         state = search.settled(search.value(state.chosen, state.posterior))
         if miss < STRAIGHT_CHI2_PER_N:
             break
-        same = same and miss < STRAIGHT_BESIDE_CHI2_PER_N
+        same = same and miss < STRAIGHT_CHI2_PER_N
     return problem, search, state, same
