@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -25,6 +23,8 @@ DIES_CYCLES = 4.0
 """Periods of its cut-off after which the low-pass filter's response is below 1e-4 of its peak. Derived."""
 TYPICAL = 0.8
 """Share of readings that are neither held nor next to such, of those that move. Chosen."""
+TYPICAL_SIGMAS = 1.2816
+"""Standard deviations that such a share of normal numbers stays within. Derived."""
 FINEST = 2e-6
 """Step [rad or m] of a reading that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
 
@@ -96,16 +96,8 @@ def scatter(x: Array) -> float:
         x: readings, shape (Q,), of a joint whose own fourth differences are below that.
     """
     apart = np.abs(np.diff(x, 4))
-    typical = np.quantile(apart[apart > 0.0], TYPICAL) if apart.any() else 0.0
-    return float(typical / norm.ppf(0.5 + 0.5 * TYPICAL) * math.sqrt(12.0 / 70.0))
-
-
-def _there(spans: Sequence[tuple[int, int]], count: int) -> NDArray[np.bool_]:
-    """Which of so many readings lie in spans."""
-    out = np.zeros(count, dtype=bool)
-    for start, stop in spans:
-        out[start:stop] = True
-    return out
+    sigma = np.quantile(apart[apart > 0.0], TYPICAL) / TYPICAL_SIGMAS if apart.any() else 0.0
+    return float(sigma * np.sqrt(12.0 / 70.0))
 
 
 def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held, ...], Array]:
@@ -121,13 +113,13 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
     found, doubt, out = [], np.zeros(len(x)), x
     for column, (own, size) in enumerate(zip(x.T, steps, strict=True)):
         step = size or FINEST
-        if _there(held_spans(own, step), len(own)).mean() > MOST:
+        plain = held_spans(own, step)
+        spans = held_spans(own, max(step, scatter(own))) if size else plain
+        if not spans or sum(b - a for a, b in plain) > MOST * len(own):
             continue
-        step = max(step, scatter(own)) if size else step
-        spans = held_spans(own, step)
-        there = _there(spans, len(own))
-        if not spans:
-            continue
+        there = np.zeros(len(own), dtype=bool)
+        for start, stop in spans:
+            there[start:stop] = True
         # Of readings that may have had any value on the joint's way.
         nats = sum((b - a) * np.log1p(abs(own[b] - own[a]) / step) for a, b in spans)
         found.append(Held(column, tuple(spans), float(nats)))
@@ -143,10 +135,8 @@ def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Arr
     angles = np.stack([recording.phi, recording.theta], axis=1)
     x = angles.reshape(len(angles), -1)
     x, held, doubt = filled(x, [rounding_step(own) for own in x.T])
-    if not held:
-        return recording, held, doubt
     phi, theta = np.moveaxis(x.reshape(angles.shape), 1, 0)
-    return replace(recording, phi=phi, theta=theta), held, doubt
+    return replace(recording, phi=phi, theta=theta) if held else recording, held, doubt
 
 
 def angle_of(column: int, robots: int) -> tuple[int, int, int]:
