@@ -16,6 +16,8 @@ from estimator.arrays import Array
 TRACE_S = 0.3
 """Between points of a law's trace [s]."""
 
+OFF_BY = " is off by "
+"""Between place and formula of a sentence."""
 INSIDE = {"time_s": "s", "at_s": "s", "frequency_hz": "Hz", "times": "rad"}
 """Units of numbers inside a term; others have the signal's, ``times`` this over the signal's."""
 
@@ -86,14 +88,14 @@ class Law:
             unit, scale = fitting(self._amplitude(0), max(map(abs, sizes)))
             by = f" times the {self.times.words}" if self.times else ""
             ends = f"{scale * min(sizes):.3g} to {scale * max(sizes):.3g}"
-            return f"{lead} is off by a curve of the {said}{by}, from {ends} {unit}".strip()
+            return f"{lead}{OFF_BY}a curve of the {said}{by}, from {ends} {unit}".strip()
         unit, scale = self._shown
         text = formula.text(
             self.of.symbol,
             unit=lambda power: self._amplitude(power, unit if scale != 1.0 else ""),
             scale=scale,
         )
-        return f"{lead} is off by {f'({text}) {self.times.symbol}' if self.times else text}{where}"
+        return f"{lead}{OFF_BY}{f'({text}) {self.times.symbol}' if self.times else text}{where}"
 
     def pieces(self) -> Iterator[Piece]:
         """The law as functions of one amplitude each, which is how simulators take it."""

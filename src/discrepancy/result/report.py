@@ -9,6 +9,7 @@ from itertools import zip_longest
 from typing import Any
 
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.formulas.law import OFF_BY
 from discrepancy.numbers import number, one_each, parameter, three_digits
 from discrepancy.result.lines import (
     NOTHING_WRONG_HERE,
@@ -204,6 +205,8 @@ def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
         event, numbers = cause.get("event"), members[0]["parameters"]
         told = event or {}
         sizes = _sizes({name: x for name, x in numbers.items() if name not in told}, verbose=verbose)
+        if cause.get("law"):  # a formula says more than its numbers one by one
+            sizes = [cause["sentence"].partition(OFF_BY)[2].removesuffix(".")]
         if event:
             sizes.append(f"trial {event['trial']}, {event['start_s']:.2f} s, for {event['duration_s']:.2f} s")
         yield [cause["place"]], what, sizes or [""], chance
