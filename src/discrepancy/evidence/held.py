@@ -10,7 +10,6 @@ from discrepancy.evidence.findings import Event, Finding, Verdict
 
 V = TypeVar("V", bound=Verdict)
 KIND = "held readings"
-TIMES_TOLD = 3
 
 
 @dataclass(frozen=True)
@@ -45,12 +44,11 @@ class HeldReadings:
     def note(self) -> str:
         """A sentence on how often, how long and when."""
         lengths = [1e3 * event.duration_s for event in self.events]
-        when = ", ".join(
-            f"{event.start_s:.2f} s of trial {event.trial + 1}" for event in self.events[:TIMES_TOLD]
-        )
+        first = self.events[0]
         return (
             f"The encoder of {self.of} holds its last value {len(lengths)} times, for {min(lengths):.0f} to "
-            f"{max(lengths):.0f} ms, in all {100.0 * self.share:.1f} % of the time, first from {when}. Rows that it "
+            f"{max(lengths):.0f} ms, in all {100.0 * self.share:.1f} % of the time, first from "
+            f"{first.start_s:.2f} s of trial {first.trial + 1}. Rows that it "
             "reaches are left out."
         )
 
