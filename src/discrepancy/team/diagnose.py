@@ -113,5 +113,5 @@ def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem
         state = search.settled(search.value(state.chosen, state.posterior))
         if miss < STRAIGHT_CHI2_PER_N:
             break
-        same = same and miss < STRAIGHT_CHI2_PER_N
+        same = False
     return problem, search, state, same

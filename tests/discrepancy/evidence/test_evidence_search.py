@@ -106,18 +106,40 @@ def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) ->
         assert state.evidence > plain.evidence - 6.0
 
 
-def test_what_is_unlisted_stands_only_for_what_listed_causes_leave() -> None:
-    """Its columns span the listed cause, too, so that it alone would be likelier."""
+@pytest.mark.parametrize("kind", ["late", "event"])
+def test_laws_and_events_stand_only_for_what_lasting_causes_leave(kind: str) -> None:
+    """Their columns span the listed cause, too, so that they alone would be likelier."""
     rng = np.random.default_rng(5)
     x, other = wave(rng), wave(rng)
     y = 5.0 * x + 0.3 * other + 0.05 * rng.standard_normal(LENGTH)
     cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
     cells.add([{0: [x]}, {0: [x]}, {0: [other]}])
     listed = Group("cause", "joint", (0,), (5.0,))
-    machine = Machine(cells, [listed, Group("unlisted", "joint", (1, 2), (5.0, 1.0), late=True)])
-    search = Search(machine, np.full((1, 3), 0.05**2))
+    second = Group("second", "joint", (1, 2), (5.0, 1.0), late=kind == "late", event=kind == "event")
+    search = Search(Machine(cells, [listed, second]), np.full((1, 3), 0.05**2))
     state = search.run(search.value([], None))
-    assert state.keys == {("cause", "joint"), ("unlisted", "joint")}
+    assert state.keys == {("cause", "joint"), ("second", "joint")}
+
+
+@pytest.mark.parametrize(("size", "usual"), [(2.0, True), (8.0, False)])
+def test_what_is_within_three_of_its_kinds_tolerances_is_no_fault(size: float, usual: bool) -> None:
+    """However well another shape of it, of which the tolerances know nothing, fits."""
+    rng = np.random.default_rng(8)
+    columns, other = [wave(rng) for _ in range(4)], wave(rng)
+    y = size * other + sum(columns) + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]} for x in (*columns, other)])
+
+    class Tolerated(Machine):
+        def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+            return np.array([1.0, 1.0, 1.0, 1.0, 0.0])
+
+    groups = [Group("cause", f"joint {k}", (k,), (64.0,)) for k in range(4)]
+    shape = Group("cause", "joint 0", (4,), (64.0,), shape=(("slow", 1.0),))
+    search = Search(Tolerated(cells, groups, families=[[0, 1, 2, 3]]), np.full((1, 3), 0.05**2))
+    (odds,) = odds_of(search, search.settled(search.value([Chosen(shape, 1.0)], None)))
+    assert odds.over_nothing > 100.0
+    assert odds.probability < 1e-3 if usual else odds.probability > 0.999
 
 
 def test_a_law_that_only_brings_its_errors_is_not_found() -> None:

@@ -10,6 +10,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise
 from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.linear.start import Sensed, exact_residual
+from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.arms import true_joints
@@ -73,6 +74,28 @@ def test_a_deviation_of_the_robot_takes_out_what_the_column_says(case, candidate
             scale = np.abs(expected[:, channels]).max()
             np.testing.assert_allclose(change[:, channels], expected[:, channels], atol=0.02 * scale + 1e-9)
         assert np.abs(expected).max() > 1e-7
+
+
+@pytest.mark.parametrize(
+    "candidate",
+    [c for c in CANDIDATES if c.robot == 2 and c.cause in ("link_length", "sea_scale", "sea_bias")],
+    ids=lambda c: c.label,
+)
+def test_columns_are_those_of_arms_as_they_are(case, candidate):
+    """Around robots that nobody calibrated, by central differences of the exact residual: its rms, kinds apart."""
+    there = SIZES * np.random.default_rng(5).standard_normal((3, COUNT))
+    s, units = case.signals, ArmUnit(DESIGN, there)
+    true = dict(zip(("phi", "theta", "tau"), true_joints(units, s.phi, s.theta, s.tau), strict=True))
+    linear = linearise(replace(s, **true), case.shared, case.bases, units, case.reduction, full=True)
+    cause, place = CAUSES[candidate.cause], places_of(candidate)
+    columns = cause.columns(linear, candidate.robot - 1, (candidate.joint or 1) - 1, candidate.shape)
+    for k, at in enumerate(place[1]):
+        step = np.zeros((3, COUNT))
+        step[place[0], at] = 1e-3 * SIZES[at]
+        change = 0.5 * (rows_of(case, there + step) - rows_of(case, there - step)) / (1e-3 * SIZES[at])
+        for channels in (slice(0, 12), slice(12, 18)):
+            size = np.linalg.norm(columns[:, channels, k])
+            assert np.linalg.norm(change[:, channels] + columns[:, channels, k]) <= 3e-3 * size
 
 
 @pytest.mark.parametrize("name", ["theta_zero", "sea_bias", "link_length", "base_tilt"])

@@ -33,6 +33,7 @@ def test_an_unlisted_law_is_told_and_carried(tmp_path: Path, monkeypatch: pytest
         assert size["value"] == pytest.approx(true, abs=4.0 * size["se"] + 0.03 * true)
     assert law["units"] == {"amplitude": "N m", "phase_rad": "rad", "times": ""}
     assert "mN m sin(12 phi_21 + 0." in cause["sentence"]
+    assert "mN m sin(12 phi_21 + 0." in str(found).partition("probability")[2]  # its row in the table
     assert len(law["traces"]) == len(values["recordings"])
     found.write_into(tmp_path)
     sine, constant = load_extended(tmp_path / "extended").effects

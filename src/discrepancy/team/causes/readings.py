@@ -5,6 +5,7 @@ from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import ReadingError, one_joint, one_robot
 from estimator.arm.arms import design_of
+from estimator.arm.unit import ArmUnit
 
 
 class Late(ReadingError):
@@ -91,7 +92,7 @@ class SeaScale(ReadingError):
         return f"the spring is {n('scale', '%', 1e2)} {stiffer} than assumed, so the torque is read {small}"
 
     def errors(self, signals, robot, joint, shape, arm):
-        return [{"tau": one_joint(-signals.tau[:, robot, joint], joint)}]
+        return [{"tau": one_joint(-signals.tau[:, robot, joint] / _stiffness(arm, joint), joint)}]
 
 
 class SeaBias(ReadingError):
@@ -109,7 +110,12 @@ class SeaBias(ReadingError):
         )
 
     def errors(self, signals, robot, joint, shape, arm):
-        return [{"tau": np.eye(3)[joint]}]
+        return [{"tau": _stiffness(arm, joint) * np.eye(3)[joint]}]
+
+
+def _stiffness(arm, joint):
+    """How stiff a spring is over what its readings assume."""
+    return 1.0 + (arm.of("stiffness_ratio")[joint] if isinstance(arm, ArmUnit) else 0.0)
 
 
 class SeaHardening(ReadingError):
