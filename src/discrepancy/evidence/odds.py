@@ -77,10 +77,18 @@ def _nothing(search: Search, state: State, own: Chosen, without: State) -> float
     """Log evidence that a cause is not there: its trace is within its tolerance, or an error of the others' laws.
 
     Laws are off by less than they explain. So what the tolerance has to take up is subtracted from their worth.
+    A law that no table lists was fitted, not derived: beside it, events and further such laws must explain more.
     """
+    s = search.settings
+    room = s.open_nats
+    laws = [c for c in without.chosen if c.group.late]
+    if own.group.second and laws:
+        bare = [c for c in without.chosen if not c.group.late]
+        bare_evidence = search.settled(search.value(bare, without.posterior)).evidence
+        room = max(room, s.unlisted_share * (without.evidence - bare_evidence))
     empty = search.settled(search.value((), without.posterior))
     worth = without.evidence - empty.evidence - search.tolerated(state, own)
-    return without.evidence + float(np.clip(worth, 0.0, search.settings.open_nats))
+    return without.evidence + float(np.clip(worth, 0.0, room))
 
 
 def _odds(search: Search, state: State, own: Chosen) -> Odds:

@@ -410,14 +410,16 @@ class Search:
         )
 
     def is_usual(self, state: State, own: Chosen) -> bool:
-        """Whether all values of a cause are within three of the tolerances that its kind turns out to have."""
+        """Whether all values of a cause are within three of the tolerances that its kind, or else the machine, has."""
         plain = next((g for g in self.problem.groups if g.key == own.group.key), None)
         if plain is None or len(plain.columns) != len(own.group.columns) or own.group.members:
             return False
         nominal, p = self.problem.prior((), None), state.posterior
         free = {k for c in state.chosen for k in c.group.columns}
-        kin = next((k for k in self.problem.families if plain.columns[0] in k), ())
-        spread = next((p.prior[k] / nominal[k] for k in kin if k not in free and nominal[k] > 0.0), 1.0)
+        every = [k for g in self.problem.groups for k in g.columns if not g.members]
+        kin = next((k for k in self.problem.families if plain.columns[0] in k), every)
+        spreads = [p.prior[k] / nominal[k] for k in kin if k not in free and nominal[k] > 0.0]
+        spread = float(np.median(spreads)) if spreads else 1.0
         most = self.settings.apart**2 * spread * nominal[list(plain.columns)]
         return bool(np.all(p.mean[list(own.group.columns)] ** 2 < most))
 

@@ -19,6 +19,7 @@ class Settings:
         cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
         open_nats: log odds over nothing of what the laws of other causes leave where one is taken out. Fitted by log
             score to arms with effects whose laws are not the table's: 9 to 14 score alike.
+        unlisted_share: the same of events and unlisted laws beside other unlisted laws, of what these explain.
         most_causes: largest set.
         tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
         tried_quiet: the same of those that are likeliest with the noise at its floor.
@@ -49,6 +50,7 @@ class Settings:
     need_nats: float = 1.0
     cause_nats: float = 3.0
     open_nats: float = 10.0
+    unlisted_share: float = 0.5
     most_causes: int = 30
     tried: int = 6
     tried_quiet: int = 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -602,6 +603,7 @@ def team_problem(
     out.labels += catalogue.labels
     out.tolerance += catalogue.tolerance
     out.groups = [replace(g, columns=tuple(first + k for k in g.columns)) for g in catalogue.groups]
-    out.families = [[first + k for k in kind] for kind in catalogue.kinds.values() if len(kind) > 1]
+    places = Counter(g.cause for g in catalogue.groups)  # a single part has no kin to learn its spread from
+    out.families = [[first + k for k in kind] for cause, kind in catalogue.kinds.items() if places[cause] > 1]
     out.listed = replace(catalogue.listed, X=out.beside(catalogue.listed.X))
     return out
