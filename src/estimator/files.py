@@ -1,19 +1,94 @@
 """Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
 
+from __future__ import annotations
+
 import errno
 import json
 import os
+import re
 import shutil
+import socket
 import tempfile
+import threading
+import time
+import uuid
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from estimator.errors import InputError
-from estimator.inputs import file_sha256, printable
-from estimator.processes import scratch_name
+from estimator.inputs import Unpacked, file_sha256, open_input, plain, printable
 from estimator.strict import read_json
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_HOST = re.sub(r"\W", "", socket.gethostname())[:40]
+_NAME = re.compile(rf"\.mocobot-{_HOST}-(\d{{1,9}})-[0-9a-f]{{8}}\.tmp")
+_swept: set[Path] = set()
+
+
+def scratch_name(folder: Path) -> Path:
+    """A name in a folder that nothing has and that tells whose it is; scraps of dead processes there are removed."""
+    if folder not in _swept:
+        _swept.add(folder)
+        with suppress(OSError):
+            for path in folder.iterdir():
+                found = _NAME.fullmatch(path.name)
+                if found and not _is_alive(int(found[1])) and not path.with_suffix(".old").exists():
+                    _remove(path)
+    return folder / f".mocobot-{_HOST}-{os.getpid()}-{uuid.uuid4().hex[:8]}.tmp"
+
+
+@contextmanager
+def scratch_folder(where: Path | None = None) -> Iterator[Path]:
+    """A folder that lasts as long as the block.
+
+    Args:
+        where: the folder to make it in; that of the system for temporary files if None.
+    """
+    path = scratch_name(Path(tempfile.gettempdir()) if where is None else where)
+    path.mkdir(mode=0o700)
+    try:
+        yield path
+    finally:
+        _remove(path)
+
+
+def _remove(path: Path) -> None:
+    shutil.rmtree(path, ignore_errors=True)  # neither files nor links
+    with suppress(OSError):
+        path.unlink()
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except OSError as error:
+        return error.errno != errno.ESRCH  # another user's
+    return True
+
+
+EVERY_S = 0.5
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after its parent has ended, however that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(EVERY_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def ends_with_this() -> Mapping[str, Any]:
+    """What makes the workers of ``joblib.Parallel`` end with this process."""
+    return {"initializer": end_with, "initargs": (os.getpid(),)}
+
 
 LIST, FORMAT = ".mocobot-files", "mocobot-files"
 """The list: {format, kind: of the result, files: {path in the folder: SHA-256}}."""
@@ -302,3 +377,64 @@ def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(f"{path}: cannot be {done} ({error.strerror or error})") from error
+
+
+def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *, compress: bool) -> None:
+    """Write plain values and arrays.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    import numpy as np  # of no use to those who write texts only
+
+    told = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
+    with path.open("wb") as file:
+        (np.savez_compressed if compress else np.savez)(file, allow_pickle=False, facts=told, **arrays)
+
+
+def read_archive(path: Path, what: str) -> tuple[Any, dict[str, NDArray[Any]]]:
+    """Read what ``write_archive`` wrote.
+
+    Args:
+        path: the file.
+        what: it should be, for messages.
+
+    Raises:
+        InputError: there is no such file, it is not whole, or unpacks to too much.
+    """
+    import numpy as np
+
+    try:
+        with open_input(path) as opened, zipfile.ZipFile(opened) as archive:
+            refuse_other_packing(archive, str(path))
+            Unpacked(str(path), path.stat().st_size).add(sum(entry.file_size for entry in archive.infolist()))
+            arrays = {}
+            for entry in archive.infolist():
+                with archive.open(entry) as file:
+                    name = entry.filename.removesuffix(".npy")
+                    arrays[name] = np.lib.format.read_array(file, allow_pickle=False)
+        if "facts" not in arrays:
+            raise InputError(f"{path}: not {what}; 'facts' is missing")
+        return plain(json.loads(arrays.pop("facts").tobytes())), arrays
+    except InputError:
+        raise
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file; it would be {what}") from error
+    except Exception as error:  # on damaged bytes numpy and zipfile raise many types
+        raise InputError(f"{path}: not {what}, or damaged ({words(error)})") from error
+
+
+def refuse_other_packing(archive: zipfile.ZipFile, where: str) -> None:
+    """Refuse entries packed as numpy never does: Python unpacks these without a limit.
+
+    Raises:
+        InputError: there is one.
+    """
+    for entry in archive.infolist():
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise InputError(f"{where}: entry {entry.filename!r:.60} is not packed as numpy does it")
+
+
+def words(error: Exception) -> str:
+    """What a library says of a damaged file, in one line."""
+    return " ".join(str(error).split())[:120] or type(error).__name__

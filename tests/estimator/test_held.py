@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.filtering import differentiate, low_pass
-from estimator.held import angle_of, doubtful, held_spans, without_held
+from estimator.quantisation import angle_of, doubtful, held_spans, without_held
 from estimator.recording.model import Recording
 from recordings import small_recording
 

@@ -1,15 +1,17 @@
-"""One arm as it is: how its lengths, springs, masses and sensor zeros differ from the design."""
+"""Arms as they are: deviations from the design, their files, and the frames that encoder zeros define."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign, Triple
 from estimator.arrays import Array
+from estimator.errors import InputError
+from estimator.strict import Fields
 
 
 class Group(NamedTuple):
@@ -151,3 +153,118 @@ class ArmUnit:
     def gravity_mps2(self) -> float:
         """See ``Arm``."""
         return self.design.gravity_mps2
+
+
+Arms = OmnidDesign | ArmUnit
+"""One arm or several: as designed, all alike, or as they are, side by side in leading axes of ``ArmUnit.x``."""
+
+
+def design_of(arms: Arms) -> OmnidDesign:
+    """What arms are meant to be."""
+    return arms.design if isinstance(arms, ArmUnit) else arms
+
+
+def arm_of(arms: Arms, robot: int) -> Arms:
+    """The arm of one robot (from 0) among several."""
+    return ArmUnit(arms.design, arms.x[robot]) if isinstance(arms, ArmUnit) else arms
+
+
+def true_joints(arms: Arms, phi: Array, theta: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """True driven angles [rad], gimbal angles [rad] and spring torques [N m] from readings, shape (..., 3) each.
+
+    Arms as designed read the truth: the arrays themselves come back.
+    """
+    if not isinstance(arms, ArmUnit):
+        return phi, theta, tau
+    return phi - arms.of("phi_zero"), theta - arms.of("theta_zero"), arms.true_tau(tau)
+
+
+def levelled(arms: Arms, R: Array, h: Array) -> tuple[Array, Array]:
+    """Orientations (..., 3, 3) and wrists (..., 3) [m] from the arms' own frames to {b}, which is level."""
+    if not isinstance(arms, ArmUnit) or not arms.of("tilt").any():
+        return R, h
+    return arms.R_ba @ R, (arms.R_ba @ h[..., None])[..., 0]
+
+
+def key_of(group: Group) -> str:
+    """The group's name with its unit, such as ``tau_zero_Nm``."""
+    return f"{group.name}_{group.unit.replace(' ', '')}" if group.unit else group.name
+
+
+KEYS = tuple(key_of(group) for group in GROUPS)
+
+
+def units_to_list(units: ArmUnit) -> list[dict[str, list[float]]]:
+    """One object per robot: every group of ``GROUPS`` as a list of its entries.
+
+    Args:
+        units: ``x`` of shape (N, ``COUNT``).
+    """
+    return [
+        {key_of(group): one.of(group.name).tolist() for group in GROUPS}
+        for one in (ArmUnit(units.design, x) for x in units.x)
+    ]
+
+
+def units_from_list(values: list[Any], design: OmnidDesign, where: str) -> ArmUnit:
+    """Inverse of ``units_to_list``.
+
+    Args:
+        values: one object per robot.
+        design: what the robots deviate from.
+        where: what messages call the list.
+
+    Raises:
+        InputError: a key is unknown or missing, or a value is not finite, or not such that an arm can have it.
+    """
+    x = np.empty((len(values), COUNT))
+    for i, entry in enumerate(values):
+        read = Fields(entry, KEYS, f"{where}[{i}]")
+        x[i] = np.concatenate([read.array(key_of(group), (len(group.entries),)) for group in GROUPS])
+    units = ArmUnit(design, x)
+    check_units(units, where)
+    return units
+
+
+def check_units(units: ArmUnit, where: str) -> None:
+    """Whether such arms can be: lengths and masses, and the springs' stiffness, are greater than 0.
+
+    Raises:
+        InputError: they cannot.
+    """
+    for group, least in (("stiffness_ratio", -1.0), ("proximal_mass_ratio", -1.0), ("rod_mass_ratio", -1.0),
+                         ("wrist_mass_ratio", -1.0), ("radius", -units.design.radius_m),
+                         ("proximal_length", -units.design.proximal_length_m),
+                         ("rod_length", -units.design.rod_length_m)):  # fmt: skip
+        values = units.of(group)
+        bad = np.argwhere(~(values > least))
+        if len(bad):
+            robot, value = int(bad[0][0]), float(values[tuple(bad[0])])
+            key = KEYS[[one.name for one in GROUPS].index(group)]
+            raise InputError(f"{where}[{robot}]: {key} is {value:g}; it must be greater than {least:g}")
+
+
+ENCODERS = "frames {i} as the encoders define them: each turned about its x axis by the zero of that theta_x"
+MIXED = "Frames are the encoders' in one and the drawing's in the other: of the payload, the mass alone is compared."
+
+
+def frames_said(zero_sd_rad: float) -> str:
+    """The frames of encoders, with the tolerance of their zeros."""
+    return f"{ENCODERS} (0 +- {np.rad2deg(zero_sd_rad):.2g} deg, which is not in the standard errors)"
+
+
+def in_encoder_frames(units: ArmUnit | None) -> bool:
+    """Whether theta_x is taken as it is read, for robots as designed (None) or as calibrated."""
+    return units is None or not units.of("theta_zero")[..., 2].any()
+
+
+def seen_by_encoders(zeros: Array, R_1i: Array, p_1i: Array, *vectors: Array) -> list[Array]:
+    """What a drawing has, in the frames of encoders.
+
+    Args:
+        zeros: of theta_x of every robot, reading minus truth [rad], shape (N,).
+        R_1i, p_1i: grasp frames, shapes (N, 3, 3) and (N, 3).
+        vectors: any others in {1}, as columns.
+    """
+    turn = Rotation.from_rotvec(np.outer(zeros, [1.0, 0.0, 0.0])).as_matrix()
+    return [turn[0].T @ R_1i @ turn, p_1i @ turn[0], *(turn[0].T @ vector for vector in vectors)]

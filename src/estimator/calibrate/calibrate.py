@@ -10,30 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
-from estimator.arrays import Array
+from estimator.arrays import Array, inertia_parameters
 from estimator.calibrate import rules
-from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
-from estimator.calibrate.equations.alone import AloneEquations
-from estimator.calibrate.equations.level import corrected
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Resolution, Sensing
-from estimator.calibrate.fit import Fit, fit
-from estimator.calibrate.left_out import Given, contradicting
-from estimator.calibrate.outcome.shares import shares
-from estimator.calibrate.prior import MASSES, Prior
-from estimator.calibrate.problem import KnownMass, Trial
-from estimator.calibrate.quadratic import Quadratic, solved
-from estimator.calibrate.unknowns import Unknowns
+from estimator.calibrate.calibration import MASSES, CalibratedPayload, CalibratedTrial, Calibration, Prior
+from estimator.calibrate.equations import AloneEquations, corrected
+from estimator.calibrate.findings import Given, contradicting, shares
+from estimator.calibrate.least_squares import CarriedTrial, Fit, KnownMass, Quadratic, Unknowns, fit, solved
+from estimator.calibrate.rows import Resolution, Rows, Sensing
 from estimator.errors import InputError
-from estimator.estimate.consistency import Trial as Processed
+from estimator.estimate.consistency import Trial
 from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic
-from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
 from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared, robot_data, start_bases
+from estimator.rigid_team import Bases, Shared, robot_data, start_bases
 
 _SENSORS = (
     ("phi_zero", "the encoder of phi{entry}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
@@ -312,7 +304,7 @@ def calibrate(
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
     payload_of = [labels.index(recording.metadata.payload) for recording in recordings]
-    trials = [Trial(r, k, s) for r, k, s in zip(rows, payload_of, sensing, strict=False)]
+    trials = [CarriedTrial(r, k, s) for r, k, s in zip(rows, payload_of, sensing, strict=False)]
     bases = [_start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
     alone = [
         AloneEquations.of(_rows(recording), its)
@@ -334,7 +326,7 @@ def calibrate(
     return _result(found, wrong, recordings, free, labels, payload_of, prior, known)
 
 
-def start_estimate(trials: Sequence[Processed]) -> PayloadEstimate:
+def start_estimate(trials: Sequence[Trial]) -> PayloadEstimate:
     """What a calibration starts from: grasps, mass, centre of mass and inertia as robots as designed would have them.
 
     Args:

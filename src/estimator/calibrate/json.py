@@ -53,15 +53,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
-from estimator.arm.units_json import key_of
+from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit, key_of
 from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
-from estimator.calibrate.outcome.carried import carried, grasps_of
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import (
+    CalibratedPayload,
+    CalibratedTrial,
+    Calibration,
+    Prior,
+    carried,
+    grasps_of,
+)
 from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.rigid_team.residual import Bases
+from estimator.estimate.grasps import GraspEstimate
+from estimator.rigid_team import Bases
 from estimator.strict import Fields
 
 

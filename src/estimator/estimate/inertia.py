@@ -11,23 +11,133 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arrays import Array
-from estimator.estimate.fusion import acceleration_noise, fuse, fusion_changes
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, WeakDirection, axis, combination, judge
-from estimator.estimate.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
+from estimator.arrays import ORDER, Array, inertia_matrix
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.uncertainty import (
     WINDOW_S,
+    StepReport,
+    WeakDirection,
     Window,
+    axis,
+    combination,
+    judge,
     standard_errors,
     window_covariance,
     window_normals,
     windows,
 )
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import (
+    acceleration_noise,
+    fuse,
+    fusion_changes,
+    inertia_regressor,
+    inertia_regressor_changes,
+)
+from estimator.signals import GraspData
 from estimator.statistics import rms
+
+AXES_SE_LIMIT_RAD = np.deg2rad(20)
+"""Principal axes less certain than this are not reported."""
+
+
+@dataclass(frozen=True)
+class PrincipalInertia:
+    """Principal moments and axes.
+
+    Attributes:
+        moments: principal moments, ascending [kg m^2], shape (3,).
+        moments_se: their standard errors [kg m^2], shape (3,).
+        R_1c: principal axes as columns in {1} (= axes of {b}), right-handed, shape (3, 3); of the four
+            choices of signs the one of smallest rotation angle, as in Table I. None when undetermined.
+        R_1c_covariance: covariance of the error rotation in {1} [rad^2], shape (3, 3), or None.
+    """
+
+    moments: Array
+    moments_se: Array
+    R_1c: Array | None
+    R_1c_covariance: Array | None
+
+    @property
+    def axis_angle_rad(self) -> Array | None:
+        """Rotation vector of R_1c [rad], shape (3,), or None."""
+        return None if self.R_1c is None else Rotation.from_matrix(self.R_1c).as_rotvec()
+
+    @property
+    def axis_angle_se_rad(self) -> Array | None:
+        """Standard errors of the components of the rotation vector [rad], shape (3,), or None."""
+        if self.R_1c is None or self.R_1c_covariance is None:
+            return None
+        return standard_errors(so3.rotvec_covariance(self.R_1c, self.R_1c_covariance))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        axes, axes_se, covariance = self.axis_angle_rad, self.axis_angle_se_rad, self.R_1c_covariance
+        return {
+            "principal_kgm2": self.moments.tolist(),
+            "principal_se_kgm2": self.moments_se.tolist(),
+            "R_1c_axis_angle_deg": None if axes is None else np.rad2deg(axes).tolist(),
+            "R_1c_se_deg": None if axes_se is None else np.rad2deg(axes_se).tolist(),
+            "R_1c_covariance_rad2": None if covariance is None else covariance.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> PrincipalInertia:
+        """Inverse of ``to_dict``; other keys are left alone."""
+        axes, covariance = values["R_1c_axis_angle_deg"], values["R_1c_covariance_rad2"]
+        return cls(
+            np.array(values["principal_kgm2"]),
+            np.array(values["principal_se_kgm2"]),
+            None if axes is None else Rotation.from_rotvec(axes, degrees=True).as_matrix(),
+            None if covariance is None else np.array(covariance),
+        )
+
+
+def project_positive(inertia: Array) -> tuple[Array, bool]:
+    """Footnote 1: replace negative eigenvalues by zero; second result tells whether there were any."""
+    values, vectors = np.linalg.eigh(inertia)
+    if values[0] >= 0:
+        return inertia, False
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T, True
+
+
+def principal_inertia(inertia: Array, covariance: Array) -> PrincipalInertia:
+    """Equation (27) with standard errors by first-order perturbation.
+
+    Args:
+        inertia: matrix in {b}, axes of {1} [kg m^2], shape (3, 3).
+        covariance: of the six parameters of (20) [kg^2 m^4], shape (6, 6).
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    axes = _smallest_rotation(axes)
+    # r_k^T dI r_l as a linear map of the six parameters; off-diagonal entries count twice.
+    maps = {}
+    for k in range(3):
+        for m in range(k, 3):
+            outer = np.outer(axes[:, k], axes[:, m])
+            maps[k, m] = np.array([outer[a, b] + (outer[b, a] if a != b else 0.0) for a, b in ORDER])
+    J = np.array([maps[k, k] for k in range(3)])
+    moments_se = standard_errors(J @ covariance @ J.T)
+
+    # Error rotation about c mixes a and b: (r_b^T dI r_a) / (lambda_a - lambda_b), (a, b, c) cyclic.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        about = np.array(
+            [maps[min(a, b), max(a, b)] / (moments[a] - moments[b]) for a, b in ((1, 2), (2, 0), (0, 1))]
+        )
+    rotation = about @ covariance @ about.T if np.all(np.isfinite(about)) else np.full((3, 3), np.inf)
+    if not np.all(np.diag(rotation) < AXES_SE_LIMIT_RAD**2):
+        return PrincipalInertia(moments, moments_se, None, None)
+    return PrincipalInertia(moments, moments_se, axes, axes @ rotation @ axes.T)
+
+
+def _smallest_rotation(axes: Array) -> Array:
+    """Signs of the columns such that they are right-handed and the rotation angle is smallest."""
+    choices = [axes * np.array(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]
+    choices = [R if np.linalg.det(R) > 0 else -R for R in choices]
+    return max(choices, key=np.trace)
+
 
 PARAMETERS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 SE_LIMIT = 1 / 3
@@ -92,26 +202,6 @@ class InertiaEstimate:
             values["residual_Nm"],
             values["moment_Nm"],
         )
-
-
-def momentum_regressor(w: Array) -> Array:
-    """L(w) with L(w) I_reg = I w and I_reg as in (20), shapes (..., 3) -> (..., 3, 6); (21) is L(alpha)."""
-    w = np.asarray(w, dtype=float)
-    x, y, z = w[..., 0], w[..., 1], w[..., 2]
-    L = np.zeros((*w.shape, 6))
-    L[..., 0, 0], L[..., 0, 1], L[..., 0, 2] = x, y, z
-    L[..., 1, 1], L[..., 1, 3], L[..., 1, 4] = x, y, z
-    L[..., 2, 2], L[..., 2, 4], L[..., 2, 5] = x, y, z
-    return L
-
-
-def inertia_regressor(omega: Array, alpha: Array) -> Array:
-    """A + B of (21)-(24): (A + B) I_reg = I alpha + omega x I omega, shapes (..., 3) -> (..., 3, 6).
-
-    B = [omega] L(omega). The paper prints B as six rows of three: its rows 1-3 are columns 1-3 and its rows
-    4-6 are columns 4-6 of the 3 x 6 matrix meant.
-    """
-    return momentum_regressor(alpha) + so3.skew(omega) @ momentum_regressor(omega)
 
 
 def estimate_inertia(
@@ -255,22 +345,6 @@ def by_upstream(
         right += flat.T @ dy.reshape(K + 3, -1).T
         right[:, :K] += inertia_regressor_changes(omega, d_omega, d_alpha, residual).T
     return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-
-
-def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, moment: Array) -> Array:
-    """Changes of sum_q (A + B)^T m, with A + B as of ``inertia_regressor``, by changes of the motion, (K, 6).
-
-    Args:
-        omega: angular velocity [rad/s], shape (Q, 3).
-        d_omega, d_alpha: changes of it and of the angular acceleration, shape (K, Q, 3).
-        moment: m, shape (Q, 3).
-    """
-    # L(w)^T m is linear in w m^T, and [omega]^T m = m x omega.
-    outer = np.swapaxes(d_alpha, 1, 2) @ moment + np.swapaxes(d_omega, 1, 2) @ so3.cross(moment, omega)
-    outer += omega.T @ so3.cross(moment, d_omega)
-    both = outer + np.swapaxes(outer, 1, 2)
-    i, j = np.triu_indices(3)
-    return np.where(i == j, 0.5, 1.0) * both[:, i, j]
 
 
 def thinned(trials: Sequence[GraspData]) -> list[GraspData]:

@@ -13,24 +13,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator import so3
-from estimator.arrays import Array
-from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse, tilt_scatter
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, cross_information
+from estimator.arrays import Array, inertia_parameters
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import (
     InertiaEstimate,
-    inertia_regressor,
     refuse,
     refuse_uncertain,
     rotational_excitation,
     thinned,
     trial_windows,
 )
-from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.statics import ComEstimate, MassEstimate, check_lifted, judge_com
-from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
-from estimator.signals.grasp_data import GraspData
+from estimator.estimate.uncertainty import (
+    WINDOW_S,
+    StepReport,
+    cross_information,
+    numerical_jacobian,
+    window_covariance,
+    window_normals,
+)
+from estimator.rigid_team import BodyMotion, acceleration_noise, fuse, newton_euler_regressor, tilt_scatter
+from estimator.signals import GraspData
 from estimator.statistics import rms
 
 COM_SE_LIMIT_M = 0.3
@@ -54,25 +57,6 @@ class JointEstimate:
     inertia: InertiaEstimate | None
     covariance: Array
     parameters: Array
-
-
-def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) -> Array:
-    """Regressor of (f, M) at the origin of {1} by (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz).
-
-    Args:
-        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {1}, shape (Q, 3).
-        specific_force: G = a + g up in {1} [m/s^2], shape (Q, 3).
-
-    Returns:
-        Shape (Q, 6, 10), force rows first.
-    """
-    W = so3.skew(omega)
-    Y = np.zeros((len(omega), 6, 10))
-    Y[:, :3, 0] = specific_force
-    Y[:, :3, 1:4] = so3.skew(alpha) + W @ W
-    Y[:, 3:, 1:4] = -so3.skew(specific_force)
-    Y[:, 3:, 4:] = inertia_regressor(omega, alpha)
-    return Y
 
 
 def estimate_joint(

@@ -16,13 +16,13 @@ from estimator.estimate.consistency import (
     check_disagreement_is_noise,
     check_rigid,
     check_same_payload,
+    withheld,
     wrench_balance,
 )
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.identifiability import StepReport
+from estimator.estimate.grasps import GraspEstimate, estimate_grasps
 from estimator.estimate.inertia import InertiaEstimate, estimate_inertia
 from estimator.estimate.joint import estimate_joint
+from estimator.estimate.leftover import contradiction, left_over, steps_of
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import (
     CONTRADICTION,
@@ -31,18 +31,12 @@ from estimator.estimate.statics import (
     estimate_from_holds,
     rounding_kg,
 )
-from estimator.estimate.uncertainty import WINDOW_S
-from estimator.estimate.withheld import withheld
+from estimator.estimate.uncertainty import WINDOW_S, StepReport
 from estimator.filtering import trim_slice
-from estimator.held import doubtful, without_held
-from estimator.leftover.contradiction import contradiction
-from estimator.leftover.leftover import left_over
-from estimator.leftover.steps import steps_of
+from estimator.quantisation import doubtful, without_held
 from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
-from estimator.signals.grasp_data import GraspData
-from estimator.signals.holds import Hold, find_holds
-from estimator.signals.process import process_recording
+from estimator.signals import GraspData, Hold, find_holds, process_recording
 
 MASS_TOLERANCE = 0.05
 """Recordings whose masses differ by more than this share are not of one payload, if beyond ``MASS_SIGMAS`` as well.

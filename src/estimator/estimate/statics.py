@@ -21,11 +21,10 @@ from scipy.optimize import brentq
 from estimator import so3
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.fusion import fused_up, tilt_scatter, total_wrench
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, cross_information, judge
-from estimator.estimate.uncertainty import numerical_jacobian
-from estimator.signals.holds import Hold
+from estimator.estimate.grasps import GraspEstimate
+from estimator.estimate.uncertainty import StepReport, cross_information, judge, numerical_jacobian
+from estimator.rigid_team import fused_up, tilt_scatter, total_wrench
+from estimator.signals import Hold
 from estimator.statistics import rms
 
 CONTRADICTION = "the wrenches contradict each other"

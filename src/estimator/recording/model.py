@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arm.arms import Arms, arm_of, true_joints
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
+from estimator.arm.unit import Arms, arm_of, true_joints
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.metadata import Level, RecordingMetadata

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.arm.delta import forward_kinematics, jacobian
-from estimator.arm.dynamics import wrench_on_payload
-from estimator.arm.gimbal import rotation
+from estimator.arm.dynamics import rotation, wrench_on_payload
 from mujoco_arm import LEGS, Arm, random_motion
 from omnid_design import DESIGN
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.arm.gimbal import angular_motion, moment_about_axes, rate_matrix, rate_matrix_dot, rotation
+from estimator.arm.dynamics import angular_motion, moment_about_axes, rate_matrix, rate_matrix_dot, rotation
 from omnid_design import DESIGN
 
 RNG = np.random.default_rng(3)

@@ -7,8 +7,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimator.arm.delta import forward_kinematics, inverse_kinematics, is_in_reach, leg_geometry
-from estimator.arm.wrist_level import driven_motion, joints_of, wrist_fault, wrist_of
+from estimator.arm.delta import (
+    driven_motion,
+    forward_kinematics,
+    inverse_kinematics,
+    is_in_reach,
+    joints_of,
+    leg_geometry,
+    wrist_fault,
+    wrist_of,
+)
 from estimator.errors import InputError
 from mujoco_arm import Arm, random_motion
 from omnid_design import DESIGN

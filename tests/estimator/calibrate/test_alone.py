@@ -9,10 +9,9 @@ from calibration_case import differences
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.equations.alone import AloneEquations
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.equations import AloneEquations
+from estimator.calibrate.rows import Rows, Sensing
 from estimator.recording.model import Recording
 from omnid_design import DESIGN
 from recorded_team import STEP_S, Sines, derivatives

@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import AT, COUNT, GROUPS
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import carried, grasps_of
-from estimator.calibrate.outcome.text import format_calibration, frames_sentence, shown_groups
-from estimator.calibrate.outcome.unit_toml import unit_toml
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Calibration, Prior, carried, grasps_of
+from estimator.calibrate.text import format_calibration, frames_sentence, shown_groups, unit_toml
 from invented_calibration import invented_calibration
 
 UNITS = {

@@ -6,13 +6,9 @@ from scipy.linalg import block_diag
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.calibrate import rules
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.fit import Descent
-from estimator.calibrate.prior import Prior
-from estimator.calibrate.problem import Problem, Trial
-from estimator.calibrate.quadratic import solved
-from estimator.calibrate.unknowns import Layout, Unknowns
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.least_squares import CarriedTrial, Descent, Layout, Problem, Unknowns, solved
+from estimator.calibrate.rows import Rows, Sensing
 from omnid_design import DESIGN
 from synthetic_team import carry, draw_path, draw_units, load, with_noise
 
@@ -30,7 +26,7 @@ def problem_of(teams: int) -> tuple[Problem, Unknowns]:
     basis = np.asarray(block_diag(factor, np.eye(layout.size - len(factor))))
     information = np.zeros(basis.shape[1])
     information[: factor.shape[1]] = 1.0
-    trials = [Trial(Rows.of(one), 0, sensing) for one in recordings]
+    trials = [CarriedTrial(Rows.of(one), 0, sensing) for one in recordings]
     designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
     start = Unknowns(designed, (held.shared,), tuple(one.bases for one in exact))
     return Problem(trials, (), (), Prior(), layout, basis, information), start

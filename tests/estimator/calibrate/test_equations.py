@@ -7,9 +7,8 @@ import pytest
 
 from calibration_case import PRIOR, differences, exact_trial, instants
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.equations.trial import TrialEquations
+from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.rows import Rows, Sensing
 from omnid_design import DESIGN
 
 FREE = np.flatnonzero(PRIOR.factor(1, hold_scale=False).any(axis=1))

@@ -7,7 +7,7 @@ import pytest
 
 from estimator.arm.unit import ArmUnit
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Prior
 from estimator.errors import InputError
 from estimator.filtering import low_pass
 from estimator.recording.model import Recording

@@ -8,12 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import CalibratedPayload
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.fit import Trial, fit
-from estimator.calibrate.prior import Prior
-from estimator.calibrate.unknowns import Unknowns
+from estimator.calibrate.calibration import CalibratedPayload, Prior
+from estimator.calibrate.least_squares import CarriedTrial, Unknowns, fit
+from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.scene import build_team
@@ -175,7 +172,7 @@ def test_errors_are_as_claimed():
         start = Unknowns(
             ArmUnit(DESIGN, np.zeros((3, COUNT))), (loads[0].shared,), tuple(one.bases for one in exact)
         )
-        found = fit([Trial(Rows.of(one), 0, sensing) for one in noisy], start, prior)
+        found = fit([CarriedTrial(Rows.of(one), 0, sensing) for one in noisy], start, prior)
         at, factor = found.layout.of_units, prior.factor(3, hold_scale=True)
         back = np.linalg.pinv(factor)
         z = back @ (found.unknowns.units.x - units.x).ravel()

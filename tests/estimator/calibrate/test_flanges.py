@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.flanges import in_drawing_frames, parallel_flanges, turned
 from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
-from estimator.calibrate.outcome.flanges import in_drawing_frames, parallel_flanges, turned
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from invented_calibration import invented_calibration
 from mocobot_sim.scene.scene import build_team
 

@@ -5,11 +5,9 @@ import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.calibrate.calibrate import held_out
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.fit import Trial, fit
-from estimator.calibrate.prior import Prior
-from estimator.calibrate.unknowns import Unknowns
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.least_squares import CarriedTrial, Unknowns, fit
+from estimator.calibrate.rows import Rows, Sensing
 from omnid_design import DESIGN
 from synthetic_team import carry, draw_path, draw_units, load, with_noise
 
@@ -22,7 +20,7 @@ def test_held_out_is_what_a_calibration_without_the_trial_says():
     exact = [carry(units, held, draw_path(held, rng), rng, 10.0) for _ in range(3)]
     recordings = [with_noise(one.recording, 2e-5, 0.01, rng) for one in exact]
     sensing = Sensing.of(recordings)
-    trials = [Trial(Rows.of(one), 0, sensing) for one in recordings]
+    trials = [CarriedTrial(Rows.of(one), 0, sensing) for one in recordings]
     designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
     bases = tuple(one.bases for one in exact)
     whole = fit(trials, Unknowns(designed, (held.shared,), bases), Prior())
@@ -58,6 +56,6 @@ def test_the_only_trial_of_a_payload_cannot_be_held_out():
     rng = np.random.default_rng(9)
     units, held = draw_units(3, Prior(), rng), load(3, rng)
     exact = carry(units, held, draw_path(held, rng), rng, 10.0)
-    trial = Trial(Rows.of(exact.recording), 0, Sensing.of([exact.recording]))
+    trial = CarriedTrial(Rows.of(exact.recording), 0, Sensing.of([exact.recording]))
     found = fit([trial], Unknowns(units, (held.shared,), (exact.bases,)), Prior())
     assert held_out(found) == [None]

@@ -7,8 +7,7 @@ import pytest
 
 from estimator.arm.unit import AT, COUNT
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Calibration, Prior
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry

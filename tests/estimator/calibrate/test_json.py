@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import AT, COUNT
+from estimator.calibrate.calibration import carried
 from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
-from estimator.calibrate.outcome.carried import carried
 from estimator.errors import InputError
 from invented_calibration import invented_calibration
 from mocobot.files.calibrations import read_calibration, write_calibration

@@ -6,10 +6,9 @@ import pytest
 from calibration_case import PRIOR, differences, exact_trial
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, leg_geometry, length_jacobians
 from estimator.arm.unit import AT, COUNT, ArmUnit
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.equations.trial import TrialEquations, pose_derivatives
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.equations import TrialEquations, pose_derivatives
+from estimator.calibrate.rows import Rows, Sensing
 from omnid_design import DESIGN
 from synthetic_team import draw_units
 

@@ -11,13 +11,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.outcome.estimate import Asked
-from estimator.calibrate.outcome.one_fit import METHOD, WITHOUT_ERRORS, estimate
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Prior
 from estimator.errors import InputError
+from estimator.estimate.fit import ONE_FIT as METHOD
+from estimator.estimate.fit import WITHOUT_ERRORS, Asked, estimate
 from estimator.estimate.payload import estimate_payload
-from estimator.estimate.result import PayloadEstimate
-from estimator.estimate.text import format_estimate
+from estimator.estimate.result import PayloadEstimate, format_estimate
 from estimator.estimate.uncertainty import standard_errors
 from estimator.filtering import low_pass
 from estimator.recording.model import Recording

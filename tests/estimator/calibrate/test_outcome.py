@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.apply import calibrated
-from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on
+from estimator.calibrate.calibration import Calibration, calibrated
 from estimator.errors import InputError
+from estimator.estimate.fit import estimate_calibrated, estimate_on
 from estimator.estimate.payload import Method, estimate_payload
-from estimator.estimate.result import PayloadEstimate
-from estimator.estimate.text import format_estimate
+from estimator.estimate.result import PayloadEstimate, format_estimate
 from estimator.recording.model import Recording
 from invented_calibration import invented_calibration
 from recorded_team import COM, GRASPS, INERTIA, MASS

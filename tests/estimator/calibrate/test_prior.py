@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import AT, COUNT
-from estimator.calibrate.prior import LARGEST, Prior, read_prior
+from estimator.calibrate.calibration import LARGEST, Prior, read_prior
 from estimator.errors import InputError
 
 

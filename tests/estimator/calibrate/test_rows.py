@@ -5,10 +5,9 @@ import pytest
 
 from calibration_case import exact_trial
 from estimator.calibrate import rules
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.equations.trial import TrialEquations
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.rows import Rows, Sensing
 from estimator.recording.model import Recording
 from recordings import metadata
 from synthetic_team import carry, draw_path, draw_units, load, with_noise

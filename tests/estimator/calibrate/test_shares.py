@@ -7,10 +7,8 @@ from typing import Any, cast
 import numpy as np
 
 from estimator.arm.unit import AT, COUNT
-from estimator.calibrate.fit import Fit, TrialFit
-from estimator.calibrate.outcome.shares import GRASPS, INERTIAL, shares
-from estimator.calibrate.quadratic import Quadratic
-from estimator.calibrate.unknowns import Layout
+from estimator.calibrate.findings import GRASPS, INERTIAL, shares
+from estimator.calibrate.least_squares import Fit, Layout, Quadratic, TrialFit
 
 
 def test_shares_are_those_of_the_noise() -> None:

@@ -12,11 +12,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian
-from estimator.arm.dynamics import arm_torque, wrench_on_payload
-from estimator.arm.gimbal import rotation
+from estimator.arm.dynamics import arm_torque, rotation, wrench_on_payload
 from estimator.arm.unit import AT, ArmUnit
-from estimator.calibrate.equations.level import corrected
-from estimator.rigid_team.residual import robot_data
+from estimator.calibrate.equations import corrected
+from estimator.rigid_team import robot_data
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread, deviate
 from mocobot_sim.scene.omnid import load_omnid, park
 from mujoco_arm import Arm, random_motion

@@ -10,10 +10,9 @@ import pytest
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial
 from estimator.estimate.payload import check_one_payload, estimate_from_trials, estimate_payload, mass_alone
-from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.result import PayloadEstimate, format_estimate
 from estimator.estimate.statics import MassEstimate
-from estimator.estimate.text import format_estimate
-from estimator.signals.holds import find_holds
+from estimator.signals import find_holds
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry
 from rigid_body_data import make_body, moving, still
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.estimate.fusion import fuse, fusion_changes, fusion_matrix, fusion_with
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.inertia import by_upstream, inertia_regressor
+from estimator.estimate.grasps import GraspEstimate
+from estimator.estimate.inertia import by_upstream
 from estimator.estimate.uncertainty import numerical_jacobian
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import fuse, fusion_changes, fusion_matrix, fusion_with, inertia_regressor
+from estimator.signals import GraspData
 
 ROBOTS, SAMPLES = 4, 30
 K = 6 * (ROBOTS - 1)

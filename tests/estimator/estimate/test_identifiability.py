@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.identifiability import cross_information, judge
 from estimator.estimate.inertia import estimate_inertia
 from estimator.estimate.statics import estimate_com, estimate_mass
+from estimator.estimate.uncertainty import cross_information, judge
 from rigid_body_data import GRAVITY, RATE, body_pose, make_body, make_data, moving, still
 from test_statics import exact_grasps, exact_hold
 

@@ -5,14 +5,10 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import inertia_matrix, inertia_parameters
 from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.inertia import estimate_inertia, inertia_regressor, momentum_regressor
-from estimator.estimate.principal import (
-    inertia_matrix,
-    inertia_parameters,
-    principal_inertia,
-    project_positive,
-)
+from estimator.estimate.inertia import estimate_inertia, principal_inertia, project_positive
+from estimator.rigid_team import inertia_regressor, momentum_regressor
 from mocobot_sim.paper.published import PAYLOADS, payload_truth
 from mujoco_body import mujoco_data
 from rigid_body_data import make_body, moving

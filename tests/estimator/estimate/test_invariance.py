@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from estimator.estimate.consistency import Trial
 from estimator.estimate.payload import Method, estimate_from_trials
 from estimator.estimate.result import PayloadEstimate
-from estimator.signals.grasp_data import GraspData
+from estimator.signals import GraspData
 from rigid_body_data import make_body, moving, still
 
 NOISE = {"twist_noise": 1e-4, "linear_noise": 2e-5, "wrench_noise": 0.05}

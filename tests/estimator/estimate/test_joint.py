@@ -7,8 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.joint import estimate_joint, newton_euler_regressor
+from estimator.estimate.joint import estimate_joint
 from estimator.estimate.uncertainty import standard_errors
+from estimator.rigid_team import newton_euler_regressor
 from mujoco_body import mujoco_data
 from rigid_body_data import RATE, make_body, make_data, moving, still
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.estimate.leftover import Steps, rounded, steps_of
 from estimator.estimate.statics import estimate_com, estimate_mass
-from estimator.leftover.steps import Steps, rounded, steps_of
-from estimator.signals.holds import find_holds
+from estimator.signals import find_holds
 from recordings import small_recording
 from rigid_body_data import GRAVITY, make_body
 from test_statics import TILTS, exact_grasps, exact_hold, force_record

@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.statics import estimate_com, estimate_mass
-from estimator.signals.grasp_data import GraspData
-from estimator.signals.holds import Hold, find_holds
+from estimator.signals import GraspData, Hold, find_holds
 from rigid_body_data import GRAVITY, make_body, moving, still
 
 TILTS = [(0, 0), (0.08, 0), (-0.08, 0), (0, 0.08), (0, -0.08), (0.05, 0.05)]

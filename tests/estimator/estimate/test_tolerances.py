@@ -16,11 +16,10 @@ from estimator.estimate.consistency import (
     check_rigid,
     wrench_balance,
 )  # fmt: skip
-from estimator.estimate.grasp_estimate import GraspEstimate, single_robot
-from estimator.estimate.identifiability import StepReport, combination, judge
+from estimator.estimate.grasps import GraspEstimate, single_robot
 from estimator.estimate.inertia import estimate_inertia
 from estimator.estimate.statics import estimate_com, estimate_mass
-from estimator.estimate.uncertainty import norm_se, standard_errors, windows
+from estimator.estimate.uncertainty import StepReport, combination, judge, norm_se, standard_errors, windows
 from rigid_body_data import GRAVITY, make_body, moving
 from test_statics import exact_grasps, exact_hold
 
@@ -124,7 +123,7 @@ def test_what_robots_at_rest_disagree_by() -> None:
     def step(name: str, noise: float, unit: str) -> StepReport:
         return StepReport(name, ("x",), unit, (0.0,), noise, ())
 
-    from estimator.signals.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
+    from estimator.signals import STILL_RATE_RADPS, STILL_SPEED_MPS
 
     for name, unit, limit in (
         ("rotation R_13", "rad/s per rad", STILL_RATE_RADPS), ("position p_13", "m/s per m", STILL_SPEED_MPS),

@@ -17,7 +17,7 @@ from estimator.estimate.uncertainty import (
     window_normals,
     windows,
 )
-from estimator.signals.holds import find_holds
+from estimator.signals import find_holds
 from estimator.so3 import rotvec_covariance
 from rigid_body_data import GRAVITY, RATE, low_passed_noise, make_body, moving, still
 

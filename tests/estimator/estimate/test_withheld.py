@@ -8,7 +8,7 @@ import pytest
 
 from estimator.estimate.consistency import Trial
 from estimator.estimate.payload import estimate_from_trials, estimate_payload
-from estimator.estimate.text import format_estimate
+from estimator.estimate.result import format_estimate
 from recorded_team import MASS, Sines, carry
 from rigid_body_data import make_body, moving
 

@@ -13,9 +13,8 @@ import pytest
 from discrepancy.team.diagnosis import diagnose_team
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
-from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.metadata import RecordingMetadata, Sampling
 from estimator.recording.parquet import read_recording, write_recording
-from estimator.recording.sampling import Sampling
 from recordings import metadata, small_recording
 
 SAMPLING = tuple(Sampling(100.0, 0.0, 0.0, 0.0, False, "filtered", "joint", (0.01,) * 9) for _ in range(3))

@@ -18,7 +18,7 @@ from estimator.recording.checks import check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from estimator.signals.process import process_recording
+from estimator.signals import process_recording
 from mocobot.cli import main
 from omnid_design import DESIGN
 from recordings import metadata, small_recording

@@ -12,8 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from estimator.inputs import set_max_unpacked
-from estimator.recording.parquet import METADATA_KEY, read_recording, write_recording
-from estimator.recording.parquet_claims import claimed_bytes
+from estimator.recording.parquet import METADATA_KEY, claimed_bytes, read_recording, write_recording
 from recordings import small_recording
 
 LIMIT = """

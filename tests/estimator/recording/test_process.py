@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator import signals as process
 from estimator.errors import InputError
-from estimator.signals import process
-from estimator.signals.process import process_recording
+from estimator.signals import process_recording
 from recorded_team import GRASPS, INERTIA, Sines, carry, inertia_by_least_squares
 from recordings import metadata, small_recording
 
@@ -149,8 +149,6 @@ def test_bad_input_is_refused_with_the_recordings_name():
 
 
 def test_the_estimator_does_without_a_simulator():
-    code = (
-        "import estimator.signals.process, sys; print('mujoco' in sys.modules, 'dm_control' in sys.modules)"
-    )
+    code = "import estimator.signals, sys; print('mujoco' in sys.modules, 'dm_control' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.equations.sensing import Resolution
+from estimator.calibrate.rows import Resolution
 from estimator.errors import InputError
-from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.sampling import Sampling
+from estimator.recording.metadata import RecordingMetadata, Sampling
 from recordings import DESIGN, metadata, small_recording
 
 TOLD = Sampling(

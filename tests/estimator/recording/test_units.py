@@ -14,11 +14,10 @@ import pytest
 from estimator.arm.unit import GROUPS, ArmUnit
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
-from estimator.estimate.result import PayloadEstimate
-from estimator.estimate.text import format_estimate
+from estimator.estimate.result import PayloadEstimate, format_estimate
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.parquet import read_recording, write_recording
-from estimator.signals.process import process_recording
+from estimator.signals import process_recording
 from omnid_design import DESIGN
 from recorded_team import COM, GRASPS, MASS
 from recordings import metadata, small_recording

@@ -1,24 +1,102 @@
-"""How an arm's data change with its signals and with its deviations from the design.
-
-Differences of what is not linear, each taken where it arises: driven angles move the legs alone, gimbal angles the
-gimbal alone, and masses the torques of the arm alone. What follows from there (paper, equations (28)-(29), section
-IV.B, see ``arm_data``) is linear, and so are accelerations and torques.
-"""
+"""From an arm's joint signals to pose, twist and wrench at its grasp, and how these change with the signals."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.apart import apart, components
 from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
-from estimator.arm.dynamics import arm_torque, gimbal_torque
-from estimator.arm.gimbal import Gimbal
+from estimator.arm.dynamics import Gimbal, arm_torque, gimbal_torque, wrench_on_payload
+from estimator.arm.numbers import Arm
 from estimator.arm.unit import AT, ArmUnit
-from estimator.arrays import Array
-from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, STEPS, TAU, THETA, THETA_DDOT, THETA_DOT
-from estimator.signals.arm_data import ArmData
+from estimator.arrays import Array, apart, components
 from estimator.so3 import cross, times
+
+
+class Kind(NamedTuple):
+    """Three of them.
+
+    Attributes:
+        name: what they are.
+        unit: theirs.
+        step: by which they are moved for a central difference.
+    """
+
+    name: str
+    unit: str
+    step: float
+
+
+KINDS = (
+    Kind("phi", "rad", 1e-6),
+    Kind("phi_dot", "rad/s", 1e-5),
+    Kind("phi_ddot", "rad/s^2", 1e-4),
+    Kind("theta", "rad", 1e-6),
+    Kind("theta_dot", "rad/s", 1e-5),
+    Kind("theta_ddot", "rad/s^2", 1e-4),
+    Kind("tau", "N m", 1e-4),
+)
+COUNT = 3 * len(KINDS)
+STEPS = np.repeat([kind.step for kind in KINDS], 3)
+PHI, PHI_DOT, PHI_DDOT, THETA, THETA_DOT, THETA_DDOT, TAU = (slice(k, k + 3) for k in range(0, COUNT, 3))
+
+
+def with_its_rates(angle: slice) -> slice:
+    """``PHI`` or ``THETA`` with rates and accelerations."""
+    return slice(angle.start, angle.start + 9)
+
+
+class ArmData(NamedTuple):
+    """What one arm tells of its grasp; leading axes are samples, or anything else.
+
+    Attributes:
+        R_bi: orientation of {i} in the arm's base frame, shape (..., 3, 3).
+        h: wrist position there [m], shape (..., 3).
+        twist: body twist (omega_i [rad/s], v_i [m/s]) in {i}, equation (29), shape (..., 6).
+        twist_dot: its component-wise time derivative, shape (..., 6).
+        wrench: (m_i [N m], f_i [N]) of the arm ON the payload at the origin of {i}, in {i}, shape (..., 6).
+    """
+
+    R_bi: Array
+    h: Array
+    twist: Array
+    twist_dot: Array
+    wrench: Array
+
+
+def arm_data(
+    phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arm
+) -> ArmData:
+    """Kinematics and dynamics of an arm (paper, equations (28)-(29), section IV.B).
+
+    Args:
+        phi: driven angles [rad], rates and accelerations, each of shape (..., 3).
+        theta: gimbal angles (z, y, x) [rad], rates and accelerations, each (..., 3).
+        tau: spring torques [N m], shape (..., 3).
+        arm: the arm's numbers; leading axes of theirs go with those of the angles.
+
+    Raises:
+        InputError: no wrist position exists at some configuration.
+    """
+    legs = leg_geometry(phi[0], arm)
+    h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2])
+    gimbal = Gimbal.at(theta[0])
+    R_bi = gimbal.rotation()
+    R_ib = np.swapaxes(R_bi, -1, -2)
+    omega, omega_dot = gimbal.motion(theta[1], theta[2])
+    v = times(R_ib, h_dot)
+    v_dot = times(R_ib, h_ddot) - cross(omega, v)
+    wrench = wrench_on_payload(phi, theta, tau, arm, legs, gimbal, R_bi, h_ddot)
+    return ArmData(
+        R_bi,
+        legs.h,
+        np.concatenate([omega, v], axis=-1),
+        np.concatenate([omega_dot, v_dot], axis=-1),
+        wrench,
+    )
+
 
 LENGTHS: NDArray[np.intp] = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
 MASSES: NDArray[np.intp] = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]

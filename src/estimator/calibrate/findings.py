@@ -1,4 +1,4 @@
-"""Which recording the others do not fit with: calibrations without it, and of it alone."""
+"""x"""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.equations.alone import AloneEquations
-from estimator.calibrate.fit import fit
-from estimator.calibrate.prior import Prior
-from estimator.calibrate.problem import KnownMass, Trial
-from estimator.calibrate.unknowns import Unknowns
+from estimator.arm.unit import AT, GROUPS
+from estimator.arrays import Array
+from estimator.calibrate.calibration import Calibration, Prior
+from estimator.calibrate.equations import AloneEquations
+from estimator.calibrate.least_squares import CarriedTrial, Fit, KnownMass, Quadratic, Unknowns, fit
 from estimator.errors import InputError
 
 
@@ -20,7 +20,7 @@ from estimator.errors import InputError
 class Given:
     """All that a calibration is made from; as ``fit`` takes it."""
 
-    trials: Sequence[Trial]
+    trials: Sequence[CarriedTrial]
     start: Unknowns
     prior: Prior
     alone: Sequence[AloneEquations] = ()
@@ -79,3 +79,40 @@ def contradicting(given: Given, names: Sequence[str]) -> str | None:
         f"{name} contradicts the other recordings: {rest} one team of robots, and it fits none. Leave it out; mocobot "
         "diagnose may name what acts in it."
     )
+
+
+GRASPS, INERTIAL = "grasps", "inertial_parameters"
+
+
+def shares(found: Fit) -> list[dict[str, float]]:
+    """Mean share of every recording in each kind of unknown: by the names of ``GROUPS``, "grasps" and
+    "inertial_parameters"; those with a payload first, then the others. Kinds that are held are left out.
+    """
+    variance = np.diag(found.covariance)
+    kinds = {
+        kind: at[variance[at] > 1e-12 * np.max(variance[at], initial=0.0)]
+        for kind, at in _kinds(found).items()
+    }
+    parts = [*(trial.all for trial in found.trials), *found.alone]
+    weights = [
+        _weights(part, found.covariance) / np.maximum(variance, np.finfo(float).tiny) for part in parts
+    ]
+    return [
+        {kind: float(np.mean(weight[at])) for kind, at in kinds.items() if len(at) and variance[at].any()}
+        for weight in weights
+    ]
+
+
+def _kinds(found: Fit) -> dict[str, NDArray[np.intp]]:
+    layout = found.layout
+    out = {group.name: layout.unit_indices(np.r_[AT[group.name]]) for group in GROUPS}
+    payloads = range(layout.payloads)
+    grasps = [k for p in payloads for k in range(layout.of_payload(p).start, layout.of_inertia(p).start)]
+    inertial = [k for p in payloads for k in range(layout.of_inertia(p).start, layout.of_inertia(p).stop)]
+    return out | {GRASPS: np.array(grasps, dtype=np.intp), INERTIAL: np.array(inertial, dtype=np.intp)}
+
+
+def _weights(part: Quadratic, covariance: Array) -> Array:
+    """Diagonal of C H C."""
+    columns = covariance[:, part.index]
+    return np.einsum("jk,jk->j", columns @ part.H, columns)

@@ -17,9 +17,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import AT, COUNT
-from estimator.arrays import Array
+from estimator.arrays import Array, inertia_matrix, inertia_parameters
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
-from estimator.estimate.principal import inertia_matrix, inertia_parameters
 from estimator.estimate.uncertainty import numerical_jacobian, standard_errors
 
 FLOOR_RAD = 2e-6

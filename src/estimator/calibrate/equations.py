@@ -1,6 +1,6 @@
 """Loops and balance of one trial as rows, with their derivatives by the unknowns and the covariance of their noise.
 
-Residual and signs as in ``estimator.rigid_team.residual``, here of robots as they are. The residual is evaluated at the
+Residual and signs as in ``estimator.rigid_team``, here of robots as they are. The residual is evaluated at the
 thinned instants and averaged into rows; derivatives are taken at the rows' mean signals, which vary slowly, after these
 were adjusted towards the model (W. E. Deming, Statistical Adjustment of Data, 1943; in geodesy the Gauss-Helmert
 model): of signals as measured, noise is in derivative and residual alike, and shrank the mass by 3.6 %.
@@ -14,22 +14,34 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.arm.delta import jacobian_of, leg_geometry, length_jacobians
-from estimator.arm.gimbal import rate_matrix, rotation
-from estimator.arm.unit import AT, COUNT, ArmUnit
+from estimator.arm.dynamics import arm_torque, rate_matrix, rotation
+from estimator.arm.motion import BY_UNIT, PHI, PHI_DDOT, PHI_DOT, STEPS, TAU, THETA, ArmChanges, ArmData
+from estimator.arm.motion import COUNT as SLOTS
+from estimator.arm.unit import AT, COUNT, ArmUnit, true_joints
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.equations.level import corrected
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.estimate.fusion import fusion_changes, fusion_with, total_wrench
-from estimator.estimate.joint import newton_euler_regressor
-from estimator.rigid_team.changes import needed_wrench, vee
-from estimator.rigid_team.residual import Bases, Shared, pose_error, robot_data
-from estimator.rigid_team.slots import COUNT as SLOTS
-from estimator.rigid_team.slots import PHI, TAU, THETA
-from estimator.signals.arm_changes import BY_UNIT, ArmChanges
-from estimator.signals.arm_data import ArmData
+from estimator.calibrate.rows import Rows, Sensing
+from estimator.rigid_team import (
+    Bases,
+    Shared,
+    fusion_changes,
+    fusion_with,
+    needed_wrench,
+    newton_euler_regressor,
+    pose_error,
+    robot_data,
+    total_wrench,
+    vee,
+)
 from estimator.so3 import cross
+
+
+def corrected(s: Array, units: ArmUnit) -> Array:
+    """True signals of the robots from what they read, shape (..., N, ``SLOTS``)."""
+    s = s.copy()
+    s[..., PHI], s[..., THETA], s[..., TAU] = true_joints(units, s[..., PHI], s[..., THETA], s[..., TAU])
+    return s
+
 
 _POSE = np.r_[
     AT["phi_zero"], AT["theta_zero"], AT["radius"], AT["proximal_length"], AT["rod_length"], AT["tilt"]
@@ -386,3 +398,78 @@ def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     out[:, -3:, :grasped] = np.moveaxis(d.moment - needed[1], 0, -1)
     out[:, -6:, grasped:] = -_regressor(motion, motion_dot, up, gravity)
     return out
+
+
+_SIGNALS = np.r_[PHI, PHI_DOT, PHI_DDOT]
+_BY_UNIT = np.r_[
+    AT["radius"], AT["proximal_length"], AT["rod_length"], AT["tilt"],
+    AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"],
+]  # fmt: skip
+_UNIT_STEPS = np.concatenate([np.full(11, 1e-6), np.full(7, 1e-4)])
+
+
+@dataclass(frozen=True, eq=False)
+class AloneEquations:
+    """Rows of one recording of unloaded arms.
+
+    Attributes:
+        rows: its signals, and how they are averaged.
+        variances: of one sample in motion and of a hold's mean, shape (n, N, 9) each.
+        mean: averaged readings, shape (n, N, 21).
+    """
+
+    rows: Rows
+    variances: tuple[Array, Array]
+    mean: Array
+
+    @classmethod
+    def of(cls, rows: Rows, sensing: Sensing) -> AloneEquations:
+        """Of a recording whose sensors are known."""
+        mean = rows(rows.s)
+        mean[rows.moving :, :, 3:9] = 0.0
+        return cls(rows, sensing.variances(rows), mean)
+
+    def residual(self, units: ArmUnit) -> Array:
+        """Spring torques minus those that move the arm, shape (n, N, 3) [N m]."""
+        return self.rows(_left(corrected(self.rows.s, units), units))
+
+    def at(self, units: ArmUnit) -> tuple[Array, Array, Array]:
+        """Residual (n, N, 3), derivative by own deviations (n, N, 3, ``COUNT``), covariance (n, N, 3, 3)."""
+        s = corrected(self.mean, units)
+        base = _left(s, units)
+        by_signals = np.zeros((*base.shape, 9))
+        for k, slot in enumerate(_SIGNALS):
+            moved = s.copy()
+            moved[..., slot] += STEPS[slot]
+            by_signals[..., k] = (_left(moved, units) - base) / STEPS[slot]
+        J = np.zeros((*base.shape, COUNT))
+        for place, step in zip(_BY_UNIT, _UNIT_STEPS, strict=True):
+            x = units.x.copy()
+            x[:, place] += step
+            J[..., place] = (_left(s, ArmUnit(units.design, x)) - base) / step
+        J[..., AT["phi_zero"]] = -by_signals[..., :3]
+        stiff = 1.0 + units.of("stiffness_ratio")
+        for k in range(3):
+            J[..., k, AT["tau_zero"].start + k] = -stiff[:, k]
+            J[..., k, AT["stiffness_ratio"].start + k] = s[..., TAU][..., k] / stiff[:, k]
+        return self.residual(units), J, self._covariance(by_signals)
+
+    def _covariance(self, by_signals: Array) -> Array:
+        moving, held = self.variances
+        n, N = moving.shape[:2]
+        in_motion = (np.arange(n) < self.rows.moving)[:, None, None]
+        gain = self.rows.gain
+        out = np.zeros((n, N, 3, 3))
+        at = np.arange(3)
+        out[..., at, at] = np.where(in_motion, moving[..., 6:] * gain[0, 0], held[..., 6:])
+        for joint in range(3):
+            part = by_signals[..., joint::3]
+            noise = moving[..., joint, None, None] * gain
+            still = np.zeros((n, N, 3, 3))
+            still[..., 0, 0] = held[..., joint]
+            out += part @ np.where(in_motion[..., None], noise, still) @ np.swapaxes(part, -1, -2)
+        return out
+
+
+def _left(s: Array, units: ArmUnit) -> Array:
+    return s[..., TAU] - arm_torque(s[..., PHI], s[..., PHI_DOT], s[..., PHI_DDOT], units)

@@ -21,11 +21,17 @@ from scipy.signal import butter, correlate, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arm.gimbal import rate_matrix
+from estimator.arm.dynamics import rate_matrix
 from estimator.arrays import Array
 from estimator.estimate.grasps import pair_rotation
-from estimator.estimate.identifiability import StepReport, judge
-from estimator.estimate.uncertainty import WINDOW_S, window_covariance, window_normals, windows
+from estimator.estimate.uncertainty import (
+    WINDOW_S,
+    StepReport,
+    judge,
+    window_covariance,
+    window_normals,
+    windows,
+)
 from estimator.filtering import differentiate
 from estimator.recording.model import Recording
 from estimator.statistics import rms
