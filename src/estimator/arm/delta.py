@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimator.arm.design import OmnidDesign
-from estimator.arm.numbers import Arm
+from estimator.arm.unit import Arms
 from estimator.arrays import Array, apart, matrices
 from estimator.errors import InputError
 from estimator.so3 import cross, times
@@ -57,7 +57,7 @@ class LegGeometry:
         return times(np.swapaxes(self.rod, -1, -2), torque / self.leverage)
 
 
-def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
+def forward_kinematics(phi: ArrayLike, design: Arms) -> Array:
     """Wrist position h(phi) in {b} [m], shape (..., 3): equation (28); the higher of the two solutions.
 
     Args:
@@ -80,12 +80,12 @@ def _wrist(phi: Array, foot: Array, normal: Array, square: Array) -> Array:
     return foot + np.sqrt(square)[..., None] * normal
 
 
-def is_reachable(phi: ArrayLike, design: Arm) -> NDArray[np.bool_]:
+def is_reachable(phi: ArrayLike, design: Arms) -> NDArray[np.bool_]:
     """Whether a wrist position exists for driven angles ``phi`` [rad], shape (..., 3) -> (...)."""
     return _sphere_intersection(_sphere_centres(np.asarray(phi, dtype=float), design), design)[2] > 0
 
 
-def stretches(phi: ArrayLike, design: Arm) -> tuple[NDArray[np.bool_], Array]:
+def stretches(phi: ArrayLike, design: Arms) -> tuple[NDArray[np.bool_], Array]:
     """The answer of ``is_reachable``, and the legs' leverage (..., 3), which means nothing where that is no."""
     phi = np.asarray(phi, dtype=float)
     centres = _sphere_centres(phi, design)
@@ -94,7 +94,7 @@ def stretches(phi: ArrayLike, design: Arm) -> tuple[NDArray[np.bool_], Array]:
     return square > 0, _legs(phi, h, centres, design).leverage
 
 
-def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
+def leg_geometry(phi: ArrayLike, design: Arms) -> LegGeometry:
     """Wrist, rods and knee derivatives at driven angles ``phi`` [rad], shape (..., 3).
 
     Raises:
@@ -106,14 +106,14 @@ def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
     return _legs(phi, h, centres, design)
 
 
-def _legs(phi: Array, h: Array, centres: Array, design: Arm) -> LegGeometry:
+def _legs(phi: Array, h: Array, centres: Array, design: Arms) -> LegGeometry:
     cos, sin = np.cos(phi), np.sin(phi)
     rod, proximal = h[..., None, :] - centres, np.asarray(design.proximal_length_m)[..., None]
     knee_d1, knee_d2 = proximal * _in_leg_planes(-sin, cos), -proximal * _in_leg_planes(cos, sin)
     return LegGeometry(h, rod, knee_d1, knee_d2, np.sum(rod * knee_d1, axis=-1))
 
 
-def jacobian(phi: ArrayLike, design: Arm) -> Array:
+def jacobian(phi: ArrayLike, design: Arms) -> Array:
     """dh/dphi [m/rad], shape (..., 3, 3): rows x, y, z of {b}, columns phi_1..3.
 
     Raises:
@@ -127,7 +127,7 @@ def jacobian_of(legs: LegGeometry) -> Array:
     return np.asarray(legs.across_rods * legs.leverage[..., None, :])
 
 
-def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Array, Array, Array]:
+def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arms) -> tuple[Array, Array, Array]:
     """Derivatives of h by every leg's radius, proximal length and rod length, shape (..., 3, 3) each.
 
     From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs.
@@ -164,7 +164,7 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
     return h_dot, times(legs.across_rods, legs.leverage * phi_ddot + curvature)
 
 
-def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:
+def inverse_kinematics(h: ArrayLike, design: Arms) -> Array:
     """Driven angles phi(h) [rad], shape (..., 3), with every knee pointing outward.
 
     Args:
@@ -185,12 +185,12 @@ def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:
     return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
 
 
-def is_in_reach(h: ArrayLike, design: Arm) -> NDArray[np.bool_]:
+def is_in_reach(h: ArrayLike, design: Arms) -> NDArray[np.bool_]:
     """Whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
     return np.abs(_leg_triangles(np.asarray(h, dtype=float), design)[2]) <= 1.0
 
 
-def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
+def _leg_triangles(h: Array, design: Arms) -> tuple[Array, Array, Array]:
     """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
     l1, l2 = design.proximal_length_m, design.rod_length_m
     with np.errstate(
@@ -203,7 +203,7 @@ def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
         return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
 
 
-def _sphere_centres(phi: Array, design: Arm) -> Array:
+def _sphere_centres(phi: Array, design: Arms) -> Array:
     radius = design.radius_m + design.proximal_length_m * np.cos(phi)
     return _in_leg_planes(radius, design.proximal_length_m * np.sin(phi))
 
@@ -215,7 +215,7 @@ def _in_leg_planes(outward: Array, up: Array) -> Array:
     ])  # fmt: skip
 
 
-def _sphere_intersection(centres: Array, design: Arm) -> tuple[Array, Array, Array]:
+def _sphere_intersection(centres: Array, design: Arms) -> tuple[Array, Array, Array]:
     """Point of the sphere centres' plane nearest the wrist, upward unit normal, squared height over it."""
     rod = np.asarray(design.rod_length_m)
     a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
 from estimator.arm.dynamics import Gimbal, arm_torque, gimbal_torque, wrench_on_payload
-from estimator.arm.numbers import Arm
-from estimator.arm.unit import AT, ArmUnit
+from estimator.arm.unit import AT, Arms, ArmUnit
 from estimator.arrays import Array, apart, components
 from estimator.so3 import cross, times
 
@@ -67,7 +66,7 @@ class ArmData(NamedTuple):
 
 
 def arm_data(
-    phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arm
+    phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arms
 ) -> ArmData:
     """Kinematics and dynamics of an arm (paper, equations (28)-(29), section IV.B).
 

@@ -1,4 +1,4 @@
-"""Arms as they are: deviations from the design, their files, and the frames that encoder zeros define."""
+"""Arms as they are: deviations from the design, their JSON, and the frames that encoder zeros define."""
 
 from __future__ import annotations
 
@@ -15,17 +15,16 @@ from estimator.strict import Fields
 
 
 class Group(NamedTuple):
-    """Deviations of one kind.
-
-    Attributes:
-        name: theirs.
-        unit: theirs, "" for a ratio.
-        entries: one name each: legs, gimbal axes or directions.
-    """
+    """Deviations of one kind: name, unit ("" for a ratio), and a name for each leg, gimbal axis or direction."""
 
     name: str
     unit: str
     entries: tuple[str, ...]
+
+    @property
+    def key(self) -> str:
+        """Name with unit, such as ``tau_zero_Nm``."""
+        return f"{self.name}_{self.unit.replace(' ', '')}" if self.unit else self.name
 
 
 _LEGS = ("1", "2", "3")
@@ -55,7 +54,9 @@ COUNT = int(_ENDS[-1])
 
 @dataclass(frozen=True, eq=False)
 class ArmUnit:
-    """One arm, or several side by side in leading axes of ``x``: an ``Arm`` for kinematics and dynamics.
+    """One arm as it is, or several side by side in leading axes of ``x``; numbers have the names of ``OmnidDesign``.
+
+    Lengths and masses of legs have shape (..., 3). Inertias grow with the mass, centres of mass stay as designed.
 
     Attributes:
         design: what all arms of the kind have in common.
@@ -91,67 +92,67 @@ class ArmUnit:
 
     @property
     def up(self) -> Array:
-        """See ``Arm``."""
+        """Unit vector against gravity in the arm's own frame, shape (..., 3)."""
         return self.R_ba[..., 2, :]
 
     @property
     def radius_m(self) -> Array:
-        """See ``Arm``."""
+        """Base radius minus platform radius."""
         return self.design.radius_m + self.of("radius")
 
     @property
     def proximal_length_m(self) -> Array:
-        """See ``Arm``."""
+        """Driven axis to knee."""
         return self.design.proximal_length_m + self.of("proximal_length")
 
     @property
     def rod_length_m(self) -> Array:
-        """See ``Arm``."""
+        """Knee to platform joint."""
         return self.design.rod_length_m + self.of("rod_length")
 
     @property
     def proximal_mass_kg(self) -> Array:
-        """See ``Arm``."""
+        """Mass of a driven link."""
         return self.design.proximal_mass_kg * (1.0 + self.of("proximal_mass_ratio"))
 
     @property
     def proximal_com_m(self) -> float:
-        """See ``Arm``; the centre of mass stays where it is designed."""
+        """Driven axis to the link's centre of mass."""
         return self.design.proximal_com_m
 
     @property
     def proximal_inertia_kgm2(self) -> Array:
-        """See ``Arm``; grows with the mass."""
+        """Inertia of a driven link about its axis."""
         return self.design.proximal_inertia_kgm2 * (1.0 + self.of("proximal_mass_ratio"))
 
     @property
     def rod_mass_kg(self) -> Array:
-        """See ``Arm``."""
+        """Mass of a leg's rod, or rods."""
         return self.design.rod_mass_kg * (1.0 + self.of("rod_mass_ratio"))
 
     @property
     def wrist_mass_kg(self) -> Array:
-        """See ``Arm``; shape (..., 1)."""
+        """Mass of all that translates with the wrist, shape (..., 1)."""
         return self.design.wrist_mass_kg * (1.0 + self.of("wrist_mass_ratio"))
 
     @property
     def yoke_inertia_kgm2(self) -> Triple:
-        """See ``Arm``."""
+        """Principal moments of the gimbal's first body."""
         return self.design.yoke_inertia_kgm2
 
     @property
     def ring_inertia_kgm2(self) -> Triple:
-        """See ``Arm``."""
+        """Principal moments of its second body."""
         return self.design.ring_inertia_kgm2
 
     @property
     def flange_inertia_kgm2(self) -> Triple:
-        """See ``Arm``."""
+        """Principal moments of its last body."""
         return self.design.flange_inertia_kgm2
 
     @property
     def gravity_mps2(self) -> float:
-        """See ``Arm``."""
+        """Magnitude of gravity."""
         return self.design.gravity_mps2
 
 
@@ -186,41 +187,21 @@ def levelled(arms: Arms, R: Array, h: Array) -> tuple[Array, Array]:
     return arms.R_ba @ R, (arms.R_ba @ h[..., None])[..., 0]
 
 
-def key_of(group: Group) -> str:
-    """The group's name with its unit, such as ``tau_zero_Nm``."""
-    return f"{group.name}_{group.unit.replace(' ', '')}" if group.unit else group.name
-
-
-KEYS = tuple(key_of(group) for group in GROUPS)
-
-
 def units_to_list(units: ArmUnit) -> list[dict[str, list[float]]]:
-    """One object per robot: every group of ``GROUPS`` as a list of its entries.
-
-    Args:
-        units: ``x`` of shape (N, ``COUNT``).
-    """
-    return [
-        {key_of(group): one.of(group.name).tolist() for group in GROUPS}
-        for one in (ArmUnit(units.design, x) for x in units.x)
-    ]
+    """One object per robot, with every group of ``GROUPS`` as a list; ``x`` has shape (N, ``COUNT``)."""
+    return [{group.key: x[AT[group.name]].tolist() for group in GROUPS} for x in units.x]
 
 
 def units_from_list(values: list[Any], design: OmnidDesign, where: str) -> ArmUnit:
-    """Inverse of ``units_to_list``.
-
-    Args:
-        values: one object per robot.
-        design: what the robots deviate from.
-        where: what messages call the list.
+    """Inverse of ``units_to_list``; messages call the list ``where``.
 
     Raises:
         InputError: a key is unknown or missing, or a value is not finite, or not such that an arm can have it.
     """
     x = np.empty((len(values), COUNT))
     for i, entry in enumerate(values):
-        read = Fields(entry, KEYS, f"{where}[{i}]")
-        x[i] = np.concatenate([read.array(key_of(group), (len(group.entries),)) for group in GROUPS])
+        read = Fields(entry, [group.key for group in GROUPS], f"{where}[{i}]")
+        x[i] = np.concatenate([read.array(group.key, (len(group.entries),)) for group in GROUPS])
     units = ArmUnit(design, x)
     check_units(units, where)
     return units
@@ -232,18 +213,21 @@ def check_units(units: ArmUnit, where: str) -> None:
     Raises:
         InputError: they cannot.
     """
-    for group, least in (("stiffness_ratio", -1.0), ("proximal_mass_ratio", -1.0), ("rod_mass_ratio", -1.0),
-                         ("wrist_mass_ratio", -1.0), ("radius", -units.design.radius_m),
-                         ("proximal_length", -units.design.proximal_length_m),
-                         ("rod_length", -units.design.rod_length_m)):  # fmt: skip
-        values = units.of(group)
+    for group in GROUPS:
+        if group.name.endswith("_ratio"):
+            least = -1.0
+        elif group.name in ("radius", "proximal_length", "rod_length"):
+            least = -getattr(units.design, f"{group.name}_m")
+        else:
+            continue
+        values = units.of(group.name)
         bad = np.argwhere(~(values > least))
         if len(bad):
             robot, value = int(bad[0][0]), float(values[tuple(bad[0])])
-            key = KEYS[[one.name for one in GROUPS].index(group)]
-            raise InputError(f"{where}[{robot}]: {key} is {value:g}; it must be greater than {least:g}")
+            raise InputError(f"{where}[{robot}]: {group.key} is {value:g}; it must be greater than {least:g}")
 
 
+# The zero of theta_x turns {i} about its x axis, and no carry shows it: frames are the encoders' or the drawing's.
 ENCODERS = "frames {i} as the encoders define them: each turned about its x axis by the zero of that theta_x"
 MIXED = "Frames are the encoders' in one and the drawing's in the other: of the payload, the mass alone is compared."
 

@@ -1,4 +1,4 @@
-"""A calibration: the robots as they are, what they carried, how well each is known, and how well it foretells."""
+"""A calibration: the robots as they are, what they carried, how well each is known, and how well it predicts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from scipy.linalg import null_space
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit, in_encoder_frames
-from estimator.arrays import Array, inertia_matrix, inertia_parameters
+from estimator.arrays import Array, inertia_matrix
 from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
-from estimator.estimate.inertia import PrincipalInertia, principal_inertia
+from estimator.estimate.inertia import PrincipalInertia, about_com, principal_inertia
 from estimator.estimate.uncertainty import numerical_jacobian, standard_errors
 from estimator.recording.model import Recording
 from estimator.rigid_team import Bases
@@ -293,22 +293,14 @@ def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
         scale_sd: standard deviation of the common spring scale, ``Calibration.scale_sd``.
     """
     at = payload.parameters
-    values = _about_com(at)
+    values = about_com(at)
     step = np.maximum(np.abs(at), 1e-3)  # parameters of different units
-    J = numerical_jacobian(lambda x: _about_com(at + step * x), np.zeros(10)) / step
+    J = numerical_jacobian(lambda x: about_com(at + step * x), np.zeros(10)) / step
     by_scale = J @ payload.by_scale[-10:]
     covariance = J @ payload.covariance[-10:, -10:] @ J.T + scale_sd**2 * np.outer(by_scale, by_scale)
     inertia = inertia_matrix(values[4:])
     principal = principal_inertia(inertia, covariance[4:, 4:])
     return Carried(float(values[0]), values[1:4], inertia, covariance, by_scale, principal)
-
-
-def _about_com(parameters: Array) -> Array:
-    """(m, p_1c, inertia about the centre of mass) of (m, m p_1c, inertia about {1}), shape (10,)."""
-    m = parameters[0]
-    c = parameters[1:4] / m
-    inertia = inertia_matrix(parameters[4:]) - m * (c @ c * np.eye(3) - np.outer(c, c))
-    return np.concatenate([[m], c, inertia_parameters(inertia)])
 
 
 def calibrated(recording: Recording, calibration: Calibration, called: str = "the calibration") -> Recording:

@@ -53,7 +53,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit, key_of
+from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.calibration import (
     CalibratedPayload,
@@ -343,17 +343,16 @@ def _deviations(calibration: Calibration, robot: int) -> dict[str, dict[str, lis
         "by_scale": calibration.by_scale[robot],
     }
     return {
-        key_of(group): {name: part[AT[group.name]].tolist() for name, part in parts.items()}
-        for group in GROUPS
+        group.key: {name: part[AT[group.name]].tolist() for name, part in parts.items()} for group in GROUPS
     }
 
 
 def _read_deviations(read: Fields, N: int) -> tuple[Array, Array]:
     x, by_scale = np.zeros((N, COUNT)), np.zeros((N, COUNT))
     for robot, entry in enumerate(read.list("deviations", N)):
-        unit = Fields(entry, [key_of(group) for group in GROUPS], f"{read.where}: deviations[{robot + 1}]")
+        unit = Fields(entry, [group.key for group in GROUPS], f"{read.where}: deviations[{robot + 1}]")
         for group in GROUPS:
-            part = unit.within(key_of(group), ("value", "se", "prior_se", "by_scale"))
+            part = unit.within(group.key, ("value", "se", "prior_se", "by_scale"))
             shape = (len(group.entries),)
             x[robot, AT[group.name]] = part.array("value", shape)
             by_scale[robot, AT[group.name]] = part.array("by_scale", shape)

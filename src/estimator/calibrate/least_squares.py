@@ -1,4 +1,8 @@
-"""The least squares of a calibration: loops and balance of all trials, priors on the robots, weighed payloads."""
+"""The least squares of a calibration: loops and balance of all trials, priors on the robots, weighed payloads.
+
+Gauss-Newton from the robots as designed, on few rows first, then on all. Coordinates z are such that the robots' prior
+is standard normal; unknowns that are held have none.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,7 @@ from scipy.linalg import block_diag, cho_factor, cho_solve
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.calibration import Calibration, Prior
+from estimator.calibrate.calibration import CalibratedPayload, Calibration, Prior
 from estimator.calibrate.equations import AloneEquations, Curvature, Rowed, TrialEquations
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
@@ -37,13 +41,7 @@ class Unknowns:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each unknown lies in one vector: robots, then payloads, then trials.
-
-    Attributes:
-        robots: number of robots N.
-        payloads: number of payloads, 0 where the robots only move freely.
-        trials: number of trials with a payload.
-    """
+    """Where each unknown lies in one vector: robots, then payloads, then trials, as many as there are of each."""
 
     robots: int
     payloads: int
@@ -59,11 +57,6 @@ class Layout:
         """Grasps of robots 2 on, and ten inertial parameters."""
         return 6 * (self.robots - 1) + 10
 
-    @property
-    def per_trial(self) -> int:
-        """Bases of robots 2 on."""
-        return 4 * (self.robots - 1)
-
     def of_payload(self, payload: int) -> slice:
         """One payload's grasps (d_i, e_i for i >= 2), then (m, m c, J about {1})."""
         start = self.of_units.stop + payload * self.per_payload
@@ -76,8 +69,9 @@ class Layout:
 
     def of_trial(self, trial: int) -> slice:
         """One trial's bases (x, y, z, yaw for i >= 2)."""
-        start = self.of_payload(self.payloads).start + trial * self.per_trial
-        return slice(start, start + self.per_trial)
+        size = 4 * (self.robots - 1)
+        start = self.of_payload(self.payloads).start + trial * size
+        return slice(start, start + size)
 
     @property
     def size(self) -> int:
@@ -90,12 +84,11 @@ class Layout:
 
     def moved(self, at: Unknowns, dx: Array) -> Unknowns:
         """Unknowns changed by a step."""
-        carried: Sequence[Shared] = [
-            shared.moved(dx[self.of_payload(k)]) for k, shared in enumerate(at.carried)
-        ]
-        bases = [base.moved(dx[self.of_trial(k)]) for k, base in enumerate(at.bases)]
-        units = at.units.moved(dx[self.of_units].reshape(self.robots, COUNT))
-        return replace(at, units=units, carried=tuple(carried), bases=tuple(bases))
+        return Unknowns(
+            at.units.moved(dx[self.of_units].reshape(self.robots, COUNT)),
+            tuple(shared.moved(dx[self.of_payload(k)]) for k, shared in enumerate(at.carried)),
+            tuple(base.moved(dx[self.of_trial(k)]) for k, base in enumerate(at.bases)),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +137,14 @@ class Quadratic:
         own = dx[self.index]
         return float(self.c + 2.0 * self.g @ own + own @ self.H @ own)
 
-    def add_to(self, H: Array, g: Array) -> None:
-        """Add to the normal equations of all unknowns."""
-        H[np.ix_(self.index, self.index)] += self.H
-        g[self.index] += self.g
+
+def normal_equations(parts: Sequence[Quadratic], size: int) -> tuple[Array, Array]:
+    """H (K, K) and g (K,) of all unknowns, summed over parts."""
+    H, g = np.zeros((size, size)), np.zeros(size)
+    for part in parts:
+        H[np.ix_(part.index, part.index)] += part.H
+        g[part.index] += part.g
+    return H, g
 
 
 def solved(H: Array, g: Array) -> tuple[Array, Array]:
@@ -157,49 +154,64 @@ def solved(H: Array, g: Array) -> tuple[Array, Array]:
     return -scale * cho_solve(factor, scale * g), scale[:, None] * cho_solve(factor, np.diag(scale))
 
 
-@dataclass(frozen=True)
-class KnownMass:
-    """A weighed payload.
-
-    Attributes:
-        payload: which one, from 0.
-        mass_kg: what the scales say.
-        se_kg: its standard error.
-    """
+class KnownMass(NamedTuple):
+    """A weighed payload: which one (from 0), what the scales say [kg], and its standard error [kg]."""
 
     payload: int
     mass_kg: float
     se_kg: float
 
 
-@dataclass(frozen=True, eq=False)
-class CarriedTrial:
-    """A trial with a payload.
-
-    Attributes:
-        rows: its rows.
-        payload: which of the payloads it carries, from 0.
-        sensing: of its robots.
-    """
+class CarriedTrial(NamedTuple):
+    """Rows of a trial, which payload it carries (from 0), and the sensors of its robots."""
 
     rows: Rows
     payload: int
     sensing: Sensing
 
-    def blocks(self, every: int = 1, *, held: bool = False) -> list[TrialEquations]:
-        """Its equations in blocks, of every so-and-so-many-th row; robots ``held`` need no derivatives."""
-        chosen = np.arange(0, len(self.rows.time), every)
-        parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
-        return [TrialEquations.of(self.rows.take(part), self.sensing, held=held) for part in parts]
-
 
 @dataclass(frozen=True, eq=False)
-class TrialFit:
-    """One trial at the solution.
+class Given:
+    """All that a calibration is made from.
 
     Attributes:
-        all, loops, balance: of all its rows together, and of either kind alone.
+        trials: those with a payload.
+        start: values to start from, the robots as designed, or as calibrated before.
+        prior: spread of the robots.
+        alone: recordings of unloaded arms.
+        known_mass: weighed payloads; with one, the common spring scale is free.
+        robots: an earlier calibration, whose robots are held; their errors go on to the rest.
+        held: the robots are those of the start and have no errors (``prior`` has no spread): a third quicker, and
+            trials know nothing of them.
     """
+
+    trials: Sequence[CarriedTrial]
+    start: Unknowns
+    prior: Prior
+    alone: Sequence[AloneEquations] = ()
+    known_mass: Sequence[KnownMass] = ()
+    robots: Calibration | None = None
+    held: bool = False
+
+    def only(self, chosen: Sequence[int]) -> Given:
+        """Some of the trials, by index, with what they carry."""
+        carried = sorted({self.trials[k].payload for k in chosen})
+        start = replace(
+            self.start,
+            carried=tuple(self.start.carried[payload] for payload in carried),
+            bases=tuple(self.start.bases[k] for k in chosen),
+        )
+        trials = [self.trials[k]._replace(payload=carried.index(self.trials[k].payload)) for k in chosen]
+        known = [
+            one._replace(payload=carried.index(one.payload))
+            for one in self.known_mass
+            if one.payload in carried
+        ]
+        return replace(self, trials=trials, start=start, known_mass=known)
+
+
+class TrialFit(NamedTuple):
+    """One trial at the solution: all its rows together, and either kind alone."""
 
     all: Quadratic
     loops: Quadratic
@@ -212,7 +224,7 @@ class Point(NamedTuple):
     Attributes:
         unknowns: where.
         z: the same in coordinates of ``Problem.basis``, relative to the start, shape (k,).
-        trials, alone, known: its parts.
+        trials, alone, known: its parts: trials with a payload, recordings of unloaded arms, weighed masses.
         H, g: normal equations of all unknowns without the prior, shapes (K, K) and (K,).
         value: chi2 of all rows, and of the prior.
         rows: how many there are, and coordinates that have a prior.
@@ -234,62 +246,58 @@ class Problem:
 
     Attributes:
         layout: where each unknown lies.
-        basis: unknowns from coordinates z in which the robots' prior is standard normal, shape (K, k).
-        prior: information of that prior on z: 1 for the robots, 0 for the rest, shape (k,).
+        basis: unknowns from coordinates z, shape (K, k).
+        prior: information of the prior on z: 1 for the robots, 0 for the rest, shape (k,).
         complete: whether all rows are in it.
     """
 
-    def __init__(
-        self,
-        trials: Sequence[CarriedTrial],
-        alone: Sequence[AloneEquations],
-        known_mass: Sequence[KnownMass],
-        prior: Prior,
-        layout: Layout,
-        basis: Array,
-        information: Array,
-        *,
-        held: bool = False,
-    ) -> None:
-        """On every so-and-so-many-th row, ``rules.COARSE_ROWS`` in all; ``held`` as ``fit`` has it."""
-        self.layout, self.basis, self.prior = layout, basis, information
-        self._trials, self._alone, self._known = trials, alone, known_mass
-        self._held = held
+    def __init__(self, given: Given) -> None:
+        """On every so-and-so-many-th row, ``rules.COARSE_ROWS`` in all."""
+        self._given, start = given, given.start
+        self.layout = layout = Layout(len(start.units.x), len(start.carried), len(given.trials))
+        of_units = np.zeros((layout.of_units.stop, 0))
+        if given.robots is None:
+            of_units = given.prior.factor(layout.robots, hold_scale=not given.known_mass)
+        self.basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
+        self.prior = np.zeros(self.basis.shape[1])
+        self.prior[: of_units.shape[1]] = 1.0
         # A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
         # derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way. And
         # where robots are held, motion may be so weak that those errors exceed what it shows of the inertia.
-        self._averaged = prior.arm_mass_ratio > 0.0 or not information.any()
-        every = max(1, sum(len(trial.rows.time) for trial in trials) // rules.COARSE_ROWS)
+        self._averaged = given.prior.arm_mass_ratio > 0.0 or not self.prior.any()
+        self._use_rows(max(1, sum(len(trial.rows.time) for trial in given.trials) // rules.COARSE_ROWS))
+
+    def _use_rows(self, every: int) -> None:
         self.complete = every == 1
-        self._blocks = _blocks(trials, self._averaged, every, held=held)
+        self._blocks = [
+            [
+                _Block(equations, self._averaged and self.complete)
+                for equations in _equations(trial, every, held=self._given.held)
+            ]
+            for trial in self._given.trials
+        ]
 
     def on_all_rows(self, point: Point, dz: Array) -> Point:
         """A step, and every row from there on."""
-        self.complete = True
-        self._blocks = _blocks(self._trials, self._averaged, 1, held=self._held)
+        self._use_rows(1)
         return self.moved(point, dz)
 
-    def at(self, unknowns: Unknowns, z: Array, *, split: bool = False) -> Point:
-        """The sum of squares near some unknowns.
+    def start(self) -> Point:
+        """The sum of squares at the start, loops and balance apart."""
+        return self.at(self._given.start, np.zeros(self.basis.shape[1]), split=True)
 
-        Args:
-            unknowns, z: where, twice.
-            split: whether loops and balance are also wanted apart.
+    def at(self, unknowns: Unknowns, z: Array, *, split: bool = False) -> Point:
+        """The sum of squares near some unknowns, which z says, too; loops and balance are told apart if ``split``.
 
         Raises:
             InputError: robots are such that their arms cannot be where they were.
         """
-        layout = self.layout
-        done = tuple(
-            _trial_fit(k, trial, self._blocks[k], unknowns, layout, split=split or self.complete)
-            for k, trial in enumerate(self._trials)
-        )
-        alone = tuple(_alone_fit(equations, unknowns, layout) for equations in self._alone)
-        known = tuple(_weighed(one, unknowns, layout) for one in self._known)
-        H, g = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
+        split = split or self.complete
+        done = tuple(self._trial(k, unknowns, split=split) for k in range(self.layout.trials))
+        alone = tuple(_alone(equations, unknowns.units) for equations in self._given.alone)
+        known = tuple(self._weighed(one, unknowns) for one in self._given.known_mass)
         parts = (*(trial.all for trial in done), *alone, *known)
-        for part in parts:
-            part.add_to(H, g)
+        H, g = normal_equations(parts, self.layout.size)
         value = sum(part.c for part in parts) + float(self.prior @ z**2)
         count = sum(part.count for part in parts) + int(np.count_nonzero(self.prior))
         return Point(unknowns, z, done, alone, known, H, g, value, count)
@@ -300,32 +308,68 @@ class Problem:
         return H, self.basis.T @ point.g + self.prior * point.z
 
     def moved(self, point: Point, dz: Array) -> Point:
-        """The same after a step.
-
-        Raises:
-            InputError: as ``at``.
-        """
+        """The same after a step; errors as for ``at``."""
         return self.at(self.layout.moved(point.unknowns, self.basis @ dz), point.z + dz)
 
-    def signals(self) -> list[Array | None]:
-        """How the rows' signals are adjusted now."""
-        return [block.adjustment for blocks in self._blocks for block in blocks]
+    def lower(self, point: Point, damping: float, most: int) -> tuple[Point | None, int, float]:
+        """A damped step (D. W. Marquardt, J. SIAM 11, 1963): a point no higher, number of tries, next damping.
 
-    def put_back(self, signals: Sequence[Array | None]) -> None:
-        """Adjust the rows' signals as they were."""
-        for block, was in zip((b for blocks in self._blocks for b in blocks), signals, strict=True):
-            block.adjustment = was
+        The point is None if all that were tried are higher. The covariance of the rows' noise is each point's own, so
+        that the sum may rise a little where it is least.
+
+        Args:
+            point: from where.
+            damping: by how much of itself the diagonal of the normal equations is raised; 0 is Gauss-Newton.
+            most: to be tried.
+        """
+        H, g = self.normal(point)
+        every = [block for blocks in self._blocks for block in blocks]
+        adjustments = [block.adjustment for block in every]
+        for tried in range(1, most + 1):
+            dz = solved(H + damping * np.diag(np.diag(H)), g)[0]
+            try:
+                there = self.moved(point, dz)
+            except (InputError, np.linalg.LinAlgError):  # no arm reaches there
+                there = None
+            if there is not None and there.value <= point.value * (1.0 + rules.RISE):
+                return there, tried, 0.0 if damping <= rules.LEAST_DAMPING else damping / rules.DAMPING
+            for block, before in zip(every, adjustments, strict=True):
+                block.adjustment = before
+            damping = max(rules.LEAST_DAMPING, damping * rules.DAMPING)
+        return None, most, damping
+
+    def _trial(self, k: int, at: Unknowns, *, split: bool) -> TrialFit:
+        """A trial at some unknowns; loops and balance apart only where asked."""
+        payload, layout = self._given.trials[k].payload, self.layout
+        of_units = slice(0, 0) if self._given.held else layout.of_units
+        index = np.r_[of_units, layout.of_payload(payload), layout.of_trial(k)]
+        sums: list[Quadratic | None] = [None, None, None]
+        for block in self._blocks[k]:
+            rowed = block.at(at.units, at.carried[payload], at.bases[k])
+            n, C = rowed.residual.shape
+            by_units = rowed.by_units.reshape(n, C, -1)[..., of_units]
+            J = np.concatenate([by_units, rowed.by_carried, rowed.by_bases], axis=2)
+            kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
+            for kind, rows in enumerate(kinds if split else kinds[:1]):
+                noise = rowed.scatter if kind else rowed.covariance
+                part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
+                before = sums[kind]
+                sums[kind] = part if before is None else before.plus(part)
+        total = sums[0]
+        assert total is not None
+        return TrialFit(total, sums[1] or total, sums[2] or total)
+
+    def _weighed(self, known: KnownMass, at: Unknowns) -> Quadratic:
+        place = np.array([self.layout.of_inertia(known.payload).start])
+        off = (at.carried[known.payload].pi[0] - known.mass_kg) / known.se_kg
+        return Quadratic(place, np.array([[1.0 / known.se_kg**2]]), np.array([off / known.se_kg]), off**2, 1)
 
 
 @dataclass(eq=False)
 class _Block:
-    """Rows of a trial, and what earlier steps found of them.
+    """Rows of a trial, and what earlier steps found: how signals are adjusted, and the derivatives' curvature.
 
-    Attributes:
-        equations: the rows.
-        averaged: whether derivatives of the balance are averaged over each row.
-        adjustment: of the signals; None before the first step.
-        curvature: of those derivatives; None before it is needed.
+    Derivatives of the balance are ``averaged`` over each row where every row counts.
     """
 
     equations: TrialEquations
@@ -342,90 +386,23 @@ class _Block:
         return rowed
 
 
-def _blocks(trials: Sequence[CarriedTrial], averaged: bool, every: int, *, held: bool) -> list[list[_Block]]:
-    """Rows of all trials; derivatives of the balance are ``averaged`` where every row counts."""
-    return [
-        [_Block(equations, averaged and every == 1) for equations in trial.blocks(every, held=held)]
-        for trial in trials
-    ]
+def _equations(trial: CarriedTrial, every: int, *, held: bool) -> list[TrialEquations]:
+    """Equations of every so-and-so-many-th row, in blocks; robots that are held need no derivatives."""
+    chosen = np.arange(0, len(trial.rows.time), every)
+    parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
+    return [TrialEquations.of(trial.rows.take(part), trial.sensing, held=held) for part in parts]
 
 
-def _trial_fit(
-    k: int, trial: CarriedTrial, blocks: Sequence[_Block], at: Unknowns, layout: Layout, *, split: bool
-) -> TrialFit:
-    """A trial at some unknowns; loops and balance apart only where asked."""
-    held = all(block.equations.held for block in blocks)
-    of_units = slice(0, 0) if held else layout.of_units
-    index = np.r_[of_units, layout.of_payload(trial.payload), layout.of_trial(k)]
-    sums: list[Quadratic | None] = [None, None, None]
-    for block in blocks:
-        rowed = block.at(at.units, at.carried[trial.payload], at.bases[k])
-        n, C = rowed.residual.shape
-        by_units = rowed.by_units.reshape(n, C, -1)[..., of_units]
-        J = np.concatenate([by_units, rowed.by_carried, rowed.by_bases], axis=2)
-        kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
-        for kind, rows in enumerate(kinds if split else kinds[:1]):
-            noise = rowed.scatter if kind else rowed.covariance
-            part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
-            before = sums[kind]
-            sums[kind] = part if before is None else before.plus(part)
-    total = sums[0]
-    assert total is not None
-    return TrialFit(total, sums[1] or total, sums[2] or total)
-
-
-def _alone_fit(equations: AloneEquations, at: Unknowns, layout: Layout) -> Quadratic:
-    residual, by_own, covariance = equations.at(at.units)
+def _alone(equations: AloneEquations, units: ArmUnit) -> Quadratic:
+    residual, by_own, covariance = equations.at(units)
     n, N = residual.shape[:2]
     J = np.zeros((n, N, 3, N, COUNT))
     robots = np.arange(N)
     J[:, robots, :, robots] = np.moveaxis(by_own, 1, 0)
-    index = np.r_[layout.of_units]
+    shape = n * N, 3
     return Quadratic.of(
-        J.reshape(n * N, 3, -1), residual.reshape(n * N, 3), covariance.reshape(n * N, 3, 3), index
+        J.reshape(*shape, -1), residual.reshape(shape), covariance.reshape(*shape, 3), np.arange(N * COUNT)
     )
-
-
-def _weighed(known: KnownMass, at: Unknowns, layout: Layout) -> Quadratic:
-    place = np.array([layout.of_inertia(known.payload).start])
-    off = (at.carried[known.payload].pi[0] - known.mass_kg) / known.se_kg
-    return Quadratic(place, np.array([[1.0 / known.se_kg**2]]), np.array([off / known.se_kg]), off**2, 1)
-
-
-class Descent:
-    """Damping of steps, kept from one to the next (D. W. Marquardt, J. SIAM 11, 1963).
-
-    Attributes:
-        damping: by how much of itself the diagonal of the normal equations is raised; 0 is Gauss-Newton.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        self.damping = 0.0
-
-    def step(self, point: Point, most: int) -> tuple[Point | None, int]:
-        """A point that is no higher, and how many were tried; None if ``most`` were, and all are higher.
-
-        The covariance of the rows' noise is each point's own, so that the sum may rise a little where it is least.
-        """
-        problem = self._problem
-        H, g = problem.normal(point)
-        signals = problem.signals()
-        for tried in range(1, most + 1):
-            dz = solved(H + self.damping * np.diag(np.diag(H)), g)[0]
-            there = self._tried(point, dz)
-            if there is not None and there.value <= point.value * (1.0 + rules.RISE):
-                self.damping = 0.0 if self.damping <= rules.LEAST_DAMPING else self.damping / rules.DAMPING
-                return there, tried
-            problem.put_back(signals)
-            self.damping = max(rules.LEAST_DAMPING, self.damping * rules.DAMPING)
-        return None, most
-
-    def _tried(self, point: Point, dz: Array) -> Point | None:
-        try:
-            return self._problem.moved(point, dz)
-        except (InputError, np.linalg.LinAlgError):  # no arm reaches there
-            return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,70 +410,42 @@ class Fit:
     """What came out.
 
     Attributes:
-        unknowns: values.
-        layout: where each lies in ``covariance``.
-        basis: unknowns from coordinates z in which the robots' prior is standard normal, shape (K, k).
-        prior: information of that prior on z: 1 for the robots, 0 for the rest, shape (k,).
-        z: coordinates of the solution relative to the start, shape (k,).
+        point: the solution.
+        layout, basis, prior: as of ``Problem``.
         covariance: of all unknowns, the mean spring scale held; zero for held ones, shape (K, K).
         by_scale: derivative of all unknowns by the common spring scale that is held, shape (K,); zero where it is free.
-        trials: the trials with a payload at the solution.
-        alone: recordings of unloaded arms there.
-        known: weighed masses there.
         before: chi2/n of loops and balance of every trial with the robots as designed, shape (trials, 2).
         steps: Gauss-Newton steps.
         converged: whether the last step was small.
     """
 
-    unknowns: Unknowns
+    point: Point
     layout: Layout
     basis: Array
     prior: Array
-    z: Array
     covariance: Array
     by_scale: Array
-    trials: tuple[TrialFit, ...]
-    alone: tuple[Quadratic, ...]
-    known: tuple[Quadratic, ...]
     before: Array
     steps: int
     converged: bool
 
+    def payload(self, k: int, label: str | None) -> CalibratedPayload:
+        """A payload's numbers, by its index from 0."""
+        of, grasped = self.layout.of_payload(k), 6 * (self.layout.robots - 1)
+        shared, covariance = self.point.unknowns.carried[k], self.covariance[of, of]
+        grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
+        return CalibratedPayload(label, grasps, shared.pi, covariance, self.by_scale[of])
 
-def fit(
-    trials: Sequence[CarriedTrial],
-    start: Unknowns,
-    prior: Prior,
-    alone: Sequence[AloneEquations] = (),
-    known_mass: Sequence[KnownMass] = (),
-    robots: Calibration | None = None,
-    *,
-    held: bool = False,
-) -> Fit:
+
+def fit(given: Given) -> Fit:
     """Calibrate.
 
-    Args:
-        trials: those with a payload.
-        start: values to start from, the robots as designed, or as calibrated before.
-        prior: spread of the robots.
-        alone: recordings of unloaded arms.
-        known_mass: weighed payloads; with one, the common spring scale is free.
-        robots: an earlier calibration, whose robots are held; their errors go on to the rest.
-        held: the robots are those of the start and have no errors (``prior`` has no spread): a third quicker, and
-            trials know nothing of them.
+    Raises:
+        InputError, LinAlgError: arms cannot be where they were, or the equations cannot be solved.
     """
-    layout = Layout(len(start.units.x), len(start.carried), len(trials))
-    of_units = (
-        prior.factor(layout.robots, hold_scale=not known_mass)
-        if robots is None
-        else np.zeros((layout.robots * COUNT, 0))
-    )
-    basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
-    information = np.zeros(basis.shape[1])
-    information[: of_units.shape[1]] = 1.0
-    problem = Problem(trials, alone, known_mass, prior, layout, basis, information, held=held)
-    descent = Descent(problem)
-    point, steps, settled = problem.at(start, np.zeros(basis.shape[1]), split=True), 0, False
+    problem = Problem(given)
+    layout, basis = problem.layout, problem.basis
+    point, steps, settled, damping = problem.start(), 0, False, 0.0
     before = _with_robots_held(point, layout)
     while True:
         H, g = problem.normal(point)
@@ -511,7 +460,7 @@ def fit(
         elif size < rules.COARSE or steps >= rules.MAX_COARSE_STEPS:
             point, steps = problem.on_all_rows(point, dz), steps + 1
             continue
-        lower, tried = descent.step(point, rules.MAX_STEPS - steps)
+        lower, tried, damping = problem.lower(point, damping, rules.MAX_STEPS - steps)
         steps += tried
         flat = lower is None or (tried > 1 and lower.value > (1.0 - rules.FLAT) * point.value)
         point = lower or point
@@ -525,17 +474,14 @@ def fit(
         return held - basis @ (covariance_z @ (basis.T @ (point.H @ held)))
 
     by_scale, covariance = np.zeros(layout.size), basis @ covariance_z @ basis.T
-    if robots is not None:
+    if given.robots is not None:
         by_robots = followed(np.eye(layout.size)[:, layout.of_units])
-        by_scale = by_robots @ robots.by_scale.ravel()
-        covariance += by_robots @ robots.covariance @ by_robots.T
-    elif not known_mass:
+        by_scale = by_robots @ given.robots.by_scale.ravel()
+        covariance += by_robots @ given.robots.covariance @ by_robots.T
+    elif not given.known_mass:
         by_scale[layout.unit_indices(np.r_[AT["stiffness_ratio"]])] = 1.0
         by_scale = followed(by_scale)
-    return Fit(
-        point.unknowns, layout, basis, information, point.z, covariance, by_scale, point.trials, point.alone,
-        point.known, before, steps, settled,
-    )  # fmt: skip
+    return Fit(point, layout, basis, problem.prior, covariance, by_scale, before, steps, settled)
 
 
 def _with_robots_held(point: Point, layout: Layout) -> Array:

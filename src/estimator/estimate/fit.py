@@ -1,18 +1,22 @@
-"""The default estimator: one fit of closed loops and balance of wrenches, the robots held as they are said to be."""
+"""The default estimator: one fit of closed loops and balance of wrenches, the robots held as they are said to be.
+
+``estimate`` makes the fit where the recordings allow, else the paper's stages or ``joint``. ``estimate_on`` holds the
+robots as an earlier calibration found them; ``estimate_calibrated`` takes what a calibration found beside its robots.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.arrays import Array, inertia_parameters
-from estimator.calibrate.calibrate import calibrate
+from estimator.arrays import inertia_parameters
+from estimator.calibrate.calibrate import LEAST_ROWS, bases_of, calibrate
 from estimator.calibrate.calibration import (
     CalibratedPayload,
     Calibration,
@@ -22,13 +26,12 @@ from estimator.calibrate.calibration import (
     carried,
     grasps_of,
 )
-from estimator.calibrate.equations import corrected
-from estimator.calibrate.least_squares import CarriedTrial, Fit, Unknowns, fit
+from estimator.calibrate.least_squares import CarriedTrial, Fit, Given, Unknowns, fit
 from estimator.calibrate.rows import Resolution, Rows, Sensing
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial, withheld, wrench_balance
 from estimator.estimate.grasps import GraspEstimate
-from estimator.estimate.inertia import InertiaEstimate
+from estimator.estimate.inertia import InertiaEstimate, about_origin
 from estimator.estimate.joint import estimate_joint
 from estimator.estimate.payload import (
     estimate_from_trials,
@@ -40,12 +43,138 @@ from estimator.estimate.payload import (
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import MassEstimate
 from estimator.recording.model import Recording
-from estimator.rigid_team import Shared, fuse, inertia_regressor, robot_data, start_bases
+from estimator.rigid_team import Shared, fuse, inertia_regressor
 from estimator.statistics import rms
 
-CALIBRATED = "calibrated"
+ONE_FIT, CALIBRATED = "fit", "calibrated"
+"""Methods of estimates that come from here."""
 Asked = Literal["auto", "fit", "staged", "joint"]
 """What may be asked for: one fit of loops and balance, a method of ``estimate_payload``, or the best there is."""
+WITHOUT_ERRORS = (
+    "The recordings carry the calibration of their robots without its errors, so that standard errors lack them; an "
+    "estimate with the calibration itself (--calibration) has them."
+)
+
+
+class _CannotBe(Exception):
+    """Why one fit cannot be made."""
+
+
+class _Read(NamedTuple):
+    """What of one recording goes into the fit; ``why_not`` where it cannot."""
+
+    design: OmnidDesign
+    rows: Rows | None
+    resolution: Resolution
+    why_not: str
+
+    @classmethod
+    def of(cls, recording: Recording) -> _Read:
+        rows, why = None, ""
+        try:
+            rows = Rows.of(recording)
+        except InputError as error:
+            why = str(error)
+        if rows is not None and len(rows.time) < LEAST_ROWS:
+            why = f"{recording.name} is too short for it"
+        return cls(recording.metadata.design, rows, Resolution.of(recording), why)
+
+
+def estimate(
+    recordings: Iterable[Recording],
+    method: Asked = "auto",
+    cutoff_hz: float = 5.0,
+    say: Callable[[str], object] = lambda _: None,
+) -> PayloadEstimate:
+    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
+
+    Args:
+        recordings: one or several trials with the same robots and grasps, taken one after the other.
+        method: ``"fit"``, one least squares of closed loops and balance of wrenches, the robots held; ``"staged"`` and
+            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine the centre of
+            mass and nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit
+            further.
+        cutoff_hz: cut-off of the low-pass filter for what the fit does not do [Hz].
+        say: takes the name of the stage that begins.
+
+    Raises:
+        InputError: as ``estimate_payload``, or a fit was asked for and cannot be made.
+    """
+    if method not in ("auto", ONE_FIT):
+        return _said(estimate_payload(recordings, method, cutoff_hz, say=say))
+    names: list[str] = []
+    trials: list[Trial] = []
+    read: list[_Read] = []
+    with within_arithmetic(names):
+        for recording in recordings:
+            names.append(recording.name)
+            trials.append(trial_of(recording, cutoff_hz))
+            read.append(_Read.of(recording))
+            del recording  # or the next one would be read before this one is let go
+        staged = estimate_from_trials(trials, "auto", say=say, withhold=False)
+    team = max(trial.team for trial in trials)
+    say("one fit")
+    try:
+        found = _fitted(staged, trials, read)
+        if method == "auto":
+            _check_noise(found, names)
+    except (_CannotBe, InputError, np.linalg.LinAlgError) as error:
+        if method == ONE_FIT:
+            raise InputError(f"{', '.join(names)}: no fit of loops and balance ({error})") from error
+        why = f"{staged.method.capitalize()}, and not in one fit of loops and balance: {error}."
+        return _said(replace(withheld(staged, team), why_not_fit=why))
+    fitted = _with_payload(staged, trials, found.payload(0, staged.payload), 0.0)
+    return _said(withheld(replace(fitted, method=ONE_FIT), team))
+
+
+def _said(estimate: PayloadEstimate) -> PayloadEstimate:
+    """With what a reader must know of robots that the recordings know."""
+    return estimate if estimate.units is None else replace(estimate, open=(*estimate.open, WITHOUT_ERRORS))
+
+
+def _fitted(staged: PayloadEstimate, trials: Sequence[Trial], read: Sequence[_Read]) -> Fit:
+    """The fit, from where the staged estimate is."""
+    if staged.robots < 2:
+        raise _CannotBe("one robot closes no loop")
+    grasps, mass, c = staged.grasps, staged.mass, staged.p_1c
+    if grasps is None or mass is None or c is None:
+        parts = {"grasps": grasps, "mass": mass, "centre of mass": c}
+        missing = next(name for name, part in parts.items() if part is None)
+        raise _CannotBe(f"these recordings do not determine the {missing}")
+    if staged.units is None and any(trial.units is not None for trial in trials):
+        raise _CannotBe("the recordings say different things of their robots")
+    units = staged.units or ArmUnit(read[0].design, np.zeros((staged.robots, COUNT)))
+    if staged.inertia is None:  # the fit leaves it as open as the recordings do
+        pi = estimate_joint([trial.data for trial in trials], grasps)[0].parameters
+    else:
+        pi = about_origin(mass.mass, c, staged.inertia.inertia)
+    shared = Shared(grasps, pi)
+    parts, bases = [], []
+    for one, sensing in zip(read, Sensing.of_each([one.resolution for one in read]), strict=True):
+        if one.rows is None or one.why_not:
+            raise _CannotBe(one.why_not)
+        parts.append(CarriedTrial(one.rows, 0, sensing))
+        bases.append(bases_of(one.rows, units, shared))
+    start = Unknowns(units, (shared,), tuple(bases))
+    return fit(Given(parts, start, Prior().scaled(0.0), held=True))
+
+
+def _check_noise(found: Fit, names: Sequence[str]) -> None:
+    """Whether noise is all that the fit leaves."""
+    left = [
+        (part.ratio, name, what)
+        for name, trial in zip(names, found.point.trials, strict=True)
+        for part, what in ((trial.loops, "loops"), (trial.balance, "balance"))
+        if part.misfits
+    ]
+    if left:
+        ratio, name, what = max(left)
+        raise _CannotBe(
+            f"that leaves more than noise, to which it is more sensitive (chi2/n is {ratio:.3g} in the {what} of "
+            f"{name})"
+        )
+    if not found.converged:
+        raise _CannotBe("that does not settle")
 
 
 def estimate_calibrated(
@@ -72,7 +201,7 @@ def estimate_calibrated(
     trials = [trial_of(calibrated(recording, calibration), cutoff_hz) for recording in recordings]
     staged = estimate_from_trials(trials, say=say, withhold=False)
     estimate = replace(
-        with_payload(staged, trials, payload, calibration.scale_sd),
+        _with_payload(staged, trials, payload, calibration.scale_sd),
         payload=payload.label,
         method=CALIBRATED,
         units=calibration.units,
@@ -83,17 +212,10 @@ def estimate_calibrated(
     return withheld(estimate, max(trial.team for trial in trials))
 
 
-def with_payload(
+def _with_payload(
     staged: PayloadEstimate, trials: Sequence[Trial], payload: CalibratedPayload, scale_sd: float
 ) -> PayloadEstimate:
-    """An estimate with its numbers from a fit of loops and balance, and what each recording leaves of them.
-
-    Args:
-        staged: of the same recordings.
-        trials: these, processed.
-        payload: what the fit found.
-        scale_sd: standard deviation of a held common spring scale.
-    """
+    """A staged estimate with its numbers from a fit of loops and balance, and what each recording leaves of them."""
     numbers = carried(payload, scale_sd)
     grasps = _grasps(payload, scale_sd, staged)
     inertia = _inertia(trials, grasps, numbers)
@@ -228,11 +350,9 @@ def _inertia(trials: Sequence[Trial], grasps: GraspEstimate, numbers: Carried) -
         moment = inertia_regressor(motion.omega, motion.alpha) @ parameters
         explained.append(moment)
         left.append(motion.moment - np.cross(numbers.p_1c, motion.force) - moment)
-    return InertiaEstimate.of(parameters, numbers.covariance[4:, 4:], _rms(left), _rms(explained))
-
-
-def _rms(parts: Sequence[Array]) -> float:
-    return float(rms(np.concatenate(parts)))
+    return InertiaEstimate.of(
+        parameters, numbers.covariance[4:, 4:], rms(np.concatenate(left)), rms(np.concatenate(explained))
+    )
 
 
 def _force_residual(records: Sequence, numbers: Carried, trials: Sequence[Trial]) -> float:
@@ -241,139 +361,3 @@ def _force_residual(records: Sequence, numbers: Carried, trials: Sequence[Trial]
     share = np.array([record.force_residual for record in records])
     weight = numbers.mass_kg * trials[0].data.gravity_mps2
     return float(weight * np.sqrt(np.sum(count * share**2) / np.sum(count)))
-
-
-ONE_FIT = "fit"
-WITHOUT_ERRORS = (
-    "The recordings carry the calibration of their robots without its errors, so that standard errors lack them; an "
-    "estimate with the calibration itself (--calibration) has them."
-)
-_HELD = Prior().scaled(0.0)
-_LEAST_ROWS = 8
-
-
-class _CannotBe(Exception):
-    """Why one fit cannot be made."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """What of one recording goes into the fit; ``why_not`` where it cannot."""
-
-    design: OmnidDesign
-    rows: Rows | None
-    resolution: Resolution
-    why_not: str
-
-    @classmethod
-    def of(cls, recording: Recording) -> _Read:
-        rows, why = None, ""
-        try:
-            rows = Rows.of(recording)
-        except InputError as error:
-            why = str(error)
-        if rows is not None and len(rows.time) < _LEAST_ROWS:
-            why = f"{recording.name} is too short for it"
-        return cls(recording.metadata.design, rows, Resolution.of(recording), why)
-
-
-def estimate(
-    recordings: Iterable[Recording],
-    method: Asked = "auto",
-    cutoff_hz: float = 5.0,
-    say: Callable[[str], object] = lambda _: None,
-) -> PayloadEstimate:
-    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
-
-    Args:
-        recordings: one or several trials with the same robots and grasps, taken one after the other.
-        method: ``"fit"``, one least squares of closed loops and balance of wrenches, the robots held; ``"staged"`` and
-            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine the centre of
-            mass and nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit
-            further.
-        cutoff_hz: cut-off of the low-pass filter for what the fit does not do [Hz].
-        say: takes the name of the stage that begins.
-
-    Raises:
-        InputError: as ``estimate_payload``, or a fit was asked for and cannot be made.
-    """
-    if method not in ("auto", ONE_FIT):
-        return _said(estimate_payload(recordings, method, cutoff_hz, say=say))
-    names: list[str] = []
-    trials: list[Trial] = []
-    read: list[_Read] = []
-    with within_arithmetic(names):
-        for recording in recordings:
-            names.append(recording.name)
-            trials.append(trial_of(recording, cutoff_hz))
-            read.append(_Read.of(recording))
-            del recording  # or the next one would be read before this one is let go
-        staged = estimate_from_trials(trials, "auto", say=say, withhold=False)
-    team = max(trial.team for trial in trials)
-    say("one fit")
-    try:
-        found = _fitted(staged, trials, read)
-        if method == "auto":
-            _check_noise(found, names)
-    except (_CannotBe, InputError, np.linalg.LinAlgError) as error:
-        if method == ONE_FIT:
-            raise InputError(f"{', '.join(names)}: no fit of loops and balance ({error})") from error
-        why = f"{staged.method.capitalize()}, and not in one fit of loops and balance: {error}."
-        return _said(replace(withheld(staged, team), why_not_fit=why))
-    of = found.layout.of_payload(0)
-    shared, covariance = found.unknowns.carried[0], found.covariance[of, of]
-    grasped = 6 * (staged.robots - 1)
-    grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
-    payload = CalibratedPayload(staged.payload, grasps, shared.pi, covariance, found.by_scale[of])
-    return _said(withheld(replace(with_payload(staged, trials, payload, 0.0), method=ONE_FIT), team))
-
-
-def _said(estimate: PayloadEstimate) -> PayloadEstimate:
-    """With what a reader must know of robots that the recordings know."""
-    return estimate if estimate.units is None else replace(estimate, open=(*estimate.open, WITHOUT_ERRORS))
-
-
-def _fitted(staged: PayloadEstimate, trials: Sequence[Trial], read: Sequence[_Read]) -> Fit:
-    """The fit, from where the staged estimate is."""
-    if staged.robots < 2:
-        raise _CannotBe("one robot closes no loop")
-    grasps, mass, c, inertia = staged.grasps, staged.mass, staged.p_1c, staged.inertia
-    if grasps is None or mass is None or c is None:
-        parts = {"grasps": grasps, "mass": mass, "centre of mass": c}
-        missing = next(name for name, part in parts.items() if part is None)
-        raise _CannotBe(f"these recordings do not determine the {missing}")
-    if staged.units is None and any(trial.units is not None for trial in trials):
-        raise _CannotBe("the recordings say different things of their robots")
-    units = staged.units or ArmUnit(read[0].design, np.zeros((staged.robots, COUNT)))
-    if inertia is None:  # the fit leaves it as open as the recordings do
-        pi = estimate_joint([trial.data for trial in trials], grasps)[0].parameters
-    else:
-        about_1 = inertia.inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
-        pi = np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)])
-    shared = Shared(grasps, pi)
-    parts, bases = [], []
-    for one, sensing in zip(read, Sensing.of_each([one.resolution for one in read]), strict=True):
-        if one.rows is None or one.why_not:
-            raise _CannotBe(one.why_not)
-        parts.append(CarriedTrial(one.rows, 0, sensing))
-        data = robot_data(corrected(one.rows(one.rows.s), units), units)
-        bases.append(start_bases(data.R_bi, data.h, shared))
-    return fit(parts, Unknowns(units, (shared,), tuple(bases)), _HELD, held=True)
-
-
-def _check_noise(found: Fit, names: Sequence[str]) -> None:
-    """Whether noise is all that the fit leaves."""
-    left = [
-        (part.ratio, name, what)
-        for name, trial in zip(names, found.trials, strict=True)
-        for part, what in ((trial.loops, "loops"), (trial.balance, "balance"))
-        if part.misfits
-    ]
-    if left:
-        ratio, name, what = max(left)
-        raise _CannotBe(
-            f"that leaves more than noise, to which it is more sensitive (chi2/n is {ratio:.3g} in the {what} of "
-            f"{name})"
-        )
-    if not found.converged:
-        raise _CannotBe("that does not settle")

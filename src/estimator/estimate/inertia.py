@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arrays import ORDER, Array, inertia_matrix
+from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.uncertainty import (
     WINDOW_S,
@@ -93,6 +93,20 @@ class PrincipalInertia:
             None if axes is None else Rotation.from_rotvec(axes, degrees=True).as_matrix(),
             None if covariance is None else np.array(covariance),
         )
+
+
+def about_origin(mass: float, c: Array, inertia: Array) -> Array:
+    """(m, m c, J about the origin), shape (10,), from mass [kg], centre of mass [m], inertia about it [kg m^2]."""
+    about = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.concatenate([[mass], mass * c, inertia_parameters(about)])
+
+
+def about_com(parameters: Array) -> Array:
+    """Inverse of ``about_origin``: (m, c, inertia about c), shape (10,)."""
+    m = parameters[0]
+    c = parameters[1:4] / m
+    inertia = inertia_matrix(parameters[4:]) - m * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.concatenate([[m], c, inertia_parameters(inertia)])
 
 
 def project_positive(inertia: Array) -> tuple[Array, bool]:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arrays import Array, inertia_parameters
+from estimator.arrays import Array
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import (
     InertiaEstimate,
+    about_com,
     refuse,
     refuse_uncertain,
     rotational_excitation,
@@ -101,16 +102,16 @@ def estimate_joint(
 
     def moved(x: Array) -> Array:
         equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
-        return _centred(_solve(equations[0], equations[1], weights))
+        return about_com(_solve(equations[0], equations[1], weights))
 
     # All ten stay in the fit, however weak: what is not reported is an uncertainty of what is.
     thin = thinned(trials)
-    J_own = numerical_jacobian(_centred, theta)
+    J_own = numerical_jacobian(about_com, theta)
     J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
     own_covariance = J_own @ covariance @ J_own.T
     covariance = own_covariance + J @ grasps.covariance @ J.T
 
-    values = _centred(theta)
+    values = about_com(theta)
     mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), force_rms)
     if com_report.determined:
         why = "its part cannot be told from the inertia's"
@@ -171,14 +172,6 @@ def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
         left = np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 2))), floor)
         weights = np.repeat(left[0] / left, 3)
     return _solve(Y, w, weights), weights
-
-
-def _centred(parameters: Array) -> Array:
-    """(m, m c, J about {1}) -> (m, c, inertia about c)."""
-    m = parameters[0]
-    c = parameters[1:4] / m
-    shift = m * (c @ c * np.eye(3) - np.outer(c, c))
-    return np.concatenate([[m], c, parameters[4:] - inertia_parameters(shift)])
 
 
 def _tilt_noise(trials: Sequence[GraspData], grasps: GraspEstimate) -> float:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.arm.dynamics import angular_motion, moment_about_axes, rate_matrix, rate_matrix_dot, rotation
+from estimator.arm.dynamics import angular_motion, moment_about_axes, rate_matrix, rotation
 from omnid_design import DESIGN
 
 RNG = np.random.default_rng(3)
@@ -55,11 +55,6 @@ def test_angular_motion_is_the_derivative_of_the_rotation():
     omega, omega_dot = angular_motion(ANGLES, RATES, ACCELERATIONS)
     assert omega == pytest.approx(omega_of_motion(0.0), abs=1e-7)
     assert omega_dot == pytest.approx(derivative(omega_of_motion, 1e-3), abs=2e-5)
-
-
-def test_rate_matrix_dot_is_the_derivative_of_the_rate_matrix():
-    numerical = derivative(lambda s: rate_matrix(ANGLES + s * RATES), 1e-3)
-    assert rate_matrix_dot(ANGLES, RATES) == pytest.approx(numerical, abs=1e-8)
 
 
 def test_rate_matrix_is_singular_only_at_gimbal_lock():

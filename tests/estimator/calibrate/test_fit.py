@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import CalibratedPayload, Prior
-from estimator.calibrate.least_squares import CarriedTrial, Unknowns, fit
+from estimator.calibrate.least_squares import CarriedTrial, Given, Unknowns, fit
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from mocobot_sim.scene.as_built import CalibrationSpread
@@ -172,23 +172,19 @@ def test_errors_are_as_claimed():
         start = Unknowns(
             ArmUnit(DESIGN, np.zeros((3, COUNT))), (loads[0].shared,), tuple(one.bases for one in exact)
         )
-        found = fit([CarriedTrial(Rows.of(one), 0, sensing) for one in noisy], start, prior)
+        found = fit(Given([CarriedTrial(Rows.of(one), 0, sensing) for one in noisy], start, prior))
         at, factor = found.layout.of_units, prior.factor(3, hold_scale=True)
         back = np.linalg.pinv(factor)
-        z = back @ (found.unknowns.units.x - units.x).ravel()
+        z = back @ (found.point.unknowns.units.x - units.x).ravel()
         covariance = back @ found.covariance[at, at] @ back.T
         robots = z @ np.linalg.solve(covariance, z)
         at = found.layout.of_payload(0)
-        carried = found.unknowns.carried[0]
-        error = payload_error(
-            CalibratedPayload(None, carried.grasps, carried.pi, found.covariance[at, at], found.by_scale[at]),
-            loads[0],
-        )
+        error = payload_error(found.payload(0, None), loads[0])
         sd = np.sqrt(np.diag(found.covariance[at, at]))
         correlation = found.covariance[at, at] / np.outer(sd, sd)
         nees.append([robots, (error / sd) @ np.linalg.solve(correlation, error / sd)])
         inside.append(np.concatenate([np.abs(z / np.sqrt(np.diag(covariance))), np.abs(error / sd)]) < 1.96)
-        chi2.append([one.all.c / one.all.count for one in found.trials])
+        chi2.append([one.all.c / one.all.count for one in found.point.trials])
     mean, size = np.mean(nees, axis=0), np.array([60, 22])
     assert np.all(np.abs(mean / size - 1.0) < 1.96 * np.sqrt(2.0 / (size * teams)))
     assert 0.93 < np.mean(inside) < 0.97

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.calibrate import held_out
 from estimator.calibrate.calibration import Prior
-from estimator.calibrate.least_squares import CarriedTrial, Unknowns, fit
+from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.findings import held_out
+from estimator.calibrate.least_squares import CarriedTrial, Given, Unknowns, fit
 from estimator.calibrate.rows import Rows, Sensing
 from omnid_design import DESIGN
 from synthetic_team import carry, draw_path, draw_units, load, with_noise
@@ -23,20 +24,16 @@ def test_held_out_is_what_a_calibration_without_the_trial_says():
     trials = [CarriedTrial(Rows.of(one), 0, sensing) for one in recordings]
     designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
     bases = tuple(one.bases for one in exact)
-    whole = fit(trials, Unknowns(designed, (held.shared,), bases), Prior())
+    given = Given(trials, Unknowns(designed, (held.shared,), bases), Prior())
+    whole = fit(given)
     predicted = held_out(whole)
 
     for k in range(3):
-        others = [i for i in range(3) if i != k]
-        rest = fit(
-            [trials[i] for i in others],
-            Unknowns(designed, (held.shared,), tuple(bases[i] for i in others)),
-            Prior(),
-        )
+        rest = fit(given.only([i for i in range(3) if i != k]))
         # Robots and payload are held, the bases alone are moved to where this trial fits best.
-        at = rest.unknowns
-        one = trials[k].blocks()[0]
-        shared, base = at.carried[0], whole.unknowns.bases[k]
+        at = rest.point.unknowns
+        one = TrialEquations.of(trials[k].rows, sensing)
+        shared, base = at.carried[0], whole.point.unknowns.bases[k]
         for _ in range(3):
             rowed = one.at(at.units, shared, base)
             weight = np.linalg.inv(rowed.covariance)
@@ -57,5 +54,5 @@ def test_the_only_trial_of_a_payload_cannot_be_held_out():
     units, held = draw_units(3, Prior(), rng), load(3, rng)
     exact = carry(units, held, draw_path(held, rng), rng, 10.0)
     trial = CarriedTrial(Rows.of(exact.recording), 0, Sensing.of([exact.recording]))
-    found = fit([trial], Unknowns(units, (held.shared,), (exact.bases,)), Prior())
+    found = fit(Given([trial], Unknowns(units, (held.shared,), (exact.bases,)), Prior()))
     assert held_out(found) == [None]

@@ -45,7 +45,7 @@ def test_robots_held_as_designed_give_the_payload(designed: Calibration) -> None
 
 
 def test_errors_of_held_robots_go_on_to_the_payload(recording: Recording, designed: Calibration) -> None:
-    """Held elsewhere, the payload comes out elsewhere; the covariance foretells by how much."""
+    """Held elsewhere, the payload comes out elsewhere; the covariance predicts by how much."""
     moved = np.zeros((3, COUNT))
     moved[1, AT["phi_zero"]] = [6e-5, -3e-5, 0.0]
     moved[2, AT["rod_length"]] = [0.0, 1e-5, 0.0]

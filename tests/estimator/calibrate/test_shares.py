@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -30,9 +31,9 @@ def test_shares_are_those_of_the_noise() -> None:
         Quadratic(index, A.T @ A, np.zeros(len(index)), 0.0, len(A))
         for A, index in zip(rows, trials, strict=True)
     ]
+    carried = tuple(TrialFit(part, part, part) for part in parts[:2])
     fields: dict[str, Any] = dict.fromkeys(Fit.__dataclass_fields__)
-    fields |= {"layout": layout, "covariance": C, "alone": (parts[2],)}
-    fields["trials"] = tuple(TrialFit(part, part, part) for part in parts[:2])
+    fields |= {"layout": layout, "covariance": C, "point": SimpleNamespace(trials=carried, alone=(parts[2],))}
     found = shares(cast(Any, Fit)(**fields))
     assert len(found) == 3
     M = [C[:, index] @ A.T for A, index in zip(rows, trials, strict=True)]
