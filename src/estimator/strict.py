@@ -198,6 +198,23 @@ class Fields:
             self.refuse(key, "a list" if length is None else f"a list of {length} entries")
         return value
 
+    def objects(
+        self, key: str, required: Sequence[str], optional: Sequence[str] = (), length: int | None = None
+    ) -> list[Fields]:
+        """Objects in a list, which messages count from 1."""
+        values = self.list(key, length)
+        return [
+            Fields(value, required, f"{self.where}: {key}[{k}]", optional)
+            for k, value in enumerate(values, 1)
+        ]
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Texts in a list."""
+        values = self.list(key)
+        if not all(isinstance(value, str) for value in values):
+            self.refuse(key, "a list of texts")
+        return tuple(values)
+
     def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
         """Finite numbers in nested lists of a shape."""
         value = self.values[key]

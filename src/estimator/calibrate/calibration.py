@@ -21,6 +21,8 @@ from estimator.recording.model import Recording
 from estimator.rigid_team import Bases
 from estimator.strict import check_known, is_number, read_toml
 
+GRASPS, INERTIAL = "grasps", "inertial_parameters"
+"""Kinds of unknowns besides ``GROUPS``, in ``CalibratedTrial.shares``."""
 MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
 
 

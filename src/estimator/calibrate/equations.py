@@ -176,12 +176,7 @@ class Rowed(NamedTuple):
 
 
 class Curvature(NamedTuple):
-    """Corrections of the balance's derivatives for motion within a row, as ``Rowed`` has them.
-
-    Attributes:
-        by_units: shape (n, 6, N, ``COUNT``).
-        by_carried: shape (n, 6, 6 (N - 1) + 10).
-    """
+    """Corrections of the balance's derivatives for motion within a row; shapes as of ``Rowed``, with 6 channels."""
 
     by_units: Array
     by_carried: Array
@@ -216,7 +211,12 @@ class TrialEquations:
 
     def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
         """Rows of the residual, shape (n, C)."""
-        return self.rows(_residual(robot_data(corrected(self.rows.s, units), units), units, shared, bases))
+        data = robot_data(corrected(self.rows.s, units), units)
+        pose = pose_error(data.R_bi, data.h, shared, bases)
+        force, moment = total_wrench(data.wrench, shared.grasps)
+        needed = _motion(data, units, shared).regressor(units) @ shared.pi
+        balance = np.concatenate([force, moment], axis=1) - needed
+        return self.rows(np.concatenate([pose, balance], axis=1))
 
     def curvature(
         self, units: ArmUnit, shared: Shared, bases: Bases, before: Curvature | None = None
@@ -227,21 +227,21 @@ class TrialEquations:
         about the others by products of rates, which mean rates do not tell. At rest there is none, but noise of rates.
         Those by the robots take longer and vary less: they are as found ``before``.
         """
-        payload = [
-            _by_carried(robot_data(corrected(s, units), units), units, shared)[:, -6:]
-            for s in (self.rows.s, self.mean)
-        ]
-        by_carried = self.rows(payload[0]) - payload[1]
+        s, mean = corrected(self.rows.s, units), corrected(self.mean, units)
+        fine, coarse = (_by_carried(robot_data(x, units), units, shared)[:, -6:] for x in (s, mean))
+        by_carried = self.rows(fine) - coarse
         by_carried[self.rows.moving :] = 0.0
         if before is not None:
             return Curvature(before.by_units, by_carried)
-        by_units = np.zeros((len(self.mean), 6, *units.x.shape))
+        by_units = np.zeros((len(mean), 6, *units.x.shape))
         if not self.held:
             every = rules.CURVATURE_EVERY
-            fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)[1][:, -6:]
-            coarse = _derivatives(corrected(self.mean, units), units, shared, bases)[1][:, -6:]
+            fine, coarse = (
+                _by_robots(x, units, shared, bases)[1][:, -6:]
+                for x in (corrected(self.rows.s[::every], units), mean)
+            )
             # Each instant stands for those around it.
-            near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(fine) - 1)
+            near = np.minimum((np.arange(len(s)) + every // 2) // every, len(fine) - 1)
             by_units = self.rows(fine[near]) - coarse
             by_units[self.rows.moving :] = 0.0
         return Curvature(by_units, by_carried)
@@ -265,111 +265,93 @@ class TrialEquations:
         if adjustment is not None:
             s = s + adjustment
         residual = self.residual(units, shared, bases)
-        by_signals, by_units, by_carried, by_bases = _derivatives(s, units, shared, bases, held=self.held)
+        by_signals, by_units = _by_robots(s, units, shared, bases, held=self.held)
+        by_carried = _by_carried(robot_data(s, units), units, shared)
+        by_bases = np.zeros((*residual.shape, 4 * (shared.grasps.robots - 1)))
         # Loops alone hardly tell a common scale of all lengths, and an error of a thousandth in one derivative would
         # hide it: theirs are averaged exactly.
-        poses = pose_derivatives(self.rows, units, shared, bases)
         loops = slice(0, residual.shape[1] - 6)
-        by_units[:, loops], by_carried[:, loops], by_bases[:, loops] = poses
+        by_units[:, loops], by_carried[:, loops], by_bases[:, loops] = pose_derivatives(
+            self.rows, units, shared, bases
+        )
         if curvature is not None:
             by_units[:, -6:] += curvature.by_units
             by_carried[:, -6:] += curvature.by_carried
         noise = noise_of(self.rows, self.variances)
-        covariance = covariance_of(by_signals, noise)
-        again = bool(np.any(np.asarray(self.rows.repeats) > 1.0))
-        return Rowed(
-            residual,
-            by_units,
-            by_carried,
-            by_bases,
-            covariance,
-            covariance_of(by_signals, noise_of(self.rows, self.shown)) if again else covariance,
-            adjustment_of(by_signals, noise, covariance, residual),
-        )
+        covariance = scatter = covariance_of(by_signals, noise)
+        if np.any(np.asarray(self.rows.repeats) > 1.0):
+            scatter = covariance_of(by_signals, noise_of(self.rows, self.shown))
+        adjusted = adjustment_of(by_signals, noise, covariance, residual)
+        return Rowed(residual, by_units, by_carried, by_bases, covariance, scatter, adjusted)
 
 
-def _residual(data: ArmData, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
-    pose = pose_error(data.R_bi, data.h, shared, bases)
-    return np.concatenate([pose, _balance(data, units, shared)], axis=1)
+class _Motion(NamedTuple):
+    """Motion of the payload in {1}: its twist and that one's rate, shape (Q, 6) each, and what goes with it.
 
-
-def _fusion(units: ArmUnit, shared: Shared) -> Array:
-    """G with V_1 = G [V_1; ...; V_N], shape (6, 6 N).
-
-    Weighed as equal encoders would have it, which turn the driven links and so move the wrist.
+    Attributes:
+        up: direction against gravity, shape (Q, 3).
+        length: of the sum of the robots' directions that it is the mean of, shape (Q, 1).
+        G: V_1 = G [V_1; ...; V_N], shape (6, 6 N).
     """
-    return fusion_with(shared.grasps, _ratio(units))
+
+    twist: Array
+    twist_dot: Array
+    up: Array
+    length: Array
+    G: Array
+
+    def regressor(self, units: ArmUnit) -> Array:
+        """What moves the payload, by its ten inertial parameters, shape (Q, 6, 10)."""
+        omega = self.twist[:, :3]
+        specific = self.twist_dot[:, 3:] + cross(omega, self.twist[:, 3:]) + units.gravity_mps2 * self.up
+        return newton_euler_regressor(omega, self.twist_dot[:, :3], specific)
 
 
 def _ratio(units: ArmUnit) -> float:
+    """Weights as equal encoders would have them, which turn the driven links and so move the wrist."""
     return 1.0 / units.design.proximal_length_m
 
 
-def _regressor(motion: Array, motion_dot: Array, up: Array, gravity_mps2: float) -> Array:
-    """Of what moves the payload, by its ten inertial parameters, shape (Q, 6, 10)."""
-    specific = motion_dot[:, 3:] + cross(motion[:, :3], motion[:, 3:]) + gravity_mps2 * up
-    return newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific)
-
-
-def _motion(data: ArmData, units: ArmUnit, shared: Shared) -> tuple[Array, Array, Array]:
-    """The payload's twist in {1}, its derivative, and the direction against gravity; shapes (Q, 6) twice and (Q, 3)."""
-    G, Q = _fusion(units, shared), len(data.h)
+def _motion(data: ArmData, units: ArmUnit, shared: Shared) -> _Motion:
+    G, Q = fusion_with(shared.grasps, _ratio(units)), len(data.h)
     up = np.einsum("iab,qib->qa", shared.grasps.R_1i, data.R_bi[..., 2, :])
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    return data.twist.reshape(Q, -1) @ G.T, data.twist_dot.reshape(Q, -1) @ G.T, up
+    length = np.linalg.norm(up, axis=1, keepdims=True)
+    twist, twist_dot = (part.reshape(Q, -1) @ G.T for part in (data.twist, data.twist_dot))
+    return _Motion(twist, twist_dot, up / length, length, G)
 
 
-def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
-    """(f, M) of the robots at the origin of {1}, in {1}, minus what moves the payload, shape (Q, 6)."""
-    motion, motion_dot, up = _motion(data, units, shared)
-    force, moment = total_wrench(data.wrench, shared.grasps)
-    needed = _regressor(motion, motion_dot, up, units.gravity_mps2) @ shared.pi
-    return np.concatenate([force, moment], axis=1) - needed
-
-
-def _derivatives(
+def _by_robots(
     s: Array, units: ArmUnit, shared: Shared, bases: Bases, *, held: bool = False
-) -> tuple[Array, Array, Array, Array]:
-    """By signals (n, C, N, ``SLOTS``), units (n, C, N, ``COUNT``), ``Shared.moved`` and ``Bases.moved``."""
+) -> tuple[Array, Array]:
+    """Derivatives of the residual by signals (n, C, N, ``SLOTS``) and units (n, C, N, ``COUNT``)."""
     n, N = s.shape[:2]
-    C = 6 * N
     data = robot_data(s, units)
-    G = _fusion(units, shared)
-    motion = data.twist.reshape(n, -1) @ G.T
-    motion_dot = data.twist_dot.reshape(n, -1) @ G.T
-    summed = np.einsum("iab,qib->qa", shared.grasps.R_1i, data.R_bi[..., 2, :])
-    length = np.linalg.norm(summed, axis=1, keepdims=True)
-    up = summed / length
-
-    by_signals = np.zeros((n, C, N, SLOTS))
-    by_units = np.zeros((n, C, N, COUNT))
+    motion = _motion(data, units, shared)
+    by_signals, by_units = np.zeros((n, 6 * N, N, SLOTS)), np.zeros((n, 6 * N, N, COUNT))
     for i in range(N):
-        base = ArmData(*(part[:, i] for part in data))
-        arm = ArmChanges(s[:, i], ArmUnit(units.design, units.x[i]))
-        by_unit = [] if held else [(BY_UNIT, by_units, arm.by_unit())]
-        for places, changed, d in [(np.arange(SLOTS), by_signals, arm.by_signals()), *by_unit]:
-            part = _chain(i, d, base, data, motion, motion_dot, up, length, G, shared, bases, units)
+        unit = ArmUnit(units.design, units.x[i])
+        arm = ArmChanges(s[:, i], unit)
+        parts = [(np.arange(SLOTS), by_signals, arm.by_signals())]
+        parts += [] if held else [(BY_UNIT, by_units, arm.by_unit())]
+        for places, changed, d in parts:
+            part = _chain(i, d, data.R_bi[:, i], motion, shared, bases, units.gravity_mps2)
             changed[:, :, i, places] = np.moveaxis(part, 0, -1)
         by_units[:, :, i, AT["phi_zero"]] = -by_signals[:, :, i, PHI]
         by_units[:, :, i, AT["theta_zero"]] = -by_signals[:, :, i, THETA]
-        of_tau, unit = by_signals[:, :, i, TAU], ArmUnit(units.design, units.x[i])
-        by_units[:, :, i, AT["tau_zero"]] = -of_tau * (1.0 + unit.of("stiffness_ratio"))
-        tau = s[:, i, TAU] / (1.0 + unit.of("stiffness_ratio"))
-        by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
-    by_carried = _by_carried(data, units, shared)
-    return by_signals, by_units, by_carried, np.zeros((n, C, 4 * (N - 1)))
+        of_tau, stiff = by_signals[:, :, i, TAU], 1.0 + unit.of("stiffness_ratio")
+        by_units[:, :, i, AT["tau_zero"]] = -of_tau * stiff
+        by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * (s[:, i, TAU] / stiff)[:, None]
+    return by_signals, by_units
 
 
 def _chain(
-    i: int, d: ArmData, base: ArmData, data: ArmData, motion: Array, motion_dot: Array, up: Array, length: Array,
-    G: Array, shared: Shared, bases: Bases, units: ArmUnit,
-) -> Array:  # fmt: skip
-    """What changes of robot i's data, shape (K, n, ...), do to the residual, shape (K, n, C)."""
-    grasps, N = shared.grasps, shared.grasps.robots
-    K, n = d.h.shape[:2]
-    out = np.zeros((K, n, 6 * N))
-    turn = vee(d.R_bi @ np.swapaxes(base.R_bi, -1, -2))
-    for j in range(1, N):
+    i: int, d: ArmData, R_bi: Array, motion: _Motion, shared: Shared, bases: Bases, gravity: float
+) -> Array:
+    """What changes d of robot i's data, shapes (K, n, ...), do to the residual, shape (K, n, C)."""
+    grasps = shared.grasps
+    out = np.zeros((*d.h.shape[:2], 6 * grasps.robots))
+    turn = vee(d.R_bi @ np.swapaxes(R_bi, -1, -2))
+    for j in range(1, grasps.robots):
         at = 6 * (j - 1)
         if i == 0:
             out[..., at : at + 3] = -turn
@@ -377,10 +359,10 @@ def _chain(
         elif i == j:
             out[..., at : at + 3] = turn @ bases.R[j].T
             out[..., at + 3 : at + 6] = d.h @ bases.R[j].T
-    own = G[:, 6 * i : 6 * i + 6]
+    own, up = motion.G[:, 6 * i : 6 * i + 6], motion.up
     d_up = d.R_bi[..., 2, :] @ grasps.R_1i[i].T
-    d_up = (d_up - np.sum(d_up * up, axis=-1, keepdims=True) * up) / length
-    needed = needed_wrench(motion, d.twist @ own.T, d.twist_dot @ own.T, d_up * units.gravity_mps2, shared.pi)
+    d_up = (d_up - np.sum(d_up * up, axis=-1, keepdims=True) * up) / motion.length
+    needed = needed_wrench(motion.twist, d.twist @ own.T, d.twist_dot @ own.T, d_up * gravity, shared.pi)
     d_force, d_moment = d.wrench[..., 3:] @ grasps.R_1i[i].T, d.wrench[..., :3] @ grasps.R_1i[i].T
     d_moment = d_moment + cross(grasps.p_1i[i], d_force)
     out[..., -6:] = np.concatenate([d_force - needed[0], d_moment - needed[1]], axis=-1)
@@ -388,15 +370,16 @@ def _chain(
 
 
 def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
-    motion, motion_dot, up = _motion(data, units, shared)
+    """Derivative of the balance by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10); zero for the loops."""
+    motion = _motion(data, units, shared)
     n, N = data.h.shape[:2]
-    grasped, gravity = 6 * (N - 1), units.gravity_mps2
+    grasped = 6 * (N - 1)
     out = np.zeros((n, 6 * N, grasped + 10))
     d = fusion_changes(data.twist, data.twist_dot, data.R_bi, data.wrench, shared.grasps, _ratio(units))
-    needed = needed_wrench(motion, d.twist, d.twist_dot, gravity * d.up, shared.pi)
+    needed = needed_wrench(motion.twist, d.twist, d.twist_dot, units.gravity_mps2 * d.up, shared.pi)
     out[:, -6:-3, :grasped] = np.moveaxis(d.force - needed[0], 0, -1)
     out[:, -3:, :grasped] = np.moveaxis(d.moment - needed[1], 0, -1)
-    out[:, -6:, grasped:] = -_regressor(motion, motion_dot, up, gravity)
+    out[:, -6:, grasped:] = -motion.regressor(units)
     return out
 
 

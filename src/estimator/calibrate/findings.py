@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from estimator.arm.unit import AT, COUNT, GROUPS
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.calibration import MASSES, Prior
+from estimator.calibrate.calibration import GRASPS, INERTIAL, MASSES, Prior
 from estimator.calibrate.least_squares import Fit, Given, Quadratic, fit, normal_equations, solved
 from estimator.errors import InputError
 
 UNKNOWN_MASSES = 0.05
 """Relative error of arm masses that is taken for granted where nobody has weighed them."""
-GRASPS, INERTIAL = "grasps", "inertial_parameters"
 _SENSORS = (
     ("phi_zero", "the encoder of phi{entry}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
     ("theta_zero", "the encoder of theta_{axis}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 
 from estimator.arm.unit import AT, COUNT
-from estimator.calibrate.findings import GRASPS, INERTIAL, shares
+from estimator.calibrate.calibration import GRASPS, INERTIAL
+from estimator.calibrate.findings import shares
 from estimator.calibrate.least_squares import Fit, Layout, Quadratic, TrialFit
 
 
