@@ -10,9 +10,12 @@ A positive offset means that a clock is ahead: **stamp = true time + offset + dr
 time being that of robot 1. A log that says t of a sample taken at t - delay has an offset of +delay.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +28,6 @@ from estimator.arm.dynamics import rate_matrix
 from estimator.arrays import Array
 from estimator.estimate.grasps import pair_rotation
 from estimator.estimate.uncertainty import (
-    WINDOW_S,
     StepReport,
     judge,
     window_covariance,
@@ -121,8 +123,7 @@ def fit_clock(
         first, other: robots 1 and i.
         part: samples of robot 1 to use as far as robot i has any at their instants.
         middle_s: instant of robot 1 at which ``offset_s`` is meant [s].
-        offset_s, drift: the guess.
-        with_drift: whether to fit the drift, or keep it.
+        offset_s, drift: the guess; the drift is kept without ``with_drift``.
     """
     wanted = first.time[part]
     at = wanted + offset_s + drift * (wanted - middle_s)
@@ -146,7 +147,10 @@ def fit_clock(
     R = pair_rotation(q_1, q_i)
     for _ in range(_ITERATIONS):
         change = q_dot @ R.T
-        columns = [_turning(q_i @ R.T), change[..., None]]
+        columns = [
+            -so3.skew(q_i @ R.T),
+            change[..., None],
+        ]  # by a rotation vector on the left, and the offset
         columns += [(lever * change)[..., None]] if with_drift else []
         J = np.concatenate(columns, axis=-1).reshape(q_1.size, -1)
         size = np.linalg.norm(J, axis=0)
@@ -170,7 +174,7 @@ def fit_clock(
         half_s=float(half_s),
         R=R,
         residual=residual,
-        rotated_rate=_determined(_turning(q_i @ R.T)),
+        rotated_rate=_determined(-so3.skew(q_i @ R.T)),
         change=q_dot @ R.T,
         mismatch=rms(residual) / rms_q if rms_q > 0 else np.inf,
     )
@@ -183,13 +187,8 @@ def _smooth(omega: Array, rate_hz: float) -> Array:
     return sosfiltfilt(sections, omega, axis=0, padlen=padding)
 
 
-def _turning(rotated: Array) -> Array:
-    """Derivative of R q_i by a rotation vector on the left, shape (Q, 3, 3)."""
-    return -so3.skew(rotated)
-
-
 def _determined(turning: Array) -> Array:
-    """The same by the rotations that change something: none about a single axis of all motion."""
+    """Derivatives by the rotations that change something: none about a single axis of all motion."""
     values, axes = np.linalg.eigh(np.einsum("qik,qil->kl", turning, turning))
     return turning @ axes[:, values > 1e-12 * values[-1]]
 
@@ -320,36 +319,36 @@ def estimate_clocks(
     Returns:
         The estimate. Where the motion cannot tell, an offset is NaN and ``why_not`` says why.
     """
-    starts, N = np.asarray(start_s, dtype=float), len(theta)
+    starts = np.asarray(start_s, dtype=float)
     too_short = [len(x) < (2 * TRIM_S + _SHORTEST_S) * rate_hz for x in theta]
     middle_s = float(starts[0] + (len(theta[0]) - 1) / rate_hz / 2)
-    results = [_Clock(0.0, 0.0, np.zeros((2, 2)), 0.0, np.nan, None, None)]
+    results = []
     first = None if too_short[0] else Rates(theta[0], starts[0], rate_hz)
-    for i in range(1, N):
+    for i in range(1, len(theta)):
         if first is None or too_short[i]:
             seconds = min(len(theta[0]), len(theta[i])) / rate_hz
             results.append(_unknown(f"{seconds:.3g} s of samples are too short"))
         else:
             results.append(_pair(first, Rates(theta[i], starts[i], rate_hz), i + 1, middle_s, max_offset_s))
-    return ClockEstimate(
-        middle_s,
-        **{name: np.array([getattr(r, name) for r in results]) for name in NUMBERS},
-        reports=tuple(r.report for r in results if r.report is not None),
-        why_not=tuple(r.why_not for r in results),
-    )
+    return _relative_to_first(middle_s, results)
 
 
 def unknown_clocks(robots: int, middle_s: float, why: str) -> ClockEstimate:
-    """What is known of clocks where nothing can be compared.
+    """What is known of N clocks where nothing can be compared, for a reason ``why``.
 
-    Args:
-        robots: number of robots N.
-        middle_s: an instant of robot 1, after the origin of the stamps [s].
-        why: the reason, for all robots but the first.
+    ``middle_s`` is an instant of robot 1, after the origin of the stamps [s].
     """
-    results = [_Clock(0.0, 0.0, np.zeros((2, 2)), 0.0, np.nan, None, None), *[_unknown(why)] * (robots - 1)]
-    numbers = {name: np.array([getattr(r, name) for r in results]) for name in NUMBERS}
-    return ClockEstimate(middle_s, **numbers, reports=(), why_not=tuple(r.why_not for r in results))
+    return _relative_to_first(middle_s, [_unknown(why)] * (robots - 1))
+
+
+def _relative_to_first(middle_s: float, others: Sequence[_Clock]) -> ClockEstimate:
+    clocks = [_Clock(0.0, 0.0, np.zeros((2, 2)), 0.0, np.nan, None, None), *others]
+    return ClockEstimate(
+        middle_s,
+        **{name: np.array([getattr(clock, name) for clock in clocks]) for name in NUMBERS},
+        reports=tuple(clock.report for clock in clocks if clock.report is not None),
+        why_not=tuple(clock.why_not for clock in clocks),
+    )
 
 
 def recorded_clocks(recording: Recording, max_offset_s: float = MAX_OFFSET_S) -> ClockEstimate:
@@ -359,8 +358,7 @@ def recorded_clocks(recording: Recording, max_offset_s: float = MAX_OFFSET_S) ->
     return estimate_clocks(theta, starts, recording.metadata.rate_hz, max_offset_s)
 
 
-@dataclass(frozen=True)
-class _Clock:
+class _Clock(NamedTuple):
     offset_s: float
     drift: float
     covariance: Array
@@ -481,7 +479,7 @@ def _covariance(first: Rates, fit: ClockFit, middle_s: float, *, with_drift: boo
     change = fit.change[..., None]
     J = np.concatenate([fit.rotated_rate, change] + ([lever * change] if with_drift else []), axis=-1)
     size = np.sqrt(np.mean(J**2, axis=(0, 1)))
-    parts = windows(len(time), first.rate_hz, WINDOW_S)
+    parts = windows(len(time), first.rate_hz)
     covariance = window_covariance(*window_normals(J / size, fit.residual, parts)) / np.outer(size, size)
     K = fit.rotated_rate.shape[-1]
     if not with_drift:

@@ -44,11 +44,7 @@ def scratch_name(folder: Path) -> Path:
 
 @contextmanager
 def scratch_folder(where: Path | None = None) -> Iterator[Path]:
-    """A folder that lasts as long as the block.
-
-    Args:
-        where: the folder to make it in; that of the system for temporary files if None.
-    """
+    """A folder that lasts as long as the block, in ``where`` or in the system's folder for temporary files."""
     path = scratch_name(Path(tempfile.gettempdir()) if where is None else where)
     path.mkdir(mode=0o700)
     try:
@@ -95,21 +91,16 @@ LIST, FORMAT = ".mocobot-files", "mocobot-files"
 
 
 def list_written(folder: Path, kind: str) -> None:
-    """Write the list of all that a new folder holds.
-
-    Args:
-        folder: which nobody else has written into yet.
-        kind: of the result, such as ``diagnosis``.
-    """
+    """Write the list of all that a new folder holds, whose result is of a kind such as ``diagnosis``."""
     files = {str(path.relative_to(folder)): _digest(path) for path in _entries(folder)}
-    _write(folder, {"format": FORMAT, "kind": kind, "files": files})
+    write_json(folder / LIST, {"format": FORMAT, "kind": kind, "files": files})
 
 
 def add_written(path: Path) -> None:
     """Add a file that was written into a folder later to the folder's list, if there is one."""
     if values := _read(path.parent):
         values["files"][path.name] = _digest(path)
-        _write(path.parent, values)
+        write_json(path.parent / LIST, values)
 
 
 def holds(kind: str) -> Callable[[Path], bool]:
@@ -173,10 +164,6 @@ def _digest(path: Path) -> str:
     return ""
 
 
-def _write(folder: Path, values: dict[str, Any]) -> None:
-    (folder / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-
-
 def _read(folder: Path) -> dict[str, Any]:
     """The list; empty if there is none that can be used."""
     with suppress(InputError):
@@ -229,12 +216,8 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
     """A temporary folder that takes the place of ``path`` when the block ends without an error.
 
     Missing folders above it are made. What cannot be written inside is told by its place in ``path``. The folder gets
-    a list of what is in it. Of one that it replaces, what its list has is removed; everything else is kept, and has
-    ``.kept`` behind its name where the new folder has the same one.
-
-    Args:
-        path: the folder.
-        kind: of result, for the list (``estimator.files``).
+    a list of what is in it, with the kind of result. Of one that it replaces, what its list has is removed; everything
+    else is kept, and has ``.kept`` behind its name where the new folder has the same one.
 
     Raises:
         InputError: it cannot be created or put in place.
@@ -304,9 +287,7 @@ def check_place(path: Path) -> None:
 def check_target(path: Path, suffix: str = "") -> None:
     """Find out that a file cannot be written before the work is done whose result it would hold.
 
-    Args:
-        path: the file.
-        suffix: how its name must end, ``".html"`` for example; any name will do if empty.
+    Its name must end in ``suffix``, such as ``".html"``; any name will do if that is empty.
 
     Raises:
         InputError: the target is a folder or a device, its name ends otherwise, or nothing can be put there.
@@ -393,11 +374,7 @@ def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *,
 
 
 def read_archive(path: Path, what: str) -> tuple[Any, dict[str, NDArray[Any]]]:
-    """Read what ``write_archive`` wrote.
-
-    Args:
-        path: the file.
-        what: it should be, for messages.
+    """Read what ``write_archive`` wrote; messages call it ``what``.
 
     Raises:
         InputError: there is no such file, it is not whole, or unpacks to too much.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,12 +145,10 @@ FINEST = 2e-6
 """Step [rad or m] of a reading that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
 
 
-@dataclass(frozen=True)
-class Held:
-    """A reading that was held.
+class Held(NamedTuple):
+    """Readings of a column that were held.
 
     Attributes:
-        column: which.
         spans: readings that are none, first and last but one more.
         nats: by how much a value that is held is likelier than readings of a moving joint that happen to be equal.
     """
@@ -205,11 +204,7 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
 
 
 def scatter(x: Array) -> float:
-    """Rounding step that would make the noise of moving readings, from their fourth differences [rad or m].
-
-    Args:
-        x: readings, shape (Q,), of a joint whose own fourth differences are below that.
-    """
+    """Rounding step that would make the noise of moving readings, shape (Q,), from their fourth differences."""
     apart = np.abs(np.diff(x, 4))
     sigma = np.quantile(apart[apart > 0.0], TYPICAL) / TYPICAL_SIGMAS if apart.any() else 0.0
     return float(sigma * np.sqrt(12.0 / 70.0))
@@ -263,10 +258,7 @@ def angle_of(column: int, robots: int) -> tuple[int, int, int]:
 def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_]:
     """Samples of filtered angles, rates and accelerations that held readings may change by more than noise, shape (Q,).
 
-    Args:
-        doubt: of ``filled``.
-        rate_hz: of the samples.
-        cutoff_hz: of the low-pass filter (``filtering.low_pass``).
+    ``doubt`` is that of ``filled``; the filter is ``filtering.low_pass``.
     """
     out = np.zeros(len(doubt), dtype=bool)
     if doubt.any():

@@ -146,12 +146,9 @@ def fusion_changes(
     grasps: GraspEstimate,
     ratio: float | None = None,
 ) -> FusionChanges:
-    """Derivatives of ``fuse``.
+    """Derivatives of ``fuse`` at twists, orientations and wrenches as of ``GraspData``.
 
-    Args:
-        twist, twist_dot, R_bi, wrench: as of ``GraspData``.
-        grasps: the grasp frames.
-        ratio: a fixed weight as of ``fusion_with``; None for that of ``fusion_matrix``, which changes with them.
+    ``ratio`` is a fixed weight as of ``fusion_with``; None takes that of ``fusion_matrix``, which changes with grasps.
     """
     Q, N = twist.shape[:2]
     K = 6 * (N - 1)

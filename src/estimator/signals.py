@@ -109,16 +109,9 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
     keep = trim_slice(len(recording.time), rate_hz, trim_s)
     time = recording.time[keep]
     shape = len(time), recording.metadata.robots
-    data = GraspData(
-        time=time,
-        R_bi=np.empty((*shape, 3, 3)),
-        p_bi=np.empty((*shape, 3)),
-        twist=np.empty((*shape, 6)),
-        twist_dot=np.empty((*shape, 6)),
-        wrench=np.empty((*shape, 6)),
-        rate_hz=rate_hz,
-        gravity_mps2=recording.metadata.design.gravity_mps2,
-    )
+    sizes = {"R_bi": (3, 3), "p_bi": (3,), "twist": (6,), "twist_dot": (6,), "wrench": (6,)}
+    empty = {name: np.empty((*shape, *size)) for name, size in sizes.items()}
+    data = GraspData(time, **empty, rate_hz=rate_hz, gravity_mps2=recording.metadata.design.gravity_mps2)
     for robot in range(shape[1]):
         arm = recording.arm(robot)
         read = low_pass(np.concatenate(recording.joints(robot), axis=1), rate_hz, cutoff_hz)
@@ -136,15 +129,7 @@ def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
     return apart(np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]]), 1)
 
 
-def _fill(
-    data: GraspData,
-    robot: int,
-    block: slice,
-    phi: Array,
-    theta: Array,
-    tau: Array,
-    arm: Arms,
-) -> None:
+def _fill(data: GraspData, robot: int, block: slice, phi: Array, theta: Array, tau: Array, arm: Arms) -> None:
     """Data points of one robot from its angles with their derivatives, (3, q, 3), and its torques, (q, 3)."""
     found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, arm)
     data.R_bi[block, robot], data.p_bi[block, robot] = levelled(arm, found.R_bi, found.h)
@@ -197,7 +182,7 @@ def find_holds(
 
     Args:
         data: one trial.
-        tolerance_N: how far a noise-free force component may be from its mid-range in any window [N].
+        tolerance_N: how far a force component without noise may be from its mid-range in any window [N].
         duration_s: length of the window, and the least length of a hold [s].
     """
     window = round(duration_s * data.rate_hz) + 1

@@ -60,9 +60,7 @@ class LegGeometry:
 def forward_kinematics(phi: ArrayLike, design: Arms) -> Array:
     """Wrist position h(phi) in {b} [m], shape (..., 3): equation (28); the higher of the two solutions.
 
-    Args:
-        phi: driven angles [rad], 0 horizontal outward, positive raises the knee, shape (..., 3).
-        design: the robot's numbers.
+    Driven angles phi [rad] have shape (..., 3); 0 is horizontal outward, positive raises the knee.
 
     Raises:
         InputError: the three spheres of the rods do not intersect at some configuration.
@@ -130,12 +128,8 @@ def jacobian_of(legs: LegGeometry) -> Array:
 def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arms) -> tuple[Array, Array, Array]:
     """Derivatives of h by every leg's radius, proximal length and rod length, shape (..., 3, 3) each.
 
-    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs.
-
-    Args:
-        legs: geometry at the driven angles.
-        phi: driven angles [rad], shape (..., 3).
-        design: the robot's numbers.
+    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs. ``legs`` is the
+    geometry at the driven angles phi [rad], shape (..., 3).
     """
     phi = np.asarray(phi, dtype=float)
     along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
@@ -150,12 +144,7 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
     """Velocity [m/s] and acceleration [m/s^2] of the wrist in {b}, each of shape (..., 3).
 
     The constraint differentiated twice: rod_k . h_ddot = leverage_k phi_ddot_k
-    + rod_k . knee_d2_k phi_dot_k^2 - |d(rod_k)/dt|^2.
-
-    Args:
-        legs: geometry at the driven angles.
-        phi_dot: driven rates [rad/s], shape (..., 3).
-        phi_ddot: driven accelerations [rad/s^2], shape (..., 3).
+    + rod_k . knee_d2_k phi_dot_k^2 - |d(rod_k)/dt|^2, from driven rates [rad/s] and accelerations [rad/s^2], (..., 3).
     """
     phi_dot, phi_ddot = np.asarray(phi_dot, dtype=float), np.asarray(phi_ddot, dtype=float)
     h_dot = times(legs.across_rods, legs.leverage * phi_dot)
@@ -165,11 +154,7 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
 
 
 def inverse_kinematics(h: ArrayLike, design: Arms) -> Array:
-    """Driven angles phi(h) [rad], shape (..., 3), with every knee pointing outward.
-
-    Args:
-        h: wrist position in {b} [m], shape (..., 3).
-        design: the robot's numbers.
+    """Driven angles phi(h) [rad] with every knee pointing outward, from wrist positions in {b} [m], shape (..., 3).
 
     Raises:
         InputError: a leg is too long or too short for some position.
@@ -193,9 +178,8 @@ def is_in_reach(h: ArrayLike, design: Arms) -> NDArray[np.bool_]:
 def _leg_triangles(h: Array, design: Arms) -> tuple[Array, Array, Array]:
     """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
     l1, l2 = design.proximal_length_m, design.rod_length_m
-    with np.errstate(
-        all="ignore"
-    ):  # on the driven axis itself, or infinitely far: no cosine, so out of reach
+    # On the driven axis itself, or infinitely far, there is no cosine, and it is out of reach.
+    with np.errstate(all="ignore"):
         # Once the platform joint is shifted onto the wrist.
         reach = h[..., None, :] - np.asarray(design.radius_m)[..., None] * LEG_DIRECTIONS
         outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
@@ -238,15 +222,16 @@ _SAME_M = 1e-6  # wrist positions closer than this are one
 
 
 def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array, Array]:
-    """Wrist position and force of the springs on it.
+    """Wrist level: the same sensors told as wrist position h [m] and force of the springs on it [N] in {b}, (..., 3).
+
+    The springs' torques balance a force on the wrist by virtual work, tau . phi_dot = force . h_dot, so
+    force = (dh/dphi)^-T tau (paper, section IV.B, for an arm without mass). Weight and inertia of the arm stay in it,
+    and the conversion is exact both ways.
 
     Args:
         phi: driven angles [rad], shape (..., 3).
         tau: spring torques on the proximal links, positive raising them [N m], shape (..., 3).
         design: the robot's numbers.
-
-    Returns:
-        h in {b} [m] and force in {b} [N], arm weight and inertia not removed, each of shape (..., 3).
 
     Raises:
         InputError: at some configuration the rods cannot meet, a leg is past its stretched position, the wrist is not
@@ -269,15 +254,7 @@ def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array
 
 
 def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Array, Array]:
-    """Driven angles and spring torques, the inverse of ``wrist_of``.
-
-    Args:
-        h: wrist position in {b} [m], shape (..., 3).
-        force: what the springs put on the wrist, in {b} [N], shape (..., 3).
-        design: the robot's numbers.
-
-    Returns:
-        phi [rad] and tau [N m], each of shape (..., 3).
+    """Driven angles [rad] and spring torques [N m], the inverse of ``wrist_of``, shape (..., 3) each.
 
     Raises:
         InputError: some position is not one that ``wrist_of`` returns (see ``wrist_fault``).
@@ -291,13 +268,7 @@ def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Arra
 
 
 def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tuple[Array, Array]:
-    """Driven rates [rad/s] and accelerations [rad/s^2], each of shape (..., 3): the inverse of ``wrist_motion``.
-
-    Args:
-        legs: geometry at the driven angles, no leg stretched.
-        h_dot: velocity of the wrist in {b} [m/s], shape (..., 3).
-        h_ddot: its acceleration [m/s^2], shape (..., 3).
-    """
+    """Inverse of ``wrist_motion``: driven rates [rad/s] and accelerations [rad/s^2], where no leg is stretched."""
     h_dot, h_ddot = np.asarray(h_dot, dtype=float), np.asarray(h_ddot, dtype=float)
     phi_dot = np.einsum("...kj,...j->...k", legs.rod, h_dot) / legs.leverage
     rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
@@ -306,11 +277,7 @@ def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tup
 
 
 def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str] | None:
-    """The first wrist position that has no driven angles, or None where all have.
-
-    Args:
-        h: wrist position in {b} [m], shape (..., 3).
-        design: the robot's numbers.
+    """The first of wrist positions in {b} [m], shape (..., 3), that has no driven angles; None where all have.
 
     Returns:
         Its index in the leading axes, and a sentence that says what is wrong with it.

@@ -52,11 +52,9 @@ class Prior:
     arm_weight_ratio: float = 0.05
 
     def factor(self, robots: int, *, hold_scale: bool) -> Array:
-        """A matrix B, shape (N ``COUNT``, k): the robots' deviations are B z, z standard normal and independent.
+        """A matrix B, shape (N ``COUNT``, k): the deviations of N robots are B z, z standard normal and independent.
 
-        Args:
-            robots: number of robots N.
-            hold_scale: whether the mean of all springs' ratios is 0.
+        ``hold_scale`` makes the mean of all springs' ratios 0.
         """
         columns = np.diag(np.tile(self._sd(), robots))
         springs = (np.arange(robots)[:, None] * COUNT + np.r_[AT["stiffness_ratio"]]).ravel()
@@ -230,18 +228,15 @@ class Calibration:
     @property
     def untouched(self) -> tuple[str, ...]:
         """Deviations of which the recordings told hardly anything: their error is above 0.9 of the prior's."""
-        out = []
-        for robot in range(self.robots):
-            for group in GROUPS:
-                for k, entry in enumerate(group.entries):
-                    at = AT[group.name].start + k
-                    prior = self.prior_sd[robot, at]
-                    if (
-                        prior > 0
-                        and np.sqrt(self.covariance[robot * COUNT + at, robot * COUNT + at]) > 0.9 * prior
-                    ):
-                        out.append(f"omnid{robot + 1}.{group.name}{entry}")
-        return tuple(out)
+        prior, own = self.prior_sd.ravel(), np.sqrt(np.diag(self.covariance))
+        names = deviation_names(self.robots)
+        return tuple(names[k] for k in np.flatnonzero((prior > 0) & (own > 0.9 * prior)))
+
+
+def deviation_names(robots: int) -> list[str]:
+    """``omnid1.phi_zero1`` and so on: a name for every entry of ``ArmUnit.x``, robot by robot."""
+    entries = [f"{group.name}{entry}" for group in GROUPS for entry in group.entries]
+    return [f"omnid{robot}.{entry}" for robot in range(1, robots + 1) for entry in entries]
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,12 +283,7 @@ def grasps_of(payload: CalibratedPayload, scale_sd: float) -> GraspEstimate:
 
 
 def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
-    """Numbers about the centre of mass.
-
-    Args:
-        payload: one of a calibration's.
-        scale_sd: standard deviation of the common spring scale, ``Calibration.scale_sd``.
-    """
+    """Numbers about the centre of mass; ``scale_sd`` is that of ``Calibration``."""
     at = payload.parameters
     values = about_com(at)
     step = np.maximum(np.abs(at), 1e-3)  # parameters of different units
@@ -308,12 +298,7 @@ def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
 def calibrated(recording: Recording, calibration: Calibration, called: str = "the calibration") -> Recording:
     """A recording with the calibration's robots in its metadata; its samples stay as they were read.
 
-    What the metadata said of the robots before gives way.
-
-    Args:
-        recording: of the same robots.
-        calibration: theirs.
-        called: how messages call it, such as its file's name.
+    What the metadata said of the robots before gives way. ``called`` is how messages call the calibration.
 
     Raises:
         InputError: it is of another number of robots, or of another design.
@@ -326,14 +311,7 @@ def calibrated(recording: Recording, calibration: Calibration, called: str = "th
 def units_for(
     calibration: Calibration, robots: int, design: OmnidDesign, name: str, called: str = "the calibration"
 ) -> ArmUnit:
-    """The calibration's robots, for a log of so many robots of a design.
-
-    Args:
-        calibration: of the same robots.
-        robots: N.
-        design: theirs.
-        name: how messages call the log.
-        called: how messages call the calibration.
+    """The calibration's robots, for a log of so many robots of a design; messages use the names of both.
 
     Raises:
         InputError: it is of another number of robots, or of another design.

@@ -63,6 +63,7 @@ from estimator.calibrate.calibration import (
     Calibration,
     Prior,
     carried,
+    deviation_names,
     grasps_of,
 )
 from estimator.errors import InputError
@@ -87,7 +88,7 @@ _KINDS = ("random", "periodic", "static", "free")
 
 def calibration_to_dict(calibration: Calibration) -> dict[str, Any]:
     """A calibration as documented at the head of this module."""
-    names = _deviation_names(calibration.robots)
+    names = deviation_names(calibration.robots)
     free = np.flatnonzero(np.diag(calibration.covariance) > 0)
     parts = {
         "value": calibration.units.x,
@@ -165,12 +166,6 @@ def calibration_from_dict(values: Mapping[str, Any], where: str = "calibration")
     )
 
 
-def _deviation_names(robots: int) -> list[str]:
-    """``omnid1.phi_zero1`` and so on: a name for every entry of ``ArmUnit.x``, robot by robot."""
-    entries = [f"{group.name}{entry}" for group in GROUPS for entry in group.entries]
-    return [f"omnid{robot}.{entry}" for robot in range(1, robots + 1) for entry in entries]
-
-
 def _deviations(read: Fields, N: int) -> tuple[Array, Array]:
     """Values and their derivative by the spring scale, shape (N, ``COUNT``) each."""
     x, by_scale = np.zeros((N, COUNT)), np.zeros((N, COUNT))
@@ -184,7 +179,7 @@ def _deviations(read: Fields, N: int) -> tuple[Array, Array]:
 
 
 def _covariance(read: Fields, N: int) -> Array:
-    inner, known = read.within("covariance", ("names", "matrix")), _deviation_names(N)
+    inner, known = read.within("covariance", ("names", "matrix")), deviation_names(N)
     names = inner.list("names")
     if len(set(map(str, names))) != len(names) or not set(map(str, names)) <= set(known):
         inner.refuse("names", f"deviations, each once, such as {known[0]!r}")

@@ -30,7 +30,6 @@ from scipy.spatial.transform import Rotation
 from estimator import so3
 from estimator.arrays import Array
 from estimator.estimate.uncertainty import (
-    WINDOW_S,
     StepReport,
     cross_information,
     judge,
@@ -244,13 +243,9 @@ def pair_position(twist_i: Array, twist_j: Array, R_ij: Array) -> Array:
 
 
 def estimate_grasps(
-    trials: Sequence[GraspData], window_s: float = WINDOW_S
+    trials: Sequence[GraspData],
 ) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
-    """Grasp frames of all robots from one or several trials of the same payload.
-
-    Args:
-        trials: data of the same N robots and grasps; trials count by their samples and motion.
-        window_s: length of the windows for the covariance [s].
+    """Grasp frames of all N robots from one or several trials of the same payload; trials count by samples and motion.
 
     Returns:
         The estimate, or None when some T_1j is not determined, and two reports per robot j > 1 (rotation,
@@ -277,7 +272,7 @@ def estimate_grasps(
         weights = _weights(V, R, p)
         R, p = _refine(V, R, p, weights)
 
-    covariance = window_covariance(*_window_sums(trials, stacked, R, p, weights, window_s))
+    covariance = window_covariance(*_window_sums(trials, stacked, R, p, weights))
 
     mean = 3 * samples
     pair_rms = np.zeros((2, N, N))
@@ -389,7 +384,7 @@ def _triangle(V: Array) -> Array:
 
 
 def _window_sums(
-    trials: Sequence[GraspData], stacked: Sequence[Array], R: Array, p: Array, weights: Array, window_s: float
+    trials: Sequence[GraspData], stacked: Sequence[Array], R: Array, p: Array, weights: Array
 ) -> tuple[Array, Array]:
     """Normal matrices (B, K, K) and scores (B, K) of all windows; K = 6(N-1).
 
@@ -402,7 +397,7 @@ def _window_sums(
     products = np.array([
         (V[window.part].T * window.weights) @ V[window.part]
         for trial, V in zip(trials, stacked, strict=True)
-        for window in windows(trial.samples, trial.rate_hz, window_s)
+        for window in windows(trial.samples, trial.rate_hz)
     ])  # fmt: skip
     normals, scores = np.zeros((len(products), K, K)), np.zeros((len(products), K))
     for row, of_row in enumerate(J):  # all at once would take (6N)^2 K^2 numbers

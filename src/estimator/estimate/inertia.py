@@ -17,7 +17,6 @@ from estimator import so3
 from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.uncertainty import (
-    WINDOW_S,
     StepReport,
     WeakDirection,
     Window,
@@ -223,8 +222,6 @@ def estimate_inertia(
     grasps: GraspEstimate,
     p_1c: Array,
     upstream: tuple[Array, Array] | None = None,
-    window_s: float = WINDOW_S,
-    step: str = "inertia",
 ) -> tuple[InertiaEstimate | None, StepReport]:
     """Inertia by (26) from one or several trials.
 
@@ -234,8 +231,6 @@ def estimate_inertia(
         p_1c: centre of mass in {1} [m], shape (3,).
         upstream: covariance of p_1c without the part due to the grasps, shape (3, 3), and derivative of p_1c
             by the grasp errors, shape (3, 6(N-1)); None takes p_1c as exact.
-        window_s: length of the windows for the covariance [s].
-        step: name of the step in the report.
 
     Returns:
         The estimate, or None when a direction is not determined, and the report.
@@ -243,7 +238,7 @@ def estimate_inertia(
     parts = [_equations(trial, grasps, p_1c) for trial in trials]
     X, y = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
-    report = rotational_excitation(X, alpha_noise, step)
+    report = rotational_excitation(X, alpha_noise)
     if not report.determined:
         return None, report
     parameters = _solve(X, y)
@@ -253,7 +248,7 @@ def estimate_inertia(
         why = f"the moments do not follow the motion (explained {signal:.2g} N m, left {noise:.2g} N m)"
         return None, refuse(report, np.eye(6), why)
 
-    covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
+    covariance = window_covariance(*window_normals(X, residual, trial_windows(trials)))
     moment_scale, alpha_scale = rms(y), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
     report = refuse_uncertain(report, covariance, SE_LIMIT * moment_scale / alpha_scale)
     if not report.determined:
@@ -264,20 +259,20 @@ def estimate_inertia(
     return InertiaEstimate.of(parameters, covariance, noise, signal), report
 
 
-def trial_windows(trials: Sequence[GraspData], window_s: float) -> list[Window]:
+def trial_windows(trials: Sequence[GraspData]) -> list[Window]:
     """Windows over the samples of several trials put one after the other."""
     out, first = [], 0
     for trial in trials:
-        out += windows(trial.samples, trial.rate_hz, window_s, first)
+        out += windows(trial.samples, trial.rate_hz, first)
         first += trial.samples
     return out
 
 
-def rotational_excitation(X: Array, alpha_noise: float, step: str) -> StepReport:
+def rotational_excitation(X: Array, alpha_noise: float) -> StepReport:
     """Judge the regressor (Q, 3, 6) against the noise of the angular acceleration [rad/s^2]."""
     flat = X.reshape(-1, 6)
     return judge(
-        step,
+        "inertia",
         PARAMETERS,
         flat.T @ flat / len(X),
         alpha_noise,

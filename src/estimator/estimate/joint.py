@@ -26,7 +26,6 @@ from estimator.estimate.inertia import (
 )
 from estimator.estimate.statics import ComEstimate, MassEstimate, check_lifted, judge_com
 from estimator.estimate.uncertainty import (
-    WINDOW_S,
     StepReport,
     cross_information,
     numerical_jacobian,
@@ -61,15 +60,13 @@ class JointEstimate:
 
 
 def estimate_joint(
-    trials: Sequence[GraspData], grasps: GraspEstimate, window_s: float = WINDOW_S, step: str = "inertia"
+    trials: Sequence[GraspData], grasps: GraspEstimate
 ) -> tuple[JointEstimate, tuple[StepReport, ...]]:
     """Ten inertial parameters from any motion; fewer are reported when the motion is poor.
 
     Args:
         trials: one or several trials of the same payload and N >= 1 robots, holds included.
         grasps: the grasp frames.
-        window_s: length of the windows for the covariance [s].
-        step: name of the inertia step in the reports.
 
     Returns:
         The estimate and the reports on the centre of mass and the inertia.
@@ -81,7 +78,7 @@ def estimate_joint(
     Y, w, used = _equations(motions, trials)
     gravity = trials[0].gravity_mps2
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
-    inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
+    inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise)
     theta, weights = _weighted_solve(Y, w)
     check_lifted(theta[0])
     residual = w - Y @ theta
@@ -93,7 +90,7 @@ def estimate_joint(
 
     scale = np.sqrt(np.einsum("qrk,qrk->k", Y, Y) / used)
     scale[scale == 0] = 1.0
-    parts = trial_windows(trials, window_s)
+    parts = trial_windows(trials)
     J_weighted = weights[:, None] * Y
     J_weighted /= scale  # in place: these arrays are the largest of an estimate
     normals, scores = window_normals(J_weighted, weights * residual, parts)

@@ -34,13 +34,7 @@ CONTRADICTION_M = 0.02
 
 @dataclass(frozen=True)
 class MassEstimate:
-    """Mass from the vertical forces of the holds.
-
-    Attributes:
-        mass: m [kg].
-        se: its standard error [kg].
-        residual_rms: rms of the vertical force balance over the holds [N].
-    """
+    """Mass [kg], its standard error [kg], and the rms of the vertical force balance over the holds [N]."""
 
     mass: float
     se: float
@@ -182,8 +176,7 @@ def judge_com(
 
     Args:
         information: of the directions against gravity, as ``cross_information`` gives it, shape (3, 3).
-        moment_rms: moments left over [N m].
-        weight: of the payload [N].
+        moment_rms: moments left over [N m], of a payload of some weight [N].
         tilt_noise: how well the tilt is known [rad].
         reason: why a direction is open, unless the moments make no sense.
     """

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,24 +28,19 @@ WEIGHT = 2.0
 _SQUARES = 1.5  # the same for the squares of the weights
 
 
-@dataclass(frozen=True)
-class Window:
+class Window(NamedTuple):
     """Some consecutive samples and their weights, shape (samples of the slice,)."""
 
     part: slice
     weights: Array
 
 
-def windows(samples: int, rate_hz: float, window_s: float = WINDOW_S, first: int = 0) -> list[Window]:
+def windows(samples: int, rate_hz: float, first: int = 0) -> list[Window]:
     """Hann windows at a quarter of their length, cut off at both ends; every sample is weighted alike.
 
-    Args:
-        samples: number of samples Q.
-        rate_hz: sampling rate [Hz].
-        window_s: length of a window [s].
-        first: index of the first sample.
+    ``first`` is the index of the first of the samples.
     """
-    hop = max(1, round(min(window_s * rate_hz, samples / MIN_WINDOWS) / 4))
+    hop = max(1, round(min(WINDOW_S * rate_hz, samples / MIN_WINDOWS) / 4))
     hann = np.sin(np.pi * (np.arange(4 * hop) + 0.5) / (4 * hop)) ** 2
     out = []
     for start in range(-3 * hop, samples, hop):
@@ -121,10 +116,9 @@ class WeakDirection:
     """A direction of one step's parameters that the data do not determine.
 
     Attributes:
-        step: the step, for example ``"position p_12"``.
-        direction: the direction in words, for example ``"along x of {1}"``.
-        vector: the same as a unit vector over the step's parameters.
-        reason: why, as a sentence without a full stop.
+        step: such as ``"position p_12"``.
+        direction: such as ``"along x of {1}"``; ``vector`` is the same over the step's parameters, of unit length.
+        reason: a sentence without a full stop.
     """
 
     step: str
@@ -145,10 +139,8 @@ class StepReport:
     """Excitation of one step.
 
     Attributes:
-        step: the step's name.
-        parameters: names of the parameters, in the order of ``vector`` of the weak directions.
-        unit: unit of ``singular_values`` and ``noise``.
-        singular_values: rms signal per direction, descending.
+        parameters: their names, in the order of ``vector`` of the weak directions.
+        singular_values: rms signal per direction, descending; ``unit`` is theirs and that of the noise.
         noise: rms noise of that signal.
         weak: the directions that are not determined; empty when the step is.
     """
@@ -221,14 +213,13 @@ def judge(
     """Compare the singular values of a regressor to its noise.
 
     Args:
-        step: name of the step.
+        step: its name.
         parameters: K names.
         information: mean normal matrix X^T X / Q of the scaled regressor, shape (K, K).
         noise: rms noise in the unit of the singular values (the square roots of the eigenvalues).
         unit: that unit.
         reason: what to say of a weak direction.
-        words: how to introduce a direction of space, for example ``"along"``; needs K = 3 and ``frame``.
-        frame: the frame in which the direction is expressed, for example ``"{1}"``.
+        words, frame: what introduces a direction of space (K = 3), and its frame, such as ``"along"`` and ``"{1}"``.
         floor: smallest singular value that is not rounding error, same unit.
         factor: least determined ratio of a singular value to ``noise``.
     """

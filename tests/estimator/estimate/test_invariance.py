@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.estimate import uncertainty
 from estimator.estimate.consistency import Trial
 from estimator.estimate.payload import Method, estimate_from_trials
 from estimator.estimate.result import PayloadEstimate
@@ -28,9 +29,9 @@ def trials() -> tuple[GraspData, GraspData]:
     return moving(body, 14, seed=3, **NOISE), still(body, TILTS, 7.0, seed=4, **NOISE)
 
 
-def estimated(data: Sequence[GraspData], method: Method, window_s: float = 4.0) -> PayloadEstimate:
+def estimated(data: Sequence[GraspData], method: Method) -> PayloadEstimate:
     every = [Trial(f"trial {k}", "random", None, each) for k, each in enumerate(data)]
-    return estimate_from_trials(every, method, window_s)
+    return estimate_from_trials(every, method)
 
 
 @cache
@@ -111,8 +112,10 @@ def test_lengths_in_other_units(method: Method) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_times_in_other_units(method: Method) -> None:
+def test_times_in_other_units(method: Method, monkeypatch: pytest.MonkeyPatch) -> None:
     f = 1.1
+    expected = estimated(trials()[:1], method) if method == "joint" else plain(method)
+    monkeypatch.setattr(uncertainty, "WINDOW_S", f * uncertainty.WINDOW_S)
     data = [
         replace(
             each, time=f * each.time, rate_hz=each.rate_hz / f, twist=each.twist / f, twist_dot=each.twist_dot / f**2,
@@ -121,9 +124,9 @@ def test_times_in_other_units(method: Method) -> None:
         for each in trials()
     ]  # fmt: skip
     if method == "joint":
-        same(estimated(data[:1], method, 4.0 * f), estimated(trials()[:1], method), rtol=1e-4)
+        same(estimated(data[:1], method), expected, rtol=1e-4)
     else:
-        found, expected = estimated(data, method, 4.0 * f), plain(method)
+        found = estimated(data, method)
         assert found.mass is not None
         assert expected.mass is not None
         assert found.mass.mass == pytest.approx(expected.mass.mass, rel=1e-3)

@@ -239,7 +239,6 @@ def test_windows_weigh_all_samples_alike(samples: int, first: int) -> None:
 def test_windows_are_four_seconds_or_a_sixth() -> None:
     assert max(len(window.weights) for window in windows(3000, 100.0)) == 400
     assert max(len(window.weights) for window in windows(1200, 100.0)) == 200
-    assert max(len(window.weights) for window in windows(3000, 100.0, window_s=2.0)) == 200
 
 
 def test_errors_of_lengths() -> None:

@@ -22,19 +22,6 @@ from estimator.so3 import rotvec_covariance
 from rigid_body_data import GRAVITY, RATE, low_passed_noise, make_body, moving, still
 
 
-@pytest.mark.parametrize(("samples", "window_s"), [(6000, 4.0), (6001, 3.3), (700, 4.0), (5, 4.0), (1, 4.0)])
-def test_windows_weigh_every_sample_alike(samples, window_s):
-    total, squares = np.zeros(samples), np.zeros(samples)
-    for window in windows(samples, 100.0, window_s, first=0):
-        total[window.part] += window.weights
-        squares[window.part] += window.weights**2
-    np.testing.assert_allclose(total, 2.0)
-    np.testing.assert_allclose(squares, 1.5)
-    shifted = windows(samples, 100.0, window_s, first=10)
-    assert min(window.part.start for window in shifted) == 10
-    assert max(window.part.stop for window in shifted) == samples + 10
-
-
 def coloured(rng, colour, Q):
     if colour == "white":
         return rng.normal(size=Q)
@@ -90,18 +77,6 @@ def test_numerical_jacobian():
     J = numerical_jacobian(lambda x: A @ x + (x @ x) * np.ones(2), np.array([1.0, -2.0, 0.5]))
     np.testing.assert_allclose(J, A + 2 * np.array([1.0, -2.0, 0.5]), atol=1e-8)
     assert numerical_jacobian(lambda x: A[0], np.zeros(0)).shape == (3, 0)
-
-
-def test_standard_error_of_a_length():
-    covariance = np.diag([0.01, 0.04, 0.09])
-    assert norm_se(np.array([0.0, 5.0, 0.0]), covariance) == pytest.approx(0.2)
-    assert norm_se(np.array([3.0, 4.0, 0.0]), covariance) == pytest.approx(np.sqrt(0.36 * 0.01 + 0.64 * 0.04))
-    assert norm_se(np.zeros(3), covariance) > 0
-
-
-def test_norm_se_of_next_to_nothing():
-    """Of two robots that are one and the same the variance of their distance is negative by rounding."""
-    assert norm_se(np.array([1.0, 0.0, 0.0]), np.diag([-1e-30, 1.0, 1.0])) == 0.0
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-8, 0.3, 2.0, 3.0])
