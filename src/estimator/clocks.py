@@ -27,13 +27,7 @@ from estimator import so3
 from estimator.arm.dynamics import rate_matrix
 from estimator.arrays import Array
 from estimator.estimate.grasps import pair_rotation
-from estimator.estimate.uncertainty import (
-    StepReport,
-    judge,
-    window_covariance,
-    window_normals,
-    windows,
-)
+from estimator.estimate.uncertainty import StepReport, judge, window_covariance, window_normals, windows
 from estimator.filtering import differentiate
 from estimator.recording.model import Recording
 from estimator.statistics import rms

@@ -17,10 +17,8 @@ BLOCK = 1024
 """Rows that are judged together."""
 _LIVE = 0.5  # of the readings differ in an effort from the one before, or the efforts have no noise
 _SIGMAS = 8.0  # by which runs of equal rows are more than chance makes of them
-_ORDER, _NOISE = (
-    6,
-    1e-6,
-)  # differences, and their share of the range beyond which they are noise: motion leaves less
+_ORDER, _NOISE = 6, 1e-6
+"""Differences, and their share of the range beyond which they are noise: motion leaves less."""
 _EQUAL, _OF = 2, 8  # readings that are taken to be equal by chance, before any is seen
 
 
@@ -48,11 +46,8 @@ class Repeats:
         """Count high differences of the efforts that are noise; smooth efforts tell nothing of equal rows."""
         with np.errstate(over="ignore", invalid="ignore"):  # of values beyond floats, which others refuse
             changes = np.any(np.diff(values, axis=0) != 0, axis=1)
-            efforts = (
-                values[np.append(True, changes)][:, self._efforts]
-                if len(values)
-                else values[:, self._efforts]
-            )
+            kept = np.append(True, changes)[: len(values)]
+            efforts = values[kept][:, self._efforts]
             high = np.abs(np.diff(efforts, n=_ORDER, axis=0))
             noisy = high > _NOISE * np.ptp(efforts, axis=0) if high.size else high
         if high.size:

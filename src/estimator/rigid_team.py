@@ -50,10 +50,7 @@ def inertia_regressor(omega: Array, alpha: Array) -> Array:
 def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, moment: Array) -> Array:
     """Changes of sum_q (A + B)^T m, with A + B as of ``inertia_regressor``, by changes of the motion, (K, 6).
 
-    Args:
-        omega: angular velocity [rad/s], shape (Q, 3).
-        d_omega, d_alpha: changes of it and of the angular acceleration, shape (K, Q, 3).
-        moment: m, shape (Q, 3).
+    ``omega`` and ``moment``, m, have shape (Q, 3); the changes of omega and of alpha have shape (K, Q, 3).
     """
     # L(w)^T m is linear in w m^T, and [omega]^T m = m x omega.
     outer = np.swapaxes(d_alpha, 1, 2) @ moment + np.swapaxes(d_omega, 1, 2) @ so3.cross(moment, omega)
@@ -64,14 +61,9 @@ def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, mome
 
 
 def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) -> Array:
-    """Regressor of (f, M) at the origin of {1} by (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz).
+    """Regressor of (f, M) at the origin of {1} by (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz), shape (Q, 6, 10).
 
-    Args:
-        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {1}, shape (Q, 3).
-        specific_force: G = a + g up in {1} [m/s^2], shape (Q, 3).
-
-    Returns:
-        Shape (Q, 6, 10), force rows first.
+    From angular velocity and acceleration and the specific force G = a + g up [m/s^2] in {1}, shape (Q, 3) each.
     """
     W = so3.skew(omega)
     Y = np.zeros((len(omega), 6, 10))
@@ -82,15 +74,14 @@ def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) ->
     return Y
 
 
-@dataclass(frozen=True)
-class BodyMotion:
-    """Motion of the payload and the load on it, in {1}; Q samples.
+class BodyMotion(NamedTuple):
+    """Motion of the payload and the load on it, in {1}; shape (Q, 3) each.
 
     Attributes:
-        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2], shape (Q, 3).
-        acceleration: acceleration of the origin of {1} (v-dot + omega x v) [m/s^2], shape (Q, 3).
-        up: unit vector against gravity, shape (Q, 3).
-        force, moment: sum of the robots' wrenches at the origin of {1} [N, N m], shape (Q, 3).
+        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2].
+        acceleration: of the origin of {1} (v-dot + omega x v) [m/s^2].
+        up: unit vector against gravity.
+        force, moment: sum of the robots' wrenches at the origin of {1} [N, N m].
     """
 
     omega: Array
@@ -123,12 +114,10 @@ def fuse(data: GraspData, grasps: GraspEstimate) -> BodyMotion:
 
 
 class FusionChanges(NamedTuple):
-    """Derivatives of a motion by the grasps' errors (``GraspEstimate.covariance``), K = 6(N-1) of them.
+    """Derivatives of a motion by the K = 6(N-1) errors of the grasps (``GraspEstimate.covariance``).
 
-    Attributes:
-        twist, twist_dot: of the payload's twist in {1} and its component-wise derivative, shape (K, Q, 6).
-        up: of the unit vector against gravity in {1}, shape (K, Q, 3).
-        force, moment: of the sum of the robots' wrenches at the origin of {1}, shape (K, Q, 3).
+    Of the payload's twist in {1} and its component-wise derivative, shape (K, Q, 6), and of ``up``, ``force`` and
+    ``moment`` as in ``BodyMotion``, shape (K, Q, 3).
     """
 
     twist: Array
@@ -230,10 +219,9 @@ def _fusion_matrix_changes(grasps: GraspEstimate, ratio: float, by_ratio: Array)
 
 
 def total_wrench(wrench: Array, grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Sum of the wrenches at the origin of {1}, in {1}: force [N] and moment [N m].
+    """Sum of the wrenches (m_i, f_i) in {i}, (Q, N, 6), at the origin of {1}, in {1}: force and moment, (Q, 3) each.
 
-    ``wrench`` has shape (Q, N, 6), (m_i, f_i) in {i}; the sums have shape (Q, 3). Equations (10), (19): the
-    grasp moments m_i count too.
+    Equations (10), (19): the grasp moments m_i count too.
     """
     # [Ad_T_i1]^T takes a wrench from {i} to {1}; side by side they add up all robots' in one product.
     total = wrench.reshape(len(wrench), -1) @ _adjoint_inverses(grasps).reshape(-1, 6)
@@ -291,12 +279,7 @@ def _adjoint_inverse_changes(grasps: GraspEstimate) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """What all trials have in common: how the payload is held, and its inertial parameters.
-
-    Attributes:
-        grasps: grasp frames X_1i.
-        pi: (m, m c, J about {1}), shape (10,).
-    """
+    """What all trials have in common: the grasp frames X_1i, and pi = (m, m c, J about {1}), shape (10,)."""
 
     grasps: GraspEstimate
     pi: Array
@@ -311,9 +294,7 @@ class Shared:
 class Bases:
     """Poses of the robots' bases in {b1} during one trial; index 0 is robot 1 itself.
 
-    Attributes:
-        R: rotations about z, shape (N, 3, 3).
-        p: positions [m], shape (N, 3).
+    ``R`` are rotations about z, shape (N, 3, 3), ``p`` positions [m], shape (N, 3).
     """
 
     R: Array
@@ -351,11 +332,9 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 
 
 def robot_data(s: Array, arms: Arms) -> ArmData:
-    """R_bi and h in level base frames, twist, twist_dot and wrench of robots whose true signals are s (``slots``).
+    """R_bi and h in level base frames, twist, twist_dot and wrench of robots whose true signals are s, (Q, ..., 21).
 
-    Args:
-        s: shape (Q, ..., 21).
-        arms: of one robot, or of all in the axis before the last.
+    ``arms`` are of one robot, or of all in the axis before the last.
     """
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
         s.reshape(*s.shape[:-1], 7, 3), -2, 0
@@ -383,10 +362,7 @@ def grasp_data(s: Array, arms: Arms, rate_hz: float) -> GraspData:
 def start_bases(R: Array, h: Array, shared: Shared) -> Bases:
     """Bases of one trial, in which all robots agree on average about where the payload is.
 
-    Args:
-        R: orientations R_bi, shape (Q, N, 3, 3).
-        h: wrist positions in {b} [m], shape (Q, N, 3).
-        shared: how the payload is held.
+    From orientations R_bi (Q, N, 3, 3), wrist positions in {b} (Q, N, 3) [m], and how the payload is held.
     """
     turns, places = [np.eye(3)], [np.zeros(3)]
     for i in range(1, h.shape[1]):
@@ -406,7 +382,7 @@ def needed_wrench(
         motion: its twist, shape (Q, 6).
         twist, twist_dot: changes of its twist, and of that one's rate, shape (..., Q, 6).
         gravity: change of the vertical times gravity [m/s^2], shape (..., Q, 3).
-        pi: its inertial parameters (m, m c, J about {1}), shape (10,).
+        pi: its inertial parameters, shape (10,).
     """
     mass, mass_c, inertia = pi[0], pi[1:4], inertia_matrix(pi[4:])
     omega, v = motion[:, :3], motion[:, 3:]

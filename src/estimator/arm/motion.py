@@ -89,11 +89,7 @@ def arm_data(
     v_dot = times(R_ib, h_ddot) - cross(omega, v)
     wrench = wrench_on_payload(phi, theta, tau, arm, legs, gimbal, R_bi, h_ddot)
     return ArmData(
-        R_bi,
-        legs.h,
-        np.concatenate([omega, v], axis=-1),
-        np.concatenate([omega_dot, v_dot], axis=-1),
-        wrench,
+        R_bi, legs.h, np.concatenate([omega, v], axis=-1), np.concatenate([omega_dot, v_dot], axis=-1), wrench
     )
 
 

@@ -241,15 +241,12 @@ def deviation_names(robots: int) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A payload's mass, centre of mass and inertia; errors include that of a held spring scale.
+    """A payload's mass, centre of mass in {1}, inertia about it in the axes of {1}, and principal moments.
 
     Attributes:
-        mass_kg, mass_se_kg: mass.
-        p_1c: centre of mass in {1} [m], shape (3,).
-        inertia: about it, axes of {1} [kg m^2], shape (3, 3).
-        covariance: of the mass, p_1c and xx, xy, xz, yy, yz, zz of the inertia, shape (10, 10).
+        covariance: of the mass, p_1c and xx, xy, xz, yy, yz, zz of the inertia, that of a held spring scale included,
+            shape (10, 10).
         by_scale: derivative of the same by the common spring scale, shape (10,).
-        principal: principal moments and axes.
     """
 
     mass_kg: float
@@ -261,7 +258,7 @@ class Carried:
 
     @property
     def mass_se_kg(self) -> float:
-        """See above."""
+        """Standard error of the mass [kg]."""
         return float(np.sqrt(self.covariance[0, 0]))
 
     @property

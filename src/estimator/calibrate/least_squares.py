@@ -24,15 +24,8 @@ from estimator.errors import InputError
 from estimator.rigid_team import Bases, Shared
 
 
-@dataclass(frozen=True, eq=False)
-class Unknowns:
-    """Values of everything.
-
-    Attributes:
-        units: the robots side by side, ``x`` of shape (N, ``COUNT``).
-        carried: grasps and inertial parameters of every payload.
-        bases: where the robots stood in every trial.
-    """
+class Unknowns(NamedTuple):
+    """The robots side by side, grasps and inertial parameters of every payload, and bases in every trial."""
 
     units: ArmUnit
     carried: tuple[Shared, ...]
@@ -196,10 +189,10 @@ class Given:
     def only(self, chosen: Sequence[int]) -> Given:
         """Some of the trials, by index, with what they carry."""
         carried = sorted({self.trials[k].payload for k in chosen})
-        start = replace(
-            self.start,
-            carried=tuple(self.start.carried[payload] for payload in carried),
-            bases=tuple(self.start.bases[k] for k in chosen),
+        start = Unknowns(
+            self.start.units,
+            tuple(self.start.carried[payload] for payload in carried),
+            tuple(self.start.bases[k] for k in chosen),
         )
         trials = [self.trials[k]._replace(payload=carried.index(self.trials[k].payload)) for k in chosen]
         known = [

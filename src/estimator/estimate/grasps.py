@@ -44,14 +44,9 @@ from estimator.statistics import rms
 
 @dataclass(frozen=True)
 class PairGrasp:
-    """Frame {j} relative to {i}, with standard errors.
+    """Rotation and origin [m] of frame {j} in {i}, robots counted from 1.
 
-    Attributes:
-        i, j: robots, counted from 1.
-        R_ij: rotation, shape (3, 3).
-        p_ij: origin of {j} in {i} [m], shape (3,).
-        covariance: of (error rotation d in {i} [rad], e [m]), shape (6, 6): the truth is
-            exp(d) R_ij, p_ij + e.
+    The covariance (6, 6) is of (error rotation d in {i} [rad], e [m]): the truth is exp(d) R_ij, p_ij + e.
     """
 
     i: int
@@ -220,31 +215,23 @@ RATE_FLOOR_RADPS = 1e-10
 
 
 def pair_rotation(omega_i: Array, omega_j: Array) -> Array:
-    """R_ij that best maps omega_j onto omega_i (Wahba's problem), equations (3)-(5).
-
-    Args:
-        omega_i, omega_j: angular velocities [rad/s] in {i} and {j}, shape (Q, 3).
-    """
+    """R_ij that best maps angular velocities omega_j onto omega_i, (Q, 3) (Wahba's problem), equations (3)-(5)."""
     with warnings.catch_warnings():  # scipy warns when R is not unique; the caller judges that from the noise
         warnings.simplefilter("ignore", UserWarning)
         return Rotation.align_vectors(omega_i, omega_j)[0].as_matrix()
 
 
 def pair_position(twist_i: Array, twist_j: Array, R_ij: Array) -> Array:
-    """p_ij [m] that best explains the linear velocities, equations (6)-(8); shortest if not unique.
+    """p_ij [m] that best explains the linear velocities of twists (omega, v) in {i} and {j}, shape (Q, 6).
 
-    Args:
-        twist_i, twist_j: twists (omega, v) in {i} and {j}, shape (Q, 6).
-        R_ij: rotation, shape (3, 3).
+    Equations (6)-(8); the shortest if not unique.
     """
     A = so3.skew(twist_j[:, :3] @ R_ij.T).reshape(-1, 3)
     b = (twist_j[:, 3:] @ R_ij.T - twist_i[:, 3:]).ravel()
     return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0], dtype=float)
 
 
-def estimate_grasps(
-    trials: Sequence[GraspData],
-) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
+def estimate_grasps(trials: Sequence[GraspData]) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
     """Grasp frames of all N robots from one or several trials of the same payload; trials count by samples and motion.
 
     Returns:

@@ -119,9 +119,7 @@ def project_positive(inertia: Array) -> tuple[Array, bool]:
 def principal_inertia(inertia: Array, covariance: Array) -> PrincipalInertia:
     """Equation (27) with standard errors by first-order perturbation.
 
-    Args:
-        inertia: matrix in {b}, axes of {1} [kg m^2], shape (3, 3).
-        covariance: of the six parameters of (20) [kg^2 m^4], shape (6, 6).
+    From the matrix in {b}, axes of {1} [kg m^2], and the covariance of its six parameters (20) [kg^2 m^4].
     """
     moments, axes = np.linalg.eigh(inertia)
     axes = _smallest_rotation(axes)

@@ -37,10 +37,7 @@ def write_recording(recording: Recording, path: Path | str) -> None:
     with whole_file(path) as temporary:
         # Measured samples hardly repeat, so dictionaries only cost space; checksums catch damaged pages.
         pq.write_table(
-            table.replace_schema_metadata(metadata),
-            temporary,
-            use_dictionary=False,
-            write_page_checksum=True,
+            table.replace_schema_metadata(metadata), temporary, use_dictionary=False, write_page_checksum=True
         )
 
 
@@ -189,6 +186,11 @@ _PAGE_UNPACKED, _PAGE_PACKED = 2, 3
 
 def claimed_bytes(path: Path, columns: Sequence[str], names: Collection[str]) -> int:
     """The most that columns, and lists in them, unpack to by pages, by footer, or by values of eight bytes.
+
+    A reader takes memory for a whole page as its header says, 33 kB for half a gigabyte, and for values as the footer
+    says, and either may lie. Both are structures of Thrift's compact protocol, by fields with numbers
+    (https://github.com/apache/parquet-format, ``parquet.thrift``). pyarrow tells neither pages nor, without ending the
+    process, columns of a damaged footer.
 
     Args:
         path: the file.
