@@ -344,13 +344,18 @@ def robot_data(s: Array, arms: Arms) -> ArmData:
     return data._replace(R_bi=R_bi, h=h)
 
 
+def payload_equations(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Array]:
+    """Y (Q, 6, 10) and (f, M) of the robots (Q, 6) [N, N m], which are Y pi for a rigid payload."""
+    motion = fuse(data, grasps)
+    specific = motion.acceleration + data.gravity_mps2 * motion.up
+    Y = newton_euler_regressor(motion.omega, motion.alpha, specific)
+    return Y, np.concatenate([motion.force, motion.moment], axis=1)
+
+
 def balance(data: GraspData, shared: Shared) -> tuple[Array, Array]:
     """(f, M) of the robots minus Y pi [N, N m], shape (Q, 6), and Y, shape (Q, 6, 10)."""
-    motion = fuse(data, shared.grasps)
-    Y = newton_euler_regressor(
-        motion.omega, motion.alpha, motion.acceleration + data.gravity_mps2 * motion.up
-    )
-    return np.concatenate([motion.force, motion.moment], axis=1) - Y @ shared.pi, Y
+    Y, wrench = payload_equations(data, shared.grasps)
+    return wrench - Y @ shared.pi, Y
 
 
 def grasp_data(s: Array, arms: Arms, rate_hz: float) -> GraspData:

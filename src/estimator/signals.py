@@ -72,10 +72,14 @@ class GraspData:
         """Number of samples Q."""
         return self.twist.shape[0]
 
-    def at(self, kept: NDArray[np.bool_]) -> GraspData:
+    def at(self, kept: NDArray[np.bool_] | slice) -> GraspData:
         """Some of the samples, shape (Q,)."""
         names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
+
+    def every(self, stride: int) -> GraspData:
+        """Every so-and-so-many-th sample."""
+        return replace(self.at(slice(None, None, stride)), rate_hz=self.rate_hz / stride)
 
 
 BLOCK = 16_384
@@ -138,7 +142,9 @@ def _fill(data: GraspData, robot: int, block: slice, phi: Array, theta: Array, t
 
 
 TOLERANCE_N = 0.01
+"""How far a force component without noise may be from its mid-range in any window."""
 DURATION_S = 6.0
+"""Length of the window, and the least length of a hold."""
 STILL_SPEED_MPS = 5e-3
 STILL_RATE_RADPS = 2e-2
 _SIGMAS = 5.0
@@ -175,23 +181,15 @@ class Hold:
         return len(self.wrench)
 
 
-def find_holds(
-    data: GraspData, tolerance_N: float = TOLERANCE_N, duration_s: float = DURATION_S
-) -> list[Hold]:
-    """All static holds of a trial, in order of time; empty when there are none.
-
-    Args:
-        data: one trial.
-        tolerance_N: how far a force component without noise may be from its mid-range in any window [N].
-        duration_s: length of the window, and the least length of a hold [s].
-    """
-    window = round(duration_s * data.rate_hz) + 1
+def find_holds(data: GraspData) -> list[Hold]:
+    """All static holds of a trial, in order of time; empty when there are none."""
+    window = round(DURATION_S * data.rate_hz) + 1
     Q = data.samples
     if window > Q or window < 3:
         return []
     steady = np.ones(Q - window + 1, dtype=bool)
     for robot in range(data.robots):  # one at a time, for the sake of memory
-        steady &= _rests(data, robot, window, tolerance_N)
+        steady &= _rests(data, robot, window)
     starts = np.flatnonzero(steady)
     if not len(starts):
         return []
@@ -205,18 +203,18 @@ def find_holds(
     return [_hold(data, first, last) for first, last in holds]
 
 
-def _rests(data: GraspData, robot: int, window: int, tolerance_N: float) -> NDArray[np.bool_]:
+def _rests(data: GraspData, robot: int, window: int) -> NDArray[np.bool_]:
     """Whether one robot's forces are constant and its grasp is still, in every window; shape (Q - window + 1,)."""
     force = np.einsum("qab,qb->qa", data.R_bi[:, robot], data.wrench[:, robot, 3:])
     variance = _noise_variance(force, data.rate_hz, window)  # (windows, 3)
     smooth = uniform_filter1d(force, _odd(_SMOOTH_S * data.rate_hz), axis=0, mode="nearest")
     slow = variance * min(1.0, _LAG_S / _SMOOTH_S)
 
-    steady = _half_range(force, window) <= tolerance_N + _SIGMAS * np.sqrt(variance)
+    steady = _half_range(force, window) <= TOLERANCE_N + _SIGMAS * np.sqrt(variance)
     # The running mean looks half its length beyond the window, where the payload may already move.
     edge = min(_odd(_SMOOTH_S * data.rate_hz) // 2, (window - 1) // 2)
     inner = _half_range(smooth, window - 2 * edge)[edge : edge + len(steady)]
-    steady &= inner <= tolerance_N + _SLOW_SIGMAS * np.sqrt(slow)
+    steady &= inner <= TOLERANCE_N + _SLOW_SIGMAS * np.sqrt(slow)
     rests = steady.all(axis=1)
     for part, limit in ((slice(3, 6), STILL_SPEED_MPS), (slice(0, 3), STILL_RATE_RADPS)):
         square = np.sum(data.twist[:, robot, part] ** 2, axis=1, keepdims=True)

@@ -197,9 +197,7 @@ def held_out(found: Fit) -> list[tuple[float, float] | None]:
     return out
 
 
-def undecided(
-    found: Fit, prior: Prior, scale_sd: float, *, alone: bool, single: list[str], parallel: bool = False
-) -> list[str]:
+def undecided(found: Fit, prior: Prior, scale_sd: float, *, alone: bool, single: list[str]) -> list[str]:
     """Sentences on what the recordings do not decide.
 
     Args:
@@ -208,7 +206,6 @@ def undecided(
         scale_sd: standard deviation of the held common spring scale; 0 if it is not held.
         alone: whether unloaded arms were recorded.
         single: names of payloads with one recording.
-        parallel: whether the flanges are known to be parallel.
     """
     out = []
     layout, carried = found.layout, found.point.unknowns.carried
@@ -223,7 +220,7 @@ def undecided(
             f"arms' own weight alone: all masses and inertias may be off together by {100 * scale_sd:.2g} % (one "
             f"standard error). One weighed payload (--known-mass) brings that to {100 * min(masses):.1g} %."
         )
-    if not parallel and prior.encoder_zero_rad:
+    if prior.encoder_zero_rad:
         reach = max(float(np.max(np.linalg.norm(shared.grasps.p_1i, axis=1))) for shared in carried)
         degrees = np.rad2deg(prior.encoder_zero_rad)
         out.append(

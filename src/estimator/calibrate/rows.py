@@ -126,14 +126,8 @@ class Rows:
             np.array(length, dtype=np.intp),
             travel * span[:, None, None],
             rate,
-            _repeats(angles[~still & _within(len(angles), trim)], rate),
+            _repeats(angles[trim : len(angles) - trim][~still[trim : len(angles) - trim]], rate),
         )
-
-
-def _within(samples: int, trim: int) -> NDArray[np.bool_]:
-    """Samples that are not trimmed, shape (Q,)."""
-    at = np.arange(samples)
-    return (at >= trim) & (at < samples - trim)
 
 
 def _repeats(angles: Array, rate_hz: float) -> Array | float:

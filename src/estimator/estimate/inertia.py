@@ -357,8 +357,4 @@ def by_upstream(
 def thinned(trials: Sequence[GraspData]) -> list[GraspData]:
     """Every so-and-so-many-th sample of the trials, about a thousand in all."""
     stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
-    names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
-    return [
-        replace(t, rate_hz=t.rate_hz / stride, **{name: getattr(t, name)[::stride] for name in names})
-        for t in trials
-    ]
+    return [trial.every(stride) for trial in trials]

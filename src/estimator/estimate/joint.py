@@ -32,7 +32,7 @@ from estimator.estimate.uncertainty import (
     window_covariance,
     window_normals,
 )
-from estimator.rigid_team import BodyMotion, acceleration_noise, fuse, newton_euler_regressor, tilt_scatter
+from estimator.rigid_team import acceleration_noise, payload_equations, tilt_scatter
 from estimator.signals import GraspData
 from estimator.statistics import rms
 
@@ -74,8 +74,7 @@ def estimate_joint(
     Raises:
         InputError: the robots do not carry anything (the mass comes out as zero or negative).
     """
-    motions = [fuse(trial, grasps) for trial in trials]
-    Y, w, used = _equations(motions, trials)
+    Y, w = _equations(trials, grasps)
     gravity = trials[0].gravity_mps2
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
     inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise)
@@ -88,7 +87,7 @@ def estimate_joint(
         "the payload hardly tilts about any axis across it",
     )  # fmt: skip
 
-    scale = np.sqrt(np.einsum("qrk,qrk->k", Y, Y) / used)
+    scale = np.sqrt(np.einsum("qrk,qrk->k", Y, Y) / len(w))
     scale[scale == 0] = 1.0
     parts = trial_windows(trials)
     J_weighted = weights[:, None] * Y
@@ -98,8 +97,7 @@ def estimate_joint(
     covariance = _open_covariance(normals, scores) / np.outer(scale, scale)
 
     def moved(x: Array) -> Array:
-        equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
-        return about_com(_solve(equations[0], equations[1], weights))
+        return about_com(_solve(*_equations(thin, grasps.moved(x)), weights))
 
     # All ten stay in the fit, however weak: what is not reported is an uncertainty of what is.
     thin = thinned(trials)
@@ -137,16 +135,10 @@ def _open_covariance(normals: Array, scores: Array) -> Array:
     return told @ window_covariance(told.T @ normals @ told, scores @ told) @ told.T + _OPEN * open_ @ open_.T
 
 
-def _equations(motions: Sequence[BodyMotion], trials: Sequence[GraspData]) -> tuple[Array, Array, int]:
-    """Regressor (Q, 6, 10), wrench (Q, 6) as (f, M), and Q over all trials."""
-    Y = np.concatenate(
-        [
-            newton_euler_regressor(m.omega, m.alpha, m.acceleration + trial.gravity_mps2 * m.up)
-            for m, trial in zip(motions, trials, strict=True)
-        ]
-    )
-    w = np.concatenate([np.concatenate([m.force, m.moment], axis=1) for m in motions])
-    return Y, w, len(w)
+def _equations(trials: Sequence[GraspData], grasps: GraspEstimate) -> tuple[Array, Array]:
+    """Regressor (Q, 6, 10) and wrench (Q, 6) as (f, M) over all trials."""
+    parts = [payload_equations(trial, grasps) for trial in trials]
+    return np.concatenate([Y for Y, _ in parts]), np.concatenate([w for _, w in parts])
 
 
 def _solve(Y: Array, w: Array, weights: Array) -> Array:

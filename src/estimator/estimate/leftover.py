@@ -30,7 +30,7 @@ from estimator.arrays import Array
 from estimator.estimate.grasps import GraspEstimate
 from estimator.quantisation import quantisation_step, rounding_step
 from estimator.recording.model import Recording
-from estimator.rigid_team import fuse, newton_euler_regressor
+from estimator.rigid_team import payload_equations
 from estimator.signals import BATCH_S, GraspData, Hold
 from estimator.statistics import rms_length
 
@@ -150,17 +150,18 @@ def left_over(data: GraspData, grasps: GraspEstimate, steps: Steps) -> tuple[Lef
     """What the best rigid payload leaves of a recording: gaps at the flanges (none for one robot), forces, moments."""
     lag = max(2, round(0.5 * data.rate_hz / steps.cutoff_hz))
     stride = lag // 2  # the filter leaves nothing that needs more samples
-    names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
-    data = replace(
-        data, rate_hz=data.rate_hz / stride, **{name: getattr(data, name)[::stride] for name in names}
-    )
+    data = data.every(stride)
     lag //= stride
     rotation, position = _rounding(grasps, steps)
-    force, moment = _balance(data, grasps)
+    # Forces and moments about {1} that no ten inertial parameters explain, shape (Q, 6).
+    wrench = _rest(*payload_equations(data, grasps))
     per_force = np.sqrt(3 * grasps.robots / 12) * steps.tau_Nm / steps.arm_m
     levers = grasps.p_1i - grasps.p_1i.mean(axis=0)
     reach = float(np.sqrt(np.mean(np.sum(levers**2, axis=1)) * 2 / 3))
-    parts = [("force", "N", force[None], per_force), ("moment", "N m", moment[None], per_force * reach)]
+    parts = [
+        ("force", "N", wrench[None, :, :3], per_force),
+        ("moment", "N m", wrench[None, :, 3:], per_force * reach),
+    ]
     if grasps.robots > 1:
         turned, apart = _closure(data, grasps)
         parts = [
@@ -197,15 +198,6 @@ def _closure(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Array]:
         gap = data.p_bi[:, 0] + R_b1 @ grasps.p_1i[i] - heading.apply(data.p_bi[:, i])
         apart.append(_rest(np.concatenate([R_b1, np.broadcast_to(np.eye(3), R_b1.shape)], axis=2), gap))
     return np.array(turned), np.array(apart)
-
-
-def _balance(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Forces [N] and moments about {1} [N m] that no ten inertial parameters explain, shape (Q, 3) each."""
-    motion = fuse(data, grasps)
-    specific = motion.acceleration + data.gravity_mps2 * motion.up
-    Y = newton_euler_regressor(motion.omega, motion.alpha, specific)
-    rest = _rest(Y, np.concatenate([motion.force, motion.moment], axis=1))
-    return rest[:, :3], rest[:, 3:]
 
 
 def _rest(A: Array, b: Array) -> Array:

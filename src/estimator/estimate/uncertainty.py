@@ -208,7 +208,6 @@ def judge(
     words: str = "",
     frame: str = "",
     floor: float = 0.0,
-    factor: float = FACTOR,
 ) -> StepReport:
     """Compare the singular values of a regressor to its noise.
 
@@ -221,12 +220,11 @@ def judge(
         reason: what to say of a weak direction.
         words, frame: what introduces a direction of space (K = 3), and its frame, such as ``"along"`` and ``"{1}"``.
         floor: smallest singular value that is not rounding error, same unit.
-        factor: least determined ratio of a singular value to ``noise``.
     """
     values, vectors = np.linalg.eigh(information)
     values, vectors = np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1]
     # Squaring in the normal matrix leaves no digits below sqrt(eps) of the largest value.
-    limit = max(factor * noise, floor, 3e-8 * values[0])
+    limit = max(FACTOR * noise, floor, 3e-8 * values[0])
     weak = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value > limit:

@@ -301,7 +301,7 @@ def test_rounding_error_is_no_excitation():
 
 
 def test_judge_reports_values_rank_condition_and_words():
-    report = judge("step", ("u", "v"), np.diag([4.0, 0.01]), 0.05, unit="m", reason="because", factor=3.0)
+    report = judge("step", ("u", "v"), np.diag([4.0, 0.01]), 0.05, unit="m", reason="because")
     assert report.singular_values == pytest.approx((2.0, 0.1))
     assert report.condition == pytest.approx(20)
     assert report.rank == 1
@@ -493,7 +493,6 @@ def judged(values: list[float], noise: float, **options: float) -> StepReport:
 def test_three_times_the_noise_is_determined() -> None:
     assert judged([1.0, 0.5, 0.301], 0.1).rank == 3
     assert judged([1.0, 0.5, 0.299], 0.1).rank == 2
-    assert judged([1.0, 0.5, 0.3], 0.1, factor=2.0).rank == 3
     assert judged([1.0, 0.5, 0.3], 0.0, floor=0.31).rank == 2
     assert judged([1.0, 1e-7, 2e-8], 0.0).rank == 2  # no digits are left of the last
     assert judged([1.0, 0.5, 0.0], 0.0).condition == float("inf")
