@@ -216,8 +216,8 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
     """A temporary folder that takes the place of ``path`` when the block ends without an error.
 
     Missing folders above it are made. What cannot be written inside is told by its place in ``path``. The folder gets
-    a list of what is in it, with the kind of result. Of one that it replaces, what its list has is removed; everything
-    else is kept, and has ``.kept`` behind its name where the new folder has the same one.
+    a list of what is in it, with the kind of result. What the list of a replaced folder has is removed; everything else
+    is kept, and has ``.kept`` behind its name where the new folder has the same one.
 
     Raises:
         InputError: it cannot be created or put in place.

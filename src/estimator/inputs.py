@@ -20,7 +20,7 @@ from estimator.errors import InputError
 DEEPEST = 64
 """Most levels of a file's values, and parts of a key in TOML: beyond, parsers take minutes or fail."""
 MOST_BITS = 4096
-"""Of a whole number: Python does not print much larger ones."""
+"""Longest whole number: Python does not print much larger ones."""
 TOML_BYTES, JSON_BYTES = 1 << 20, 64 << 20
 _DOTTED = re.compile(rf"""(?:(?:(?<![\w-])[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 

@@ -81,7 +81,7 @@ class Repeats:
 
 _LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
 _OFF = 0.05  # of a step
-# Of the largest value, by which one may come out as two: in rounding, in a log of ten digits.
+# Share of the largest value by which one may come out as two: in rounding, in a log of ten digits.
 _ONE_VALUE = (1e-12, 1e-9)
 
 
@@ -225,7 +225,7 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
         there = np.zeros(len(own), dtype=bool)
         for start, stop in spans:
             there[start:stop] = True
-        # Of readings that may have had any value on the joint's way.
+        # Against readings that may have had any value on the joint's way.
         nats = sum((b - a) * np.log1p(abs(own[b] - own[a]) / step) for a, b in spans)
         found.append(Held(column, tuple(spans), float(nats)))
         cubic, quintic = (_interpolated(own, there, order) for order in (3, 5))

@@ -216,8 +216,8 @@ def _sphere_intersection(centres: Array, design: Arms) -> tuple[Array, Array, Ar
 
 
 MAX_CONDITION = 1e4
-"""Of dh/dphi: beyond it the arm counts as singular. Within the Omnid's joint limits it stays below 20; at the bound,
-rounding grows from 1e-16 to 1e-12."""
+"""Condition of dh/dphi beyond which the arm counts as singular. Within the Omnid's joint limits it stays below 20; at
+the bound, rounding grows from 1e-16 to 1e-12."""
 _SAME_M = 1e-6  # wrist positions closer than this are one
 
 

@@ -50,7 +50,7 @@ _AXES = np.eye(3)[:, :2]
 
 
 def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array]:
-    """Of the loops' 6 (N - 1) channels; n rows.
+    """Derivatives of the loops' 6 (N - 1) channels; n rows.
 
     Returns:
         By the robots' deviations, shape (n, 6 (N - 1), N, ``COUNT``), by ``Shared.moved``, (n, ., 6 (N - 1) + 10), and
@@ -202,7 +202,7 @@ class TrialEquations:
 
     @classmethod
     def of(cls, rows: Rows, sensing: Sensing, *, held: bool = False) -> TrialEquations:
-        """Of a trial whose sensors are known."""
+        """Equations of a trial whose sensors are known."""
         mean = rows(rows.s)
         # A hold is at rest: what rates it shows are noise.
         mean[rows.moving :, :, 3:9] = mean[rows.moving :, :, 12:18] = 0.0
@@ -407,7 +407,7 @@ class AloneEquations:
 
     @classmethod
     def of(cls, rows: Rows, sensing: Sensing) -> AloneEquations:
-        """Of a recording whose sensors are known."""
+        """Equations of a recording whose sensors are known."""
         mean = rows(rows.s)
         mean[rows.moving :, :, 3:9] = 0.0
         return cls(rows, sensing.variances(rows), mean)

@@ -148,7 +148,7 @@ def _repeats(angles: Array, rate_hz: float) -> Array | float:
     shares = np.array([np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0) for lag in lags])
     if not len(lags) or shares.mean(axis=(1, 2)).max() < rules.REPEATED:
         return 1.0
-    # Of multiples of the period, the shortest after which a joint reads much the same: a slow one after any.
+    # The shortest multiple of the period after which a joint reads much the same: a slow one does after any.
     first = np.argmax(shares > 0.8 * shares.max(axis=0), axis=0)
     again = 1.0 + np.take_along_axis(shares, first[None], axis=0)[0] * (len(angles) / lags[first] - 1.0)
     return np.concatenate([again, again[:, :3]], axis=1)
@@ -212,7 +212,7 @@ class Resolution(NamedTuple):
 
     @classmethod
     def of(cls, recording: Recording) -> Resolution:
-        """Of one recording."""
+        """What one recording says."""
         step, white = _steps(recording), _white(recording)
         if recording.metadata.sampling is None:
             # The ripple of a slow joint's rounding is no noise: without noise, no reading goes to and fro.

@@ -107,7 +107,7 @@ def rounded(step: float, noise: Array) -> Array:
 
 
 def _coarsest(recording: Recording, kind: int) -> float | None:
-    """Of phi (0), theta (1) or tau (2) of all robots: as told, or as the samples show; None where neither does."""
+    """Coarsest step of phi (0), theta (1) or tau (2) of all robots, as told or as samples show; None where not."""
     told = recording.metadata.sampling
     if told is not None:
         return max(step for sampling in told for step in sampling.steps_of(kind)) or None

@@ -91,7 +91,7 @@ def test_inverse_kinematics_is_the_inverse():
 
 
 def test_knees_point_outward():
-    """Of the two knees that fit, the one farther from the robot's centre line through the leg's plane."""
+    """The one of two knees that fit which is farther from the robot's centre line through the leg's plane."""
     below = HS * [1, 1, -1]  # the same with the robot hanging: a mirror image
     assert inverse_kinematics(below, DESIGN) == pytest.approx(-PHIS, abs=1e-12)
     for phi, h in zip(PHIS, HS, strict=True):

@@ -254,9 +254,9 @@ def test_errors_of_held_robots_go_on_to_the_payload(recording: Recording, design
         )
         for c in (designed, held)
     )
-    foretold = np.sqrt(sd**2 - sd_before**2)
+    predicted = np.sqrt(sd**2 - sd_before**2)
     large = np.abs(change) > 0.05 * np.abs(change).max()
-    np.testing.assert_allclose(foretold[large], np.abs(change)[large], rtol=0.03)
+    np.testing.assert_allclose(predicted[large], np.abs(change)[large], rtol=0.03)
 
 
 def test_common_spring_scale_goes_on(recording: Recording, designed: Calibration) -> None:

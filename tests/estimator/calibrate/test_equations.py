@@ -122,7 +122,7 @@ def test_ripple_of_slow_rounding_is_no_noise():
 
 
 def test_each_joint_has_its_own_rounding_errors_again():
-    """Of a cycle that is no whole number of samples, a slow joint's readings come again, and a fast one's do not."""
+    """Where a cycle is no whole number of samples, a slow joint's readings come again, and a fast one's do not."""
     time, step = np.arange(0, 44, 0.01), 1e-4
     angle = 2 * np.pi * 0.6037 * time
     trial = recording_of(np.round(0.1 * np.sin(angle) / step) * step)

@@ -228,7 +228,7 @@ def test_changes_with_a_weight_that_is_held() -> None:
 
 
 def test_inertia_by_errors_of_grasps_and_centre_of_mass() -> None:
-    """Of data that fit no inertia: residuals count in the derivative, too."""
+    """Where data fit no inertia, residuals count in the derivative, too."""
     rng = np.random.default_rng(3)
     held, p_1c, by_grasps = grasps(), np.array([0.1, -0.2, 0.3]), rng.normal(size=(3, K))
     data = [motion(200), motion(150)]
