@@ -42,8 +42,8 @@ from estimator.statistics import rms
 
 CUTOFF_HZ = 0.7
 """Cut-off of the first-order low-pass, run forward and backward. White noise of encoders grows in proportion to
-frequency in rates: from about here on the filter turns rates into something like angles, in which that noise is even, and the motion
-of a payload ends below 1 Hz. Sharper filters at 1 to 3 Hz scatter 1.0 to 1.6 times as much."""
+frequency in rates: from about here on the filter turns rates into something like angles, in which that noise is even,
+and the motion of a payload ends below 1 Hz. Sharper filters at 1 to 3 Hz scatter 1.0 to 1.6 times as much."""
 TRIM_S = 2.0
 """Dropped at both ends of a stream against transients of the filter [s]."""
 STEP_LIMIT_S = 0.5

@@ -157,12 +157,10 @@ _MARGIN_S = 0.5
 
 @dataclass(frozen=True)
 class Hold:
-    """Mean pose and wrench of one static hold.
+    """Mean orientation R_bi (N, 3, 3) and wrench (m_i, f_i) in {i} (N, 6) of one static hold.
 
     Attributes:
         start_s, end_s: first and last sample time of the hold [s].
-        R_bi: mean orientation of {i} in {b}, shape (N, 3, 3).
-        wrench: mean wrench (m_i, f_i) in {i} [N m, N], shape (N, 6).
         batches: means of the wrench over consecutive half seconds, shape (batches, N, 6); their scatter is
             the measurement noise within the hold.
         rounding_N2: variance of every component of a robot's mean force that rounding leaves [N^2].

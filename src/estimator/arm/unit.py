@@ -66,11 +66,6 @@ class ArmUnit:
     design: OmnidDesign
     x: Array
 
-    @classmethod
-    def as_designed(cls, design: OmnidDesign) -> ArmUnit:
-        """No deviation."""
-        return cls(design, np.zeros(COUNT))
-
     def of(self, name: str) -> Array:
         """Deviations of one group, shape (..., entries)."""
         return self.x[..., AT[name]]

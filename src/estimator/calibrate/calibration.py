@@ -144,7 +144,6 @@ class CalibratedTrial:
     """How well one recording fits; pairs are (loops, balance), chi2 over the numbers compared.
 
     Attributes:
-        name: the recording's.
         kind: "random", "periodic", "static" or "free".
         payload: index into ``Calibration.payloads``, or None.
         duration_s: evaluated length [s].

@@ -42,9 +42,7 @@ class Trial:
 
     Attributes:
         name: how messages call it.
-        kind: ``"random"``, ``"periodic"`` or ``"static"``.
-        payload: label of the payload, or None.
-        data: the data points.
+        kind, payload: ``"random"``, ``"periodic"`` or ``"static"``; label of the payload, or None.
         steps: rounding of its channels, or None where nobody asks whether the robots contradict each other.
         team: number of robots that carried the payload, as far as the metadata say.
         units: the robots as they are, or None for robots as designed.
@@ -224,9 +222,7 @@ poorly calibrated robots leave up to 0.04, random trials with one robot of three
 def withheld(estimate: PayloadEstimate, team: int) -> PayloadEstimate:
     """The estimate without what its balance does not bear out, and with the reason among the flags.
 
-    Args:
-        estimate: as its equations have it.
-        team: number of robots that carry the payload, as far as the recordings say.
+    ``team`` robots carry the payload, as far as the recordings say.
     """
     if estimate.mass is None:
         return estimate

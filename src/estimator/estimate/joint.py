@@ -62,11 +62,7 @@ class JointEstimate:
 def estimate_joint(
     trials: Sequence[GraspData], grasps: GraspEstimate
 ) -> tuple[JointEstimate, tuple[StepReport, ...]]:
-    """Ten inertial parameters from any motion; fewer are reported when the motion is poor.
-
-    Args:
-        trials: one or several trials of the same payload and N >= 1 robots, holds included.
-        grasps: the grasp frames.
+    """Ten inertial parameters from any motion of one payload, holds included; fewer where the motion is poor.
 
     Returns:
         The estimate and the reports on the centre of mass and the inertia.

@@ -71,12 +71,10 @@ class RecordingEstimate:
     """What one recording alone says, given the pooled grasps and (staged) the pooled centre of mass.
 
     Attributes:
-        name: the recording's name.
         trial: ``"random"``, ``"periodic"`` or ``"static"``.
         duration_s: evaluated length [s].
         holds: number of static holds found.
-        grasps: grasp frames from this recording alone, or None where it does not determine them.
-        inertia: inertia from this recording alone, or None.
+        grasps, inertia: from this recording alone, or None where it does not determine them.
         force_residual: rms of f - m (a_c + g up) over m g, or None without a mass and a centre of mass.
         moment_residual_m: rms moment about the centre of mass that the inertia leaves, over m g [m]: the
             error of the centre of mass that would explain it; None where it cannot be told.
@@ -119,17 +117,12 @@ class PayloadEstimate:
     """Grasps, mass, centre of mass and inertia of one payload; None marks what the data do not determine.
 
     Attributes:
-        payload: the recordings' payload label, or None.
-        robots: number of robots N.
         method: ``"fit"`` (one fit of loops and balance), ``"staged"`` (the paper's), ``"joint"``, or ``"calibrated"``
             (found with the robots' calibration).
         grasps: grasp frames pooled over the recordings.
-        mass: mass with its standard error.
-        p_1c: centre of mass in {1} [m], shape (3,).
-        p_1c_covariance: its covariance [m^2], shape (3, 3).
-        inertia: inertia in {b} and its principal axes, pooled over the recordings with motion.
+        p_1c, p_1c_covariance: centre of mass in {1} [m], shape (3,), and its covariance [m^2], shape (3, 3).
+        inertia: in {b}, with its principal axes, pooled over the recordings with motion.
         steps: excitation of every step.
-        recordings: per-recording results, in the order given.
         flags: what a reader should know before trusting the numbers, one sentence each.
         units: the robots as they were taken to be, or None for robots as designed.
         open: what the robots' calibration does not decide, one sentence each; standard errors have no more of it in

@@ -43,11 +43,9 @@ class MassEstimate:
 
 @dataclass(frozen=True)
 class ComEstimate:
-    """Mass and centre of mass from the holds, with their common covariance.
+    """Mass [kg] and centre of mass in {1} [m] from the holds, with their common covariance.
 
     Attributes:
-        mass: the mass it goes with [kg].
-        p_1c: centre of mass in {1} [m], shape (3,).
         covariance: of (m [kg], p_1c [m]), grasp errors included, shape (4, 4).
         own_covariance: the same without the part due to the grasps.
         grasp_jacobian: derivative of p_1c by the grasp errors of ``GraspEstimate``, shape (3, 6(N-1)).

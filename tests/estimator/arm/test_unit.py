@@ -38,7 +38,7 @@ TILT = np.array([0.02, -0.03])
 
 def unit_of(built: AsBuilt, tilt=(0.0, 0.0)) -> ArmUnit:
     """The same deviations by the estimator's names."""
-    unit = ArmUnit.as_designed(DESIGN)
+    unit = ArmUnit(DESIGN, np.zeros(COUNT))
     unit.x[AT["phi_zero"]], unit.x[AT["theta_zero"]] = built.phi_zero_rad, built.theta_zero_rad
     unit.x[AT["radius"]] = built.base_radius_m - built.platform_radius_m
     unit.x[AT["proximal_length"]], unit.x[AT["rod_length"]] = built.proximal_length_m, built.rod_length_m
@@ -94,7 +94,7 @@ def test_force_on_the_payload(seed, tilt):
     wrench = wrench_on_payload(phi, theta, tau, unit)
     assert wrench[3:] == pytest.approx(rotation(theta[0]).T @ f_a, abs=1e-8)
     assert wrench[:3] == pytest.approx(m_i, abs=1e-11)
-    as_designed = wrench_on_payload(phi, theta, tau, ArmUnit.as_designed(DESIGN))
+    as_designed = wrench_on_payload(phi, theta, tau, ArmUnit(DESIGN, np.zeros(COUNT)))
     assert np.abs(as_designed - wrench).max() > 0.05
 
 
