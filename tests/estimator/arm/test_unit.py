@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque, rotation, wrench_on_payload
-from estimator.arm.unit import AT, GROUPS, ArmUnit
+from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
 from estimator.calibrate.equations import corrected
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
