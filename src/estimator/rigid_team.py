@@ -193,7 +193,7 @@ def _ratio(grasps: GraspEstimate) -> tuple[float, Array]:
 
 
 def fusion_with(grasps: GraspEstimate, ratio: float) -> Array:
-    """The same with linear residuals weighted by ``ratio`` [rad/m], angular ones by 1."""
+    """``fusion_matrix`` with linear residuals weighted by ``ratio`` [rad/m], angular ones by 1."""
     weights = np.array([1.0, 1.0, 1.0, ratio, ratio, ratio])
     H = (weights[:, None] * _adjoint_inverses(grasps)).reshape(-1, 6)
     return np.asarray(np.linalg.pinv(H) * np.tile(weights, grasps.robots), dtype=float)
@@ -235,7 +235,7 @@ def fused_up(R_bi: Array, grasps: GraspEstimate) -> Array:
 
 
 def robot_up(R_bi: Array, grasps: GraspEstimate) -> Array:
-    """The same by each robot alone: R_1i R_bi^T z, shape (Q, N, 3)."""
+    """Unit vector against gravity in {1} by each robot alone: R_1i R_bi^T z, shape (Q, N, 3)."""
     return np.einsum("iab,qib->qia", grasps.R_1i, R_bi[..., 2, :])
 
 
@@ -321,7 +321,7 @@ def pose_residual(phi: Array, theta: Array, shared: Shared, bases: Bases, arms: 
 
 
 def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
-    """The same from R_bi (Q, N, 3, 3) and h (Q, N, 3)."""
+    """``pose_residual`` from R_bi (Q, N, 3, 3) and h (Q, N, 3)."""
     grasps = shared.grasps
     parts = []
     for i in range(1, grasps.robots):

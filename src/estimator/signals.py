@@ -78,7 +78,7 @@ class GraspData:
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
     def every(self, stride: int) -> GraspData:
-        """Every so-and-so-many-th sample."""
+        """One sample in ``stride``."""
         return replace(self.at(slice(None, None, stride)), rate_hz=self.rate_hz / stride)
 
 

@@ -245,7 +245,7 @@ class Problem:
     """
 
     def __init__(self, given: Given) -> None:
-        """On every so-and-so-many-th row, ``rules.COARSE_ROWS`` in all."""
+        """On evenly spaced rows first, ``rules.COARSE_ROWS`` in all."""
         self._given, start = given, given.start
         self.layout = layout = Layout(len(start.units.x), len(start.carried), len(given.trials))
         of_units = np.zeros((layout.of_units.stop, 0))
@@ -380,7 +380,7 @@ class _Block:
 
 
 def _equations(trial: CarriedTrial, every: int, *, held: bool) -> list[TrialEquations]:
-    """Equations of every so-and-so-many-th row, in blocks; robots that are held need no derivatives."""
+    """Equations of one row in ``every``, in blocks; robots that are held need no derivatives."""
     chosen = np.arange(0, len(trial.rows.time), every)
     parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
     return [TrialEquations.of(trial.rows.take(part), trial.sensing, held=held) for part in parts]

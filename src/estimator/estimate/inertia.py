@@ -355,6 +355,6 @@ def by_upstream(
 
 
 def thinned(trials: Sequence[GraspData]) -> list[GraspData]:
-    """Every so-and-so-many-th sample of the trials, about a thousand in all."""
+    """Evenly spaced samples of the trials, about a thousand in all."""
     stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
     return [trial.every(stride) for trial in trials]
