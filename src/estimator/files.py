@@ -361,7 +361,7 @@ def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
 
 
 def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *, compress: bool) -> None:
-    """Write plain values and arrays.
+    """Write plain values and arrays to one NPZ file, without pickles: ``facts`` is the bytes of a JSON text.
 
     Raises:
         OSError: it cannot be written.

@@ -1,8 +1,9 @@
-"""Static holds: stretches in which the payload does not move and the measured forces stay constant.
+"""The data points of a recording (paper, sections II and IV.B), and its static holds.
 
-The paper takes data "when the measured forces along all axes remained constant (with a tolerance of 0.01 N)
-for a continuous duration of six seconds". With torque noise of 0.01 N m the forces scatter by 0.016 N rms
-even after filtering, and the bare criterion never fires. Here a window of six seconds is part of a hold when
+In a hold the payload does not move and the measured forces stay constant. The paper takes data "when the measured forces
+along all axes remained constant (with a tolerance of 0.01 N) for a continuous duration of six seconds". With torque
+noise of 0.01 N m the forces scatter by 0.016 N rms even after filtering, and the bare criterion never fires. Here a
+window of six seconds is part of a hold when
 
 * every force component stays within +-(0.01 N + 5 sigma) of its mid-range, where sigma is that component's
   noise in the window, from its second differences over 0.1 s (blind to drift and to slow motion), as the

@@ -15,12 +15,9 @@ from estimator.so3 import cross, times
 
 
 class Kind(NamedTuple):
-    """Three of them.
+    """Three of the 21 numbers that describe one robot at an instant, one a joint.
 
-    Attributes:
-        name: what they are.
-        unit: theirs.
-        step: by which they are moved for a central difference.
+    ``step`` is that by which they are moved for a central difference, in their unit.
     """
 
     name: str
@@ -105,7 +102,12 @@ _Wrist = tuple[Array, Array, Array, Array]
 
 
 class ArmChanges:
-    """Derivatives of ``robot_data`` of one arm at n instants."""
+    """Derivatives of ``robot_data`` of one arm at n instants.
+
+    Differences of what is not linear, each taken where it arises: driven angles move the legs alone, gimbal angles the
+    gimbal alone, and masses the torques of the arm alone. What follows from there (see ``arm_data``) is linear, and so
+    are accelerations and torques.
+    """
 
     def __init__(self, s: Array, unit: ArmUnit) -> None:
         """At true signals s, shape (n, ``SLOTS``), which the arm must reach."""

@@ -393,7 +393,7 @@ _UNIT_STEPS = np.concatenate([np.full(11, 1e-6), np.full(7, 1e-4)])
 
 @dataclass(frozen=True, eq=False)
 class AloneEquations:
-    """Rows of one recording of unloaded arms.
+    """Rows of one recording of unloaded arms, whose inverse dynamics must give the springs' torques.
 
     Attributes:
         rows: its signals, and how they are averaged.

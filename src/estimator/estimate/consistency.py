@@ -222,6 +222,7 @@ poorly calibrated robots leave up to 0.04, random trials with one robot of three
 def withheld(estimate: PayloadEstimate, team: int) -> PayloadEstimate:
     """The estimate without what its balance does not bear out, and with the reason among the flags.
 
+    Robots that carry a payload in part know the part they carry: they make a mass of it that looks as good as any.
     ``team`` robots carry the payload, as far as the recordings say.
     """
     if estimate.mass is None:

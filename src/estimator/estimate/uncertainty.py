@@ -108,7 +108,10 @@ def standard_errors(covariance: Array) -> Array:
 
 
 FACTOR = 3.0
-"""Signal over noise (rms over rms) below which a direction is not determined."""
+"""Signal over noise (rms over rms) below which a direction of parameter space is not determined.
+
+Sample counts do not enter: averaging cannot repair a regressor that is mostly noise (it biases the estimate toward
+zero), while tiny motions measured without noise are fine."""
 
 
 @dataclass(frozen=True)
