@@ -1,6 +1,6 @@
 """The data points of a recording (paper, sections II and IV.B), and its static holds.
 
-In a hold the payload does not move and the measured forces stay constant. The paper takes data "when the measured forces
+In a hold the payload does not move and forces stay constant. The paper takes data "when the measured forces
 along all axes remained constant (with a tolerance of 0.01 N) for a continuous duration of six seconds". With torque
 noise of 0.01 N m the forces scatter by 0.016 N rms even after filtering, and the bare criterion never fires. Here a
 window of six seconds is part of a hold when
