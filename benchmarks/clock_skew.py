@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from estimator.clocks.offsets import ClockEstimate, Rates, recorded_clocks
+from estimator.clocks import ClockEstimate, Rates, recorded_clocks
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording

@@ -12,7 +12,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import mocobot
-from estimator.leftover.contradiction import CONTRADICTS
+from estimator.estimate.leftover import CONTRADICTS
 from mocobot_logs.convert import write_converted
 
 SHORT = {"random": {"vias": 16}, "periodic": {"duration_s": 20.0}, "static": {}}

@@ -35,18 +35,15 @@ from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.equations.level import corrected
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.equations.trial import TrialEquations
-from estimator.calibrate.fit import Quadratic
-from estimator.calibrate.prior import Prior
-from estimator.calibrate.unknowns import Layout
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.equations import TrialEquations, corrected
+from estimator.calibrate.least_squares import Layout, Quadratic
+from estimator.calibrate.rows import Rows, Sensing
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.payload import estimate_payload
 from estimator.filtering import differentiate, low_pass
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared, robot_data, start_bases
+from estimator.rigid_team import Shared, robot_data, start_bases
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 from mocobot_sim.trial.trial_log import TrialLog

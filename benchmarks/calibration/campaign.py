@@ -16,8 +16,7 @@ from calibration.score import of_estimate, score, score_calibration
 from calibration.teams import TILT_RAD, Team
 from calibration.truth import Truth
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Calibration, Prior
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from mocobot_sim.errors import TrialError

@@ -10,10 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from calibration.truth import Truth, centred, principal
 from estimator.arm.unit import AT
-from estimator.arrays import Array
+from estimator.arrays import Array, inertia_parameters
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.principal import inertia_parameters
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 
 CENTRED = {"m": slice(0, 1), "com": slice(1, 4), "I": slice(4, 10)}

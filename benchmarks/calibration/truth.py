@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import AT, COUNT
-from estimator.arrays import Array
-from estimator.estimate.principal import inertia_matrix, inertia_parameters
+from estimator.arrays import Array, inertia_matrix, inertia_parameters
 
 
 @dataclass(frozen=True)

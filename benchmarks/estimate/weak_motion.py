@@ -18,8 +18,7 @@ import tyro
 from scipy.spatial.transform import Rotation
 
 import mocobot
-from estimator.arrays import Array
-from estimator.estimate.principal import inertia_parameters
+from estimator.arrays import Array, inertia_parameters
 from estimator.recording.model import Recording
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial import trajectories as paths

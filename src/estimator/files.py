@@ -1,40 +1,106 @@
 """Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
 
+from __future__ import annotations
+
 import errno
 import json
 import os
+import re
 import shutil
+import socket
 import tempfile
+import threading
+import time
+import uuid
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from estimator.errors import InputError
-from estimator.inputs import file_sha256, printable
-from estimator.processes import scratch_name
+from estimator.inputs import Unpacked, file_sha256, open_input, plain, printable
 from estimator.strict import read_json
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_HOST = re.sub(r"\W", "", socket.gethostname())[:40]
+_NAME = re.compile(rf"\.mocobot-{_HOST}-(\d{{1,9}})-[0-9a-f]{{8}}\.tmp")
+_swept: set[Path] = set()
+
+
+def scratch_name(folder: Path) -> Path:
+    """A name in a folder that nothing has and that tells whose it is; scraps of dead processes there are removed."""
+    if folder not in _swept:
+        _swept.add(folder)
+        with suppress(OSError):
+            for path in folder.iterdir():
+                found = _NAME.fullmatch(path.name)
+                if found and not _is_alive(int(found[1])) and not path.with_suffix(".old").exists():
+                    _remove(path)
+    return folder / f".mocobot-{_HOST}-{os.getpid()}-{uuid.uuid4().hex[:8]}.tmp"
+
+
+@contextmanager
+def scratch_folder(where: Path | None = None) -> Iterator[Path]:
+    """A folder that lasts as long as the block, in ``where`` or in the system's folder for temporary files."""
+    path = scratch_name(Path(tempfile.gettempdir()) if where is None else where)
+    path.mkdir(mode=0o700)
+    try:
+        yield path
+    finally:
+        _remove(path)
+
+
+def _remove(path: Path) -> None:
+    shutil.rmtree(path, ignore_errors=True)  # neither files nor links
+    with suppress(OSError):
+        path.unlink()
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except OSError as error:
+        return error.errno != errno.ESRCH  # another user's
+    return True
+
+
+EVERY_S = 0.5
+
+
+def end_with(parent: int) -> None:
+    """End this process soon after its parent has ended, however that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(EVERY_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def ends_with_this() -> Mapping[str, Any]:
+    """What makes the workers of ``joblib.Parallel`` end with this process."""
+    return {"initializer": end_with, "initargs": (os.getpid(),)}
+
 
 LIST, FORMAT = ".mocobot-files", "mocobot-files"
 """The list: {format, kind: of the result, files: {path in the folder: SHA-256}}."""
 
 
 def list_written(folder: Path, kind: str) -> None:
-    """Write the list of all that a new folder holds.
-
-    Args:
-        folder: which nobody else has written into yet.
-        kind: of the result, such as ``diagnosis``.
-    """
+    """Write the list of all that a new folder holds, whose result is of a kind such as ``diagnosis``."""
     files = {str(path.relative_to(folder)): _digest(path) for path in _entries(folder)}
-    _write(folder, {"format": FORMAT, "kind": kind, "files": files})
+    write_json(folder / LIST, {"format": FORMAT, "kind": kind, "files": files})
 
 
 def add_written(path: Path) -> None:
     """Add a file that was written into a folder later to the folder's list, if there is one."""
     if values := _read(path.parent):
         values["files"][path.name] = _digest(path)
-        _write(path.parent, values)
+        write_json(path.parent / LIST, values)
 
 
 def holds(kind: str) -> Callable[[Path], bool]:
@@ -98,10 +164,6 @@ def _digest(path: Path) -> str:
     return ""
 
 
-def _write(folder: Path, values: dict[str, Any]) -> None:
-    (folder / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-
-
 def _read(folder: Path) -> dict[str, Any]:
     """The list; empty if there is none that can be used."""
     with suppress(InputError):
@@ -154,12 +216,8 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
     """A temporary folder that takes the place of ``path`` when the block ends without an error.
 
     Missing folders above it are made. What cannot be written inside is told by its place in ``path``. The folder gets
-    a list of what is in it. Of one that it replaces, what its list has is removed; everything else is kept, and has
-    ``.kept`` behind its name where the new folder has the same one.
-
-    Args:
-        path: the folder.
-        kind: of result, for the list (``estimator.files``).
+    a list of what is in it, with the kind of result. What the list of a replaced folder has is removed; everything else
+    is kept, and has ``.kept`` behind its name where the new folder has the same one.
 
     Raises:
         InputError: it cannot be created or put in place.
@@ -229,9 +287,7 @@ def check_place(path: Path) -> None:
 def check_target(path: Path, suffix: str = "") -> None:
     """Find out that a file cannot be written before the work is done whose result it would hold.
 
-    Args:
-        path: the file.
-        suffix: how its name must end, ``".html"`` for example; any name will do if empty.
+    Its name must end in ``suffix``, such as ``".html"``; any name will do if that is empty.
 
     Raises:
         InputError: the target is a folder or a device, its name ends otherwise, or nothing can be put there.
@@ -302,3 +358,60 @@ def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(f"{path}: cannot be {done} ({error.strerror or error})") from error
+
+
+def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *, compress: bool) -> None:
+    """Write plain values and arrays to one NPZ file, without pickles: ``facts`` is the bytes of a JSON text.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    import numpy as np  # of no use to those who write texts only
+
+    told = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
+    with path.open("wb") as file:
+        (np.savez_compressed if compress else np.savez)(file, allow_pickle=False, facts=told, **arrays)
+
+
+def read_archive(path: Path, what: str) -> tuple[Any, dict[str, NDArray[Any]]]:
+    """Read what ``write_archive`` wrote; messages call it ``what``.
+
+    Raises:
+        InputError: there is no such file, it is not whole, or unpacks to too much.
+    """
+    import numpy as np
+
+    try:
+        with open_input(path) as opened, zipfile.ZipFile(opened) as archive:
+            refuse_other_packing(archive, str(path))
+            Unpacked(str(path), path.stat().st_size).add(sum(entry.file_size for entry in archive.infolist()))
+            arrays = {}
+            for entry in archive.infolist():
+                with archive.open(entry) as file:
+                    name = entry.filename.removesuffix(".npy")
+                    arrays[name] = np.lib.format.read_array(file, allow_pickle=False)
+        if "facts" not in arrays:
+            raise InputError(f"{path}: not {what}; 'facts' is missing")
+        return plain(json.loads(arrays.pop("facts").tobytes())), arrays
+    except InputError:
+        raise
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file; it would be {what}") from error
+    except Exception as error:  # on damaged bytes numpy and zipfile raise many types
+        raise InputError(f"{path}: not {what}, or damaged ({words(error)})") from error
+
+
+def refuse_other_packing(archive: zipfile.ZipFile, where: str) -> None:
+    """Refuse entries packed as numpy never does: Python unpacks these without a limit.
+
+    Raises:
+        InputError: there is one.
+    """
+    for entry in archive.infolist():
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise InputError(f"{where}: entry {entry.filename!r:.60} is not packed as numpy does it")
+
+
+def words(error: Exception) -> str:
+    """What a library says of a damaged file, in one line."""
+    return " ".join(str(error).split())[:120] or type(error).__name__

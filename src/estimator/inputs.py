@@ -20,7 +20,7 @@ from estimator.errors import InputError
 DEEPEST = 64
 """Most levels of a file's values, and parts of a key in TOML: beyond, parsers take minutes or fail."""
 MOST_BITS = 4096
-"""Of a whole number: Python does not print much larger ones."""
+"""Longest whole number: Python does not print much larger ones."""
 TOML_BYTES, JSON_BYTES = 1 << 20, 64 << 20
 _DOTTED = re.compile(rf"""(?:(?:(?<![\w-])[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
@@ -118,10 +118,9 @@ _CHOSEN: ContextVar[float | None] = ContextVar("max_unpacked_gib", default=None)
 
 
 def set_max_unpacked(gib: float | None) -> None:
-    """Choose how much any file may unpack to; a file's own size is always allowed.
+    """Choose how much any file may unpack to [GiB]; a file's own size is always allowed.
 
-    Args:
-        gib: the limit [GiB], or None for 100 times the file's size, at least 0.25 and at most 4 GiB.
+    None stands for 100 times the file's size, at least 0.25 and at most 4 GiB.
 
     Raises:
         InputError: it is out of range.
@@ -132,11 +131,7 @@ def set_max_unpacked(gib: float | None) -> None:
 
 
 class Unpacked:
-    """Counts what one input unpacks to.
-
-    Attributes:
-        size: so far [bytes].
-    """
+    """Counts what one input unpacks to: ``size`` so far [bytes]."""
 
     def __init__(self, where: str, stored_bytes: int) -> None:
         """Take the name of the input for messages, and its size [bytes]."""
@@ -145,10 +140,7 @@ class Unpacked:
         self._limit = max(stored_bytes, usual if chosen is None else chosen * GIB)
 
     def add(self, size: int) -> None:
-        """Count more, before or while it is unpacked.
-
-        Args:
-            size: claimed or unpacked [bytes].
+        """Count more [bytes], before or while it is unpacked.
 
         Raises:
             InputError: it is too much in all.

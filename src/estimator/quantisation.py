@@ -1,20 +1,24 @@
-"""The step of a quantised channel, from its samples alone."""
+"""What samples tell of their sensor: rounding steps, rows that a logger repeated, encoders that hold their value."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arrays import Array
+from estimator.filtering import differentiate, low_pass
+from estimator.recording.model import Recording
 
 BLOCK = 1024
 """Rows that are judged together."""
 _LIVE = 0.5  # of the readings differ in an effort from the one before, or the efforts have no noise
 _SIGMAS = 8.0  # by which runs of equal rows are more than chance makes of them
-_ORDER, _NOISE = (
-    6,
-    1e-6,
-)  # differences, and their share of the range beyond which they are noise: motion leaves less
+_ORDER, _NOISE = 6, 1e-6
+"""Differences, and their share of the range beyond which they are noise: motion leaves less."""
 _EQUAL, _OF = 2, 8  # readings that are taken to be equal by chance, before any is seen
 
 
@@ -42,11 +46,8 @@ class Repeats:
         """Count high differences of the efforts that are noise; smooth efforts tell nothing of equal rows."""
         with np.errstate(over="ignore", invalid="ignore"):  # of values beyond floats, which others refuse
             changes = np.any(np.diff(values, axis=0) != 0, axis=1)
-            efforts = (
-                values[np.append(True, changes)][:, self._efforts]
-                if len(values)
-                else values[:, self._efforts]
-            )
+            kept = np.append(True, changes)[: len(values)]
+            efforts = values[kept][:, self._efforts]
             high = np.abs(np.diff(efforts, n=_ORDER, axis=0))
             noisy = high > _NOISE * np.ptp(efforts, axis=0) if high.size else high
         if high.size:
@@ -80,7 +81,7 @@ class Repeats:
 
 _LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
 _OFF = 0.05  # of a step
-# Of the largest value, by which one may come out as two: in rounding, in a log of ten digits.
+# Share of the largest value by which one may come out as two: in rounding, in a log of ten digits.
 _ONE_VALUE = (1e-12, 1e-9)
 
 
@@ -121,3 +122,157 @@ def _step_of(gaps: Array, levels: int) -> float | None:
 def rounding_step(values: Array) -> float:
     """Step by which a sensor's errors repeat, or 0: where values hardly repeat, rounding is as good as noise."""
     return 0.0 if len(np.unique(values)) > 0.9 * len(values) else quantisation_step(values, levels=2) or 0.0
+
+
+LEAST = 3
+"""Equal readings at least. Derived: two of three steps are needed to tell a jump from a speed."""
+PERIODS = 2
+"""In which a held value is left. Derived: what is taken between two readings is left in two."""
+MOST = 0.5
+"""Share of an angle's readings that repeat others, beyond which its encoder is no worse than slow. Chosen."""
+DIES_CYCLES = 4.0
+"""Periods of its cut-off after which the low-pass filter's response is below 1e-4 of its peak. Derived."""
+TYPICAL = 0.8
+"""Share of readings that are neither held nor next to such, of those that move. Chosen."""
+TYPICAL_SIGMAS = 1.2816
+"""Standard deviations that such a share of normal numbers stays within. Derived."""
+FINEST = 2e-6
+"""Step [rad or m] of a reading that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
+
+
+class Held(NamedTuple):
+    """Readings of a column that were held.
+
+    Attributes:
+        spans: readings that are none, first and last but one more.
+        nats: by how much a value that is held is likelier than readings of a moving joint that happen to be equal.
+    """
+
+    column: int
+    spans: tuple[tuple[int, int], ...]
+    nats: float
+
+
+def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
+    """Spans of readings that repeat one before them while the angle moved on, first and last but one more.
+
+    An angle that stays within one step for m periods and has one acceleration all the time has a speed of 4 / m steps
+    per period at most, so that it changes by (1 + 2 p / m)^2 steps in p periods before or after. A value that is held
+    is entered at speed, by more than that, and left by all that the angle moved meanwhile: by more than that, and by as
+    much more than in the period after. In an encoder that does so once, any value is held that is entered or left by
+    more than that beyond what the change before or after makes of the acceleration.
+
+    Args:
+        x: readings, shape (Q,).
+        step: rounding step, greater than 0.
+    """
+    edges = np.append(0, np.flatnonzero(np.diff(x)) + 1)
+    first, stop = edges[:-1], edges[1:]
+    there = (stop - first >= LEAST) & (stop + 3 * PERIODS <= len(x))
+    first, stop = first[there], stop[there]
+
+    def changes(p: int) -> tuple[Array, Array, Array, Array, Array]:
+        """The most that a joint at rest changes in p periods, and what it does before the span and after it."""
+        most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
+        before, back, end = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0), stop - 1
+        each = ((first, before), (before, back), (end + p, end), (end + 2 * p, end + p))
+        into, earlier, out, after = (np.abs(x[b] - x[a]) for a, b in each)
+        return most, into, earlier, out, after
+
+    stops, leaves = np.zeros((2, len(first)), dtype=bool)
+    for most, into, earlier, out, after in map(changes, range(1, PERIODS + 1)):
+        # Twice a change less another: two more roundings.
+        enters = (2.0 * into - earlier > most + 2.0 * step) & (earlier > most)
+        stops, leaves = stops | enters, leaves | (2.0 * out - after > most + 2.0 * step)
+    most, into, _, out, after = changes(1)
+    if not np.any((into > most) & (out > most + after)):
+        return []
+    # Where it stood before, too: from rest with one acceleration, it takes twice as long as at the speed at the end,
+    # which is seen some periods later only.
+    stood = np.abs(x[first] - x[np.maximum(2 * first - stop, 0)]) < 2.5 * step
+    moved = np.abs(x[stop - 1 + PERIODS] - x[stop - 1])
+    speed = np.abs(x[stop - 1 + 3 * PERIODS] - x[stop - 1 + PERIODS]) / (2.0 * PERIODS)
+    late = stop - 2 * PERIODS - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
+    first, held = np.where(stood & ~stops, np.maximum(first, late), first), stops | leaves
+    # One more at either end: what is taken between two readings has a share of both.
+    return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
+
+
+def scatter(x: Array) -> float:
+    """Rounding step that would make the noise of moving readings, shape (Q,), from their fourth differences."""
+    apart = np.abs(np.diff(x, 4))
+    sigma = np.quantile(apart[apart > 0.0], TYPICAL) / TYPICAL_SIGMAS if apart.any() else 0.0
+    return float(sigma * np.sqrt(12.0 / 70.0))
+
+
+def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held, ...], Array]:
+    """Readings with held ones interpolated, which these are, and how wrong the interpolation may be.
+
+    The last is the difference between two orders of interpolation over the standard deviation of the reading's
+    rounding, the largest of the columns at each instant, shape (Q,).
+
+    Args:
+        x: readings of C joints, shape (Q, C).
+        steps: rounding step of each, 0 for none.
+    """
+    found, doubt, out = [], np.zeros(len(x)), x
+    for column, (own, size) in enumerate(zip(x.T, steps, strict=True)):
+        step = size or FINEST
+        plain = held_spans(own, step)
+        spans = held_spans(own, max(step, scatter(own))) if size else plain
+        if not spans or sum(b - a for a, b in plain) > MOST * len(own):
+            continue
+        there = np.zeros(len(own), dtype=bool)
+        for start, stop in spans:
+            there[start:stop] = True
+        # Against readings that may have had any value on the joint's way.
+        nats = sum((b - a) * np.log1p(abs(own[b] - own[a]) / step) for a, b in spans)
+        found.append(Held(column, tuple(spans), float(nats)))
+        cubic, quintic = (_interpolated(own, there, order) for order in (3, 5))
+        doubt = np.maximum(doubt, np.abs(cubic - quintic) / (step / np.sqrt(12.0)))
+        out = x.copy() if out is x else out
+        out[:, column] = own + step * np.round((quintic - own) / step)
+    return out, tuple(found), doubt
+
+
+def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Array]:
+    """The same of a recording, whose columns are its driven angles, then those of its gimbals (``angle_of``)."""
+    angles = np.stack([recording.phi, recording.theta], axis=1)
+    x = angles.reshape(len(angles), -1)
+    x, held, doubt = filled(x, [rounding_step(own) for own in x.T])
+    phi, theta = np.moveaxis(x.reshape(angles.shape), 1, 0)
+    return replace(recording, phi=phi, theta=theta) if held else recording, held, doubt
+
+
+def angle_of(column: int, robots: int) -> tuple[int, int, int]:
+    """Whether it is a gimbal's, and its robot and joint, all from 0, of a column of a recording of N robots."""
+    kind, robot, joint = np.unravel_index(column, (2, robots, 3))
+    return int(kind), int(robot), int(joint)
+
+
+def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_]:
+    """Samples of filtered angles, rates and accelerations that held readings may change by more than noise, shape (Q,).
+
+    ``doubt`` is that of ``filled``; the filter is ``filtering.low_pass``.
+    """
+    out = np.zeros(len(doubt), dtype=bool)
+    if doubt.any():
+        half = round(DIES_CYCLES * rate_hz / cutoff_hz)
+        impulse = np.zeros(4 * half + 1)
+        impulse[2 * half] = 1.0
+        weights = low_pass(impulse, rate_hz, cutoff_hz)
+        for _ in range(3):
+            most = np.convolve(doubt, np.abs(weights[half : 3 * half + 1]), mode="same")
+            out |= most > np.linalg.norm(weights)
+            weights = differentiate(weights, rate_hz)
+    return out
+
+
+def _interpolated(x: Array, missing: NDArray[np.bool_], order: int) -> Array:
+    from scipy.interpolate import (
+        make_interp_spline,  # takes a while to load, and few encoders hold their values
+    )
+
+    at, out = np.arange(len(x), dtype=float), x.copy()
+    out[missing] = make_interp_spline(at[~missing], x[~missing], order)(at[missing])
+    return out

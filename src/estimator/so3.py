@@ -10,7 +10,7 @@ def cross(a: Array, b: Array) -> Array:
     """Cross products along the last axis, shapes (..., 3); the bits of ``np.cross`` in a third of its time."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    # Components apart in memory, as in ``estimator.apart``.
+    # Components apart in memory, as in ``estimator.arrays``.
     out = np.empty((3, *np.broadcast_shapes(a.shape, b.shape)[:-1]))
     np.subtract(y * w, z * v, out=out[0, ...])
     np.subtract(z * u, x * w, out=out[1, ...])

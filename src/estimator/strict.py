@@ -1,7 +1,6 @@
 """Files of numbers, read strictly: what is unknown, missing or of the wrong kind is named, and nothing is guessed.
 
-A library would do where it may be installed; the estimator needs numpy and scipy alone, and the sentences are the
-project's own: which file, which key, which value, and what is allowed.
+Every sentence says which file, which key, which value, and what is allowed.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeGuard
@@ -22,14 +21,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _LARGEST = 1e300
+Rules = Mapping[str, tuple[str, Callable[[Any], bool]]]
+"""By key: what is allowed, in words, and whether a value is."""
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """Tables of a TOML file.
-
-    Args:
-        path: the file.
-        what: what it should be, without an article, for the message.
+    """Tables of a TOML file, which messages call ``what``, without an article.
 
     Raises:
         InputError: it cannot be read, or is not TOML.
@@ -43,11 +40,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def read_json(path: Path, what: str) -> dict[str, Any]:
-    """The object of a JSON file.
-
-    Args:
-        path: the file.
-        what: what it should be, with its article, for the message.
+    """The object of a JSON file, which messages call ``what``, with its article.
 
     Raises:
         InputError: there is no such file, it cannot be read, or is not a JSON object.
@@ -98,13 +91,9 @@ def check_known(keys: Iterable[str], valid: Sequence[str], where: str, what: str
 
 @dataclass(frozen=True)
 class Fields:
-    """An object with certain keys, read by type; every reader raises ``InputError`` with the key's path.
+    """An object with required and optional keys; every reader raises ``InputError`` with the key's path.
 
-    Attributes:
-        values: the object.
-        required: keys that it must have.
-        where: how messages call it, such as the file's name.
-        optional: keys that it may have besides.
+    Messages call the object ``where``, such as the file's name.
     """
 
     values: Mapping[str, Any]
@@ -134,6 +123,16 @@ class Fields:
             InputError: always.
         """
         raise InputError(f"{self.where}: {key} is {self.values[key]!r:.60}; it must be {allowed}")
+
+    def check(self, rules: Rules) -> None:
+        """Refuse the first value that is not allowed; a key that is not given breaks no rule.
+
+        Raises:
+            InputError: there is one.
+        """
+        for key, (allowed, good) in rules.items():
+            if key in self.values and not good(self.values[key]):
+                self.refuse(key, allowed)
 
     def within(self, key: str, required: Sequence[str], optional: Sequence[str] = ()) -> Fields:
         """The object inside this one."""
@@ -198,6 +197,23 @@ class Fields:
         if not isinstance(value, list) or length not in (None, len(value)):
             self.refuse(key, "a list" if length is None else f"a list of {length} entries")
         return value
+
+    def objects(
+        self, key: str, required: Sequence[str], optional: Sequence[str] = (), length: int | None = None
+    ) -> list[Fields]:
+        """Objects in a list, which messages count from 1."""
+        values = self.list(key, length)
+        return [
+            Fields(value, required, f"{self.where}: {key}[{k}]", optional)
+            for k, value in enumerate(values, 1)
+        ]
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Texts in a list."""
+        values = self.list(key)
+        if not all(isinstance(value, str) for value in values):
+            self.refuse(key, "a list of texts")
+        return tuple(values)
 
     def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
         """Finite numbers in nested lists of a shape."""

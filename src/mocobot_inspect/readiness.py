@@ -5,19 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arm.arms import Arms, design_of
-from estimator.arm.unit import ArmUnit
-from estimator.arm.wrist_level import joints_of, wrist_fault
+from estimator.arm.delta import joints_of, wrist_fault
+from estimator.arm.unit import Arms, ArmUnit, design_of
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial
-from estimator.estimate.identifiability import FACTOR, StepReport
 from estimator.estimate.payload import estimate_from_trials
 from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.uncertainty import FACTOR, StepReport
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
-from estimator.signals.grasp_data import GraspData
-from estimator.signals.process import process_recording
+from estimator.signals import GraspData, process_recording
 from mocobot_inspect.signals import CUTOFF_HZ, RATE_HZ, TRIM_S
 from mocobot_logs.log import Level
 

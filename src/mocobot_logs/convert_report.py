@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.clocks.offsets import ClockEstimate
+from estimator.clocks import ClockEstimate
 from mocobot_logs.convert import Converted
 from mocobot_logs.cut.split import Omission
 from mocobot_logs.readings import repeated

@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from estimator.arm.delta import joints_of, wrist_fault
 from estimator.arm.design import OmnidDesign
-from estimator.arm.wrist_level import joints_of, wrist_fault
-from estimator.clocks.offsets import ClockEstimate, estimate_clocks, unknown_clocks
+from estimator.clocks import ClockEstimate, estimate_clocks, unknown_clocks
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
-from estimator.recording.metadata import FREE, RecordingMetadata
+from estimator.recording.metadata import FREE, RecordingMetadata, Sampling
 from estimator.recording.model import Recording
-from estimator.recording.sampling import Sampling
 from mocobot_logs.log import CHANNELS, NS, REF, THETA, Array
 from mocobot_logs.resample.log import Resampled
 

@@ -204,7 +204,7 @@ def test_a_file_that_appears_during_the_run_is_kept(tmp_path: Path) -> None:
 
 def test_the_next_run_removes_what_a_dead_one_left(tmp_path: Path) -> None:
     code = (
-        "import os, sys, pathlib; from estimator.processes import scratch_name\n"
+        "import os, sys, pathlib; from estimator.files import scratch_name\n"
         "name = scratch_name(pathlib.Path(sys.argv[1])); name.mkdir(); (name / 'a').touch(); print(name)"
     )
     done = subprocess.run([sys.executable, "-c", code, tmp_path], capture_output=True, text=True, check=True)

@@ -253,7 +253,7 @@ mocobot.cli.main(["effects"])
 POOL = """
 import os, sys, time
 from joblib import Parallel, delayed
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 def work(_):
     os.write(1, f"{os.getpid()}\\n".encode())
     time.sleep(60)

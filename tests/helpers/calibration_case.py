@@ -4,10 +4,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from estimator.arm.unit import ArmUnit
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
-from estimator.calibrate.equations.trial import TrialEquations
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Prior
+from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.rows import Rows, Sensing
 from synthetic_team import Exact, Load, carry, draw_path, draw_units, load
 
 PRIOR = Prior(tilt_rad=0.02, arm_mass_ratio=0.05)

@@ -4,10 +4,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
-from estimator.calibrate.prior import Prior
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.rigid_team.residual import Bases
+from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration, Prior
+from estimator.estimate.grasps import GraspEstimate
+from estimator.rigid_team import Bases
 from omnid_design import DESIGN
 
 SHARES = {"phi_zero": 0.3, "rod_length": 0.2, "grasps": 0.33, "inertial_parameters": 0.25}

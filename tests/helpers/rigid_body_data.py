@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from estimator.signals.grasp_data import GraspData
+from estimator.signals import GraspData
 
 GRAVITY = 9.81
 RATE = 100.0

@@ -15,10 +15,10 @@ from scipy.spatial.transform import Rotation
 from estimator.arm.delta import inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
-from estimator.calibrate.prior import Prior
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.calibrate.calibration import Prior
+from estimator.estimate.grasps import GraspEstimate
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared
+from estimator.rigid_team import Bases, Shared
 from omnid_design import DESIGN
 from recorded_team import STEP_S, Sines, as_matrix, derivatives, gimbal_moment
 from recordings import metadata

@@ -10,9 +10,9 @@ from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.principal import inertia_parameters
-from estimator.rigid_team.residual import Bases, Shared
+from estimator.arrays import inertia_parameters
+from estimator.estimate.grasps import GraspEstimate
+from estimator.rigid_team import Bases, Shared
 from omnid_design import DESIGN
 from recorded_team import COM, GRASPS, HOME, INERTIA, MASS, Carried, Sines, carry
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimator.arm.arms import Arms
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
+from estimator.arm.unit import Arms
 from estimator.recording.model import Recording
 from mocobot_inspect.readiness import readiness
 from mocobot_inspect.signals import signals_of

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from array_log import ArrayLog, stream
-from estimator.clocks.offsets import ClockEstimate
-from estimator.estimate.identifiability import StepReport, WeakDirection
+from estimator.clocks import ClockEstimate
+from estimator.estimate.uncertainty import StepReport, WeakDirection
 from mocobot_inspect.findings import evidence, findings, of_stream, stands
 from mocobot_inspect.inspection import Inspection, Segments, inspect_log
 from mocobot_inspect.readiness import Readiness, idle_axes

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
 from mocobot_inspect.signals import Signals, signals_of

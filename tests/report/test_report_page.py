@@ -14,7 +14,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from estimator.leftover.leftover import Leftover
+from estimator.estimate.leftover import Leftover
 from mocobot_report.blocks.html import data_block, el, raw, to_bytes
 from mocobot_report.blocks.numbers import measured, plain
 from mocobot_report.blocks.palette import DARK, LIGHT

@@ -10,7 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.scene.scene import TeamScene

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from estimator.estimate.consistency import wrench_balance
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
-from estimator.signals.process import process_recording
+from estimator.signals import process_recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth

@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.linalg import eigh
 
-from estimator.arrays import Array
-from estimator.estimate.principal import inertia_parameters
+from estimator.arrays import Array, inertia_parameters
 from hidden.limits import pendulum_limit_kg
 from mocobot.campaign.draw import REACH_M
 from mocobot_sim.scene.models import omnid_design

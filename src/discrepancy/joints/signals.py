@@ -13,7 +13,7 @@ from discrepancy.joints.mechanics.motion import Motion
 from discrepancy.joints.mechanics.tree import Tree
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-from estimator.held import Held, doubtful, filled
+from estimator.quantisation import Held, doubtful, filled
 from mocobot_logs.joints.joint_log import JointLog
 
 SMOOTH_HZ = 60.0

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from discrepancy.channel import Channel
 from discrepancy.result.traces import Trace
-from estimator.archive import read_archive, words, write_archive
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.files import system_errors
+from estimator.files import read_archive, system_errors, words, write_archive
 
 NAME = "residuals.npz"
 FORMAT, VERSION = "mocobot-residuals", 1

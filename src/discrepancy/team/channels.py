@@ -7,8 +7,8 @@ import numpy as np
 from discrepancy.channel import Channel
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.linear.whitening import Whitening
+from estimator.arm.motion import PHI, TAU, THETA
 from estimator.arrays import Array
-from estimator.rigid_team.slots import PHI, TAU, THETA
 
 
 def channels_of(robots: int) -> list[Channel]:

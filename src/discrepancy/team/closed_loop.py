@@ -11,14 +11,12 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
-from estimator.arm.arms import true_joints
-from estimator.arm.unit import ArmUnit
-from estimator.arrays import Array
+from estimator.arm.unit import ArmUnit, true_joints
+from estimator.arrays import Array, inertia_matrix
 from estimator.errors import InputError
-from estimator.estimate.principal import inertia_matrix
-from estimator.held import without_held
+from estimator.quantisation import without_held
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared
+from estimator.rigid_team import Bases, Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import apply_effects, make_effect
 from mocobot_sim.errors import TrialError

@@ -25,8 +25,8 @@ from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import TeamDiagnosed
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.verdict import judged_team
+from estimator.arm.unit import ENCODERS, in_encoder_frames
 from estimator.errors import InputError
-from estimator.estimate.frames import ENCODERS, in_encoder_frames
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 

@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from estimator.arm.unit import ArmUnit
-from estimator.arrays import Array
-from estimator.estimate.frames import in_encoder_frames, seen_by_encoders
-from estimator.estimate.principal import inertia_matrix
-from estimator.rigid_team.residual import Shared
+from estimator.arm.unit import ArmUnit, in_encoder_frames, seen_by_encoders
+from estimator.arrays import Array, inertia_matrix
+from estimator.rigid_team import Shared
 
 Estimate = dict[str, Any]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from discrepancy.evidence.findings import Event
 from discrepancy.evidence.held import HeldReadings
-from estimator.held import angle_of, without_held
+from estimator.quantisation import angle_of, without_held
 from estimator.recording.model import Recording
 
 KINDS = ("driven joint", "gimbal axis")

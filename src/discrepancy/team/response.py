@@ -26,7 +26,7 @@ from discrepancy.team.gain import MARGIN_SHARE, Gain, Response, is_worse, mean_c
 from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arrays import Array
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.law import Law as LawEffect
 from mocobot_sim.extended.extended import write_extended

@@ -48,7 +48,7 @@ from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared
+from estimator.rigid_team import Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.pymjcf import why_not_composed
 

@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimator.apart import apart, matrices
-from estimator.arm.numbers import Arm
-from estimator.arrays import Array
+from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import Arms
+from estimator.arrays import Array, apart, matrices
 from estimator.errors import InputError
 from estimator.so3 import cross, times
 
@@ -57,12 +57,10 @@ class LegGeometry:
         return times(np.swapaxes(self.rod, -1, -2), torque / self.leverage)
 
 
-def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
+def forward_kinematics(phi: ArrayLike, design: Arms) -> Array:
     """Wrist position h(phi) in {b} [m], shape (..., 3): equation (28); the higher of the two solutions.
 
-    Args:
-        phi: driven angles [rad], 0 horizontal outward, positive raises the knee, shape (..., 3).
-        design: the robot's numbers.
+    Driven angles phi [rad] have shape (..., 3); 0 is horizontal outward, positive raises the knee.
 
     Raises:
         InputError: the three spheres of the rods do not intersect at some configuration.
@@ -80,12 +78,12 @@ def _wrist(phi: Array, foot: Array, normal: Array, square: Array) -> Array:
     return foot + np.sqrt(square)[..., None] * normal
 
 
-def is_reachable(phi: ArrayLike, design: Arm) -> NDArray[np.bool_]:
+def is_reachable(phi: ArrayLike, design: Arms) -> NDArray[np.bool_]:
     """Whether a wrist position exists for driven angles ``phi`` [rad], shape (..., 3) -> (...)."""
     return _sphere_intersection(_sphere_centres(np.asarray(phi, dtype=float), design), design)[2] > 0
 
 
-def stretches(phi: ArrayLike, design: Arm) -> tuple[NDArray[np.bool_], Array]:
+def stretches(phi: ArrayLike, design: Arms) -> tuple[NDArray[np.bool_], Array]:
     """The answer of ``is_reachable``, and the legs' leverage (..., 3), which means nothing where that is no."""
     phi = np.asarray(phi, dtype=float)
     centres = _sphere_centres(phi, design)
@@ -94,7 +92,7 @@ def stretches(phi: ArrayLike, design: Arm) -> tuple[NDArray[np.bool_], Array]:
     return square > 0, _legs(phi, h, centres, design).leverage
 
 
-def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
+def leg_geometry(phi: ArrayLike, design: Arms) -> LegGeometry:
     """Wrist, rods and knee derivatives at driven angles ``phi`` [rad], shape (..., 3).
 
     Raises:
@@ -106,14 +104,14 @@ def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
     return _legs(phi, h, centres, design)
 
 
-def _legs(phi: Array, h: Array, centres: Array, design: Arm) -> LegGeometry:
+def _legs(phi: Array, h: Array, centres: Array, design: Arms) -> LegGeometry:
     cos, sin = np.cos(phi), np.sin(phi)
     rod, proximal = h[..., None, :] - centres, np.asarray(design.proximal_length_m)[..., None]
     knee_d1, knee_d2 = proximal * _in_leg_planes(-sin, cos), -proximal * _in_leg_planes(cos, sin)
     return LegGeometry(h, rod, knee_d1, knee_d2, np.sum(rod * knee_d1, axis=-1))
 
 
-def jacobian(phi: ArrayLike, design: Arm) -> Array:
+def jacobian(phi: ArrayLike, design: Arms) -> Array:
     """dh/dphi [m/rad], shape (..., 3, 3): rows x, y, z of {b}, columns phi_1..3.
 
     Raises:
@@ -127,15 +125,11 @@ def jacobian_of(legs: LegGeometry) -> Array:
     return np.asarray(legs.across_rods * legs.leverage[..., None, :])
 
 
-def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Array, Array, Array]:
+def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arms) -> tuple[Array, Array, Array]:
     """Derivatives of h by every leg's radius, proximal length and rod length, shape (..., 3, 3) each.
 
-    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs.
-
-    Args:
-        legs: geometry at the driven angles.
-        phi: driven angles [rad], shape (..., 3).
-        design: the robot's numbers.
+    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs. ``legs`` is the
+    geometry at the driven angles phi [rad], shape (..., 3).
     """
     phi = np.asarray(phi, dtype=float)
     along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
@@ -150,12 +144,7 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
     """Velocity [m/s] and acceleration [m/s^2] of the wrist in {b}, each of shape (..., 3).
 
     The constraint differentiated twice: rod_k . h_ddot = leverage_k phi_ddot_k
-    + rod_k . knee_d2_k phi_dot_k^2 - |d(rod_k)/dt|^2.
-
-    Args:
-        legs: geometry at the driven angles.
-        phi_dot: driven rates [rad/s], shape (..., 3).
-        phi_ddot: driven accelerations [rad/s^2], shape (..., 3).
+    + rod_k . knee_d2_k phi_dot_k^2 - |d(rod_k)/dt|^2, from driven rates [rad/s] and accelerations [rad/s^2], (..., 3).
     """
     phi_dot, phi_ddot = np.asarray(phi_dot, dtype=float), np.asarray(phi_ddot, dtype=float)
     h_dot = times(legs.across_rods, legs.leverage * phi_dot)
@@ -164,12 +153,8 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
     return h_dot, times(legs.across_rods, legs.leverage * phi_ddot + curvature)
 
 
-def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:
-    """Driven angles phi(h) [rad], shape (..., 3), with every knee pointing outward.
-
-    Args:
-        h: wrist position in {b} [m], shape (..., 3).
-        design: the robot's numbers.
+def inverse_kinematics(h: ArrayLike, design: Arms) -> Array:
+    """Driven angles phi(h) [rad] with every knee pointing outward, from wrist positions in {b} [m], shape (..., 3).
 
     Raises:
         InputError: a leg is too long or too short for some position.
@@ -185,17 +170,16 @@ def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:
     return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
 
 
-def is_in_reach(h: ArrayLike, design: Arm) -> NDArray[np.bool_]:
+def is_in_reach(h: ArrayLike, design: Arms) -> NDArray[np.bool_]:
     """Whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
     return np.abs(_leg_triangles(np.asarray(h, dtype=float), design)[2]) <= 1.0
 
 
-def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
+def _leg_triangles(h: Array, design: Arms) -> tuple[Array, Array, Array]:
     """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
     l1, l2 = design.proximal_length_m, design.rod_length_m
-    with np.errstate(
-        all="ignore"
-    ):  # on the driven axis itself, or infinitely far: no cosine, so out of reach
+    # On the driven axis itself, or infinitely far, there is no cosine, and it is out of reach.
+    with np.errstate(all="ignore"):
         # Once the platform joint is shifted onto the wrist.
         reach = h[..., None, :] - np.asarray(design.radius_m)[..., None] * LEG_DIRECTIONS
         outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
@@ -203,7 +187,7 @@ def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
         return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
 
 
-def _sphere_centres(phi: Array, design: Arm) -> Array:
+def _sphere_centres(phi: Array, design: Arms) -> Array:
     radius = design.radius_m + design.proximal_length_m * np.cos(phi)
     return _in_leg_planes(radius, design.proximal_length_m * np.sin(phi))
 
@@ -215,7 +199,7 @@ def _in_leg_planes(outward: Array, up: Array) -> Array:
     ])  # fmt: skip
 
 
-def _sphere_intersection(centres: Array, design: Arm) -> tuple[Array, Array, Array]:
+def _sphere_intersection(centres: Array, design: Arms) -> tuple[Array, Array, Array]:
     """Point of the sphere centres' plane nearest the wrist, upward unit normal, squared height over it."""
     rod = np.asarray(design.rod_length_m)
     a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]
@@ -229,3 +213,105 @@ def _sphere_intersection(centres: Array, design: Arm) -> tuple[Array, Array, Arr
     offset = cross(a_square * b - b_square * a, normal) / (2.0 * normal_square)
     upward = normal / np.sqrt(normal_square) * np.where(normal[..., 2:] < 0, -1.0, 1.0)
     return centres[..., 0, :] + offset, upward, rod**2 - np.sum(offset**2, axis=-1)
+
+
+MAX_CONDITION = 1e4
+"""Condition of dh/dphi beyond which the arm counts as singular. Within the Omnid's joint limits it stays below 20; at
+the bound, rounding grows from 1e-16 to 1e-12."""
+_SAME_M = 1e-6  # wrist positions closer than this are one
+
+
+def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array, Array]:
+    """Wrist level: the same sensors told as wrist position h [m] and force of the springs on it [N] in {b}, (..., 3).
+
+    The springs' torques balance a force on the wrist by virtual work, tau . phi_dot = force . h_dot, so
+    force = (dh/dphi)^-T tau (paper, section IV.B, for an arm without mass). Weight and inertia of the arm stay in it,
+    and the conversion is exact both ways.
+
+    Args:
+        phi: driven angles [rad], shape (..., 3).
+        tau: spring torques on the proximal links, positive raising them [N m], shape (..., 3).
+        design: the robot's numbers.
+
+    Raises:
+        InputError: at some configuration the rods cannot meet, a leg is past its stretched position, the wrist is not
+            above the driven axes, or the arm is singular.
+    """
+    phi, tau = np.asarray(phi, dtype=float), np.asarray(tau, dtype=float)
+    legs = leg_geometry(phi, design)  # refuses what no wrist position reaches
+    faults = {
+        "a leg is folded past its stretched position": np.any(legs.leverage <= 0.0, axis=-1),
+        "the wrist lies below the driven axes": legs.h[..., 2] <= 0.0,
+        "the arm is singular": _is_singular(legs),
+    }
+    for fault, bad in faults.items():
+        if np.any(bad):
+            where = phi[np.unravel_index(np.argmax(bad), bad.shape)]
+            raise InputError(f"{fault} at phi = ({_numbers(where)}) rad")
+    # rod_k . h_dot = leverage_k phi_dot_k: leg k pushes along its rod with tau_k / leverage_k.
+    force = np.sum(legs.rod * (tau / legs.leverage)[..., None], axis=-2)
+    return legs.h, force
+
+
+def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Array, Array]:
+    """Driven angles [rad] and spring torques [N m], the inverse of ``wrist_of``, shape (..., 3) each.
+
+    Raises:
+        InputError: some position is not one that ``wrist_of`` returns (see ``wrist_fault``).
+    """
+    h, force = np.asarray(h, dtype=float), np.asarray(force, dtype=float)
+    if (fault := wrist_fault(h, design)) is not None:
+        raise InputError(fault[1])
+    phi = inverse_kinematics(h, design)
+    legs = leg_geometry(phi, design)
+    return phi, legs.along_rods(force)
+
+
+def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tuple[Array, Array]:
+    """Inverse of ``wrist_motion``: driven rates [rad/s] and accelerations [rad/s^2], where no leg is stretched."""
+    h_dot, h_ddot = np.asarray(h_dot, dtype=float), np.asarray(h_ddot, dtype=float)
+    phi_dot = np.einsum("...kj,...j->...k", legs.rod, h_dot) / legs.leverage
+    rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
+    curvature = np.sum(legs.rod * legs.knee_d2, axis=-1) * phi_dot**2 - np.sum(rod_dot**2, axis=-1)
+    return phi_dot, (np.einsum("...kj,...j->...k", legs.rod, h_ddot) - curvature) / legs.leverage
+
+
+def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str] | None:
+    """The first of wrist positions in {b} [m], shape (..., 3), that has no driven angles; None where all have.
+
+    Returns:
+        Its index in the leading axes, and a sentence that says what is wrong with it.
+    """
+    h = np.asarray(h, dtype=float)
+    within = is_in_reach(h, design)
+    if (index := _first(~np.all(within, axis=-1))) is not None:
+        leg = int(np.argmin(within[index])) + 1
+        return index, f"leg {leg} cannot reach the wrist position ({_numbers(h[index])}) m"
+    phi = inverse_kinematics(h, design)
+    # The position itself is where the spheres about the knees meet, unless they only touch there.
+    if (index := _first(~is_reachable(phi, design))) is not None:
+        return index, f"the arm is singular at the wrist position ({_numbers(h[index])}) m"
+    legs = leg_geometry(phi, design)
+    below = (h[..., 2] <= 0.0) | np.any(np.abs(legs.h - h) > _SAME_M, axis=-1)
+    if (index := _first(below)) is not None:
+        return index, f"the wrist position ({_numbers(h[index])}) m lies below the arm"
+    if (index := _first(_is_singular(legs))) is not None:
+        return index, f"the arm is singular at the wrist position ({_numbers(h[index])}) m"
+    return None
+
+
+def _is_singular(legs: LegGeometry) -> NDArray[np.bool_]:
+    """Whether dphi/dh, whose rows are rod_k / leverage_k, is too badly conditioned."""
+    stretched = np.any(legs.leverage <= 0.0, axis=-1)
+    leverage = np.where(stretched[..., None], 1.0, legs.leverage)
+    return stretched | ~(np.linalg.cond(legs.rod / leverage[..., None]) < MAX_CONDITION)
+
+
+def _first(bad: NDArray[np.bool_]) -> tuple[int, ...] | None:
+    if not np.any(bad):
+        return None
+    return tuple(int(k) for k in np.unravel_index(np.argmax(bad), bad.shape))
+
+
+def _numbers(vector: Array) -> str:
+    return ", ".join(f"{value:.4g}" for value in vector)

@@ -16,6 +16,7 @@ from estimator.strict import Fields, is_number, read_toml
 
 Triple = tuple[float, float, float]
 _UP: Array = np.array([0.0, 0.0, 1.0])
+_TRIPLES = ("yoke_inertia_kgm2", "ring_inertia_kgm2", "flange_inertia_kgm2")
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,17 @@ class OmnidDesign:
             InputError: a key is unknown or missing, or a value is not a finite number of the allowed sign.
         """
         names = [field.name for field in dataclasses.fields(cls)]
-        numbers = Fields(values, names, where).values
-        return cls(**{name: _number(f"{where}.{name}", name, numbers[name]) for name in names})
+        Fields(values, names, where)
+        out: dict[str, Any] = {}
+        for name in names:
+            value, path = values[name], f"{where}.{name}"
+            if name not in _TRIPLES:
+                out[name] = _number(path, value, positive=name != "phi_min_rad")
+            elif isinstance(value, list | tuple) and len(value) == 3:
+                out[name] = tuple(_number(path, entry, positive=True) for entry in value)
+            else:
+                raise InputError(f"{path} is {value!r:.60}; it must be three numbers")
+        return cls(**out)
 
     def to_dict(self) -> dict[str, Any]:
         """The numbers as plain JSON types, keys as in ``design.toml``."""
@@ -90,15 +100,7 @@ def load_design(path: Path) -> OmnidDesign:
     return OmnidDesign.from_dict(read_toml(path, "design file"), where=str(path))
 
 
-def _number(where: str, name: str, value: Any) -> Any:
-    if name.endswith("_inertia_kgm2") and name.split("_")[0] in ("yoke", "ring", "flange"):
-        if not isinstance(value, list | tuple) or len(value) != 3:
-            raise InputError(f"{where} is {value!r:.60}; it must be three numbers")
-        return tuple(_scalar(where, entry, positive=True) for entry in value)
-    return _scalar(where, value, positive=name != "phi_min_rad")
-
-
-def _scalar(where: str, value: Any, *, positive: bool) -> float:
+def _number(where: str, value: Any, *, positive: bool) -> float:
     if not is_number(value):
         raise InputError(f"{where} is {value!r:.60}; it must be a finite number")
     if positive and value <= 0:

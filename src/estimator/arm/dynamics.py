@@ -1,27 +1,123 @@
-"""Inverse dynamics of one Omnid arm alone, and the wrench that it exerts on the payload.
+"""The passive gimbal, inverse dynamics of one Omnid arm alone, and the wrench that it exerts on the payload.
 
-The spring torque drives the arm's own bodies and the payload. Here the first part is computed from the
-motion and taken away from the second. Derivation: docs/method-arm.md. The paper (section IV.B) writes
-f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the spring and never appears.
+Gimbal angles come in column order (theta_z, theta_y, theta_x): z is proximal, then y, then x, through the wrist centre.
+The spring torque drives the arm's own bodies and the payload. The first part is computed from the motion and taken away
+from the second (derivation: docs/method-arm.md). The paper (section IV.B) writes f_i = (dh/dphi)^-T tau_i for an arm
+without mass; the motor's rotor lies before the spring and never appears.
 """
+
+from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.apart import components, vectors
 from estimator.arm.delta import LEG_DIRECTIONS, LegGeometry, leg_geometry, wrist_motion
 from estimator.arm.design import Triple
-from estimator.arm.gimbal import Gimbal
-from estimator.arm.numbers import Arm
-from estimator.arrays import Array
+from estimator.arm.unit import Arms
+from estimator.arrays import Array, components, matrices, vectors
 from estimator.so3 import cross, times
+
+
+class Gimbal(NamedTuple):
+    """A gimbal at given angles (theta_z, theta_y, theta_x): their cosines and sines, shape (...) each.
+
+    R_bi = Rz(theta_z) Ry(theta_y) Rx(theta_x).
+    """
+
+    cz: Array
+    cy: Array
+    cx: Array | float
+    sz: Array
+    sy: Array
+    sx: Array | float
+
+    @classmethod
+    def at(cls, theta: ArrayLike) -> Gimbal:
+        """At gimbal angles [rad], shape (..., 3)."""
+        angles = components(theta)
+        return cls(*np.cos(angles), *np.sin(angles))
+
+    @property
+    def before_x(self) -> Gimbal:
+        """The same with theta_x at zero: its middle body."""
+        return self._replace(cx=1.0, sx=0.0)
+
+    def rotation(self) -> Array:
+        """Orientation R_bi of the grasp frame {i} in the base frame {b}, equation (28), shape (..., 3, 3)."""
+        cz, cy, cx, sz, sy, sx = self
+        return matrices([
+            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+            [-sy, cy * sx, cy * cx],
+        ])  # fmt: skip
+
+    def axes(self) -> Array:
+        """E of omega_i = E theta_dot, shape (..., 3, 3): its columns are the z, y and x axes of the gimbal in {i}.
+
+        det E = -cos(theta_y): singular where theta_y is +-90 deg.
+        """
+        _, cy, cx, _, sy, sx = self
+        return matrices([[-sy, 0.0, 1.0], [cy * sx, cx, 0.0], [cy * cx, -sx, 0.0]])
+
+    def motion(self, theta_dot: ArrayLike, theta_ddot: ArrayLike) -> tuple[Array, Array]:
+        """Angular velocity omega_i [rad/s] of {i} in {b}, expressed in {i}, and its derivative [rad/s^2], (..., 3).
+
+        E theta_dot and E theta_ddot + dE/dt theta_dot, without their zeros.
+        """
+        _, cy, cx, _, sy, sx = self
+        z, y, x = components(theta_dot)
+        zz, yy, xx = components(theta_ddot)
+        along, across = cy * sx, cy * cx
+        omega = vectors(x - sy * z, along * z + cx * y, across * z - sx * y)
+        omega_dot = vectors(
+            xx - sy * zz - cy * y * z,
+            along * zz + cx * yy + ((across * x - sy * sx * y) * z - sx * x * y),
+            across * zz - sx * yy - ((along * x + sy * cx * y) * z + cx * x * y),
+        )
+        return omega, omega_dot
+
+    def about_axes(self, moment: Array) -> Array:
+        """Torques about the axes (z, y, x) [N m] of a moment in {i} [N m]: E^T moment, shape (..., 3)."""
+        _, cy, cx, _, sy, sx = self
+        x, y, z = components(moment)
+        return vectors(cy * sx * y + cy * cx * z - sy * x, cx * y - sx * z, x)
+
+    def moment(self, torque: ArrayLike) -> Array:
+        """Moment in {i} [N m] with given components about the axes (z, y, x) [N m]: E^-T torque, shape (..., 3)."""
+        _, cy, cx, _, sy, sx = self
+        about_z, about_y, about_x = components(torque)
+        # {i} before its turn about x: there y is the middle axis, and the first axis is (-sin, 0, cos) of theta_y.
+        up = (about_z + sy * about_x) / cy
+        return vectors(about_x, cx * about_y + sx * up, cx * up - sx * about_y)
+
+
+def rotation(theta: ArrayLike) -> Array:
+    """``Gimbal.rotation`` at gimbal angles [rad], shape (..., 3)."""
+    return Gimbal.at(theta).rotation()
+
+
+def rate_matrix(theta: ArrayLike) -> Array:
+    """``Gimbal.axes`` at gimbal angles [rad], shape (..., 3)."""
+    return Gimbal.at(theta).axes()
+
+
+def angular_motion(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike) -> tuple[Array, Array]:
+    """``Gimbal.motion`` at gimbal angles [rad], with their rates and accelerations, shape (..., 3) each."""
+    return Gimbal.at(theta).motion(theta_dot, theta_ddot)
+
+
+def moment_about_axes(theta: ArrayLike, torque: ArrayLike) -> Array:
+    """``Gimbal.moment`` at gimbal angles [rad], shape (..., 3)."""
+    return Gimbal.at(theta).moment(torque)
 
 
 def arm_torque(
     phi: ArrayLike,
     phi_dot: ArrayLike,
     phi_ddot: ArrayLike,
-    design: Arm,
+    design: Arms,
     legs: LegGeometry | None = None,
     h_ddot: Array | None = None,
 ) -> Array:
@@ -31,9 +127,7 @@ def arm_torque(
     wrist; the gimbal's bodies are balanced, so their rotation does not reach the driven joints.
 
     Args:
-        phi: driven angles [rad], shape (..., 3).
-        phi_dot: rates [rad/s], shape (..., 3).
-        phi_ddot: accelerations [rad/s^2], shape (..., 3).
+        phi, phi_dot, phi_ddot: driven angles [rad], rates and accelerations, shape (..., 3) each.
         design: the robot's numbers.
         legs, h_ddot: geometry at ``phi`` and the wrist's acceleration [m/s^2], if they are known.
 
@@ -63,14 +157,12 @@ def arm_torque(
 
 
 def gimbal_torque(
-    theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arm, gimbal: Gimbal | None = None
+    theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arms, gimbal: Gimbal | None = None
 ) -> Array:
     """Torques about the gimbal's axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
 
     Args:
-        theta: gimbal angles (theta_z, theta_y, theta_x) [rad], shape (..., 3).
-        theta_dot: rates [rad/s], shape (..., 3).
-        theta_ddot: accelerations [rad/s^2], shape (..., 3).
+        theta, theta_dot, theta_ddot: gimbal angles [rad], rates and accelerations, shape (..., 3) each.
         design: the robot's numbers.
         gimbal: the gimbal at ``theta``, if it is known.
     """
@@ -88,7 +180,7 @@ def wrench_on_payload(
     phi: tuple[ArrayLike, ArrayLike, ArrayLike],
     theta: tuple[ArrayLike, ArrayLike, ArrayLike],
     tau: ArrayLike,
-    design: Arm,
+    design: Arms,
     legs: LegGeometry | None = None,
     gimbal: Gimbal | None = None,
     R_bi: Array | None = None,

@@ -1,29 +1,30 @@
-"""One arm as it is: how its lengths, springs, masses and sensor zeros differ from the design."""
+"""Arms as they are: deviations from the design, their JSON, and the frames that encoder zeros define."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign, Triple
 from estimator.arrays import Array
+from estimator.errors import InputError
+from estimator.strict import Fields
 
 
 class Group(NamedTuple):
-    """Deviations of one kind.
-
-    Attributes:
-        name: theirs.
-        unit: theirs, "" for a ratio.
-        entries: one name each: legs, gimbal axes or directions.
-    """
+    """Deviations of one kind: name, unit ("" for a ratio), and a name for each leg, gimbal axis or direction."""
 
     name: str
     unit: str
     entries: tuple[str, ...]
+
+    @property
+    def key(self) -> str:
+        """Name with unit, such as ``tau_zero_Nm``."""
+        return f"{self.name}_{self.unit.replace(' ', '')}" if self.unit else self.name
 
 
 _LEGS = ("1", "2", "3")
@@ -53,7 +54,9 @@ COUNT = int(_ENDS[-1])
 
 @dataclass(frozen=True, eq=False)
 class ArmUnit:
-    """One arm, or several side by side in leading axes of ``x``: an ``Arm`` for kinematics and dynamics.
+    """One arm as it is, or several side by side in leading axes of ``x``; numbers have the names of ``OmnidDesign``.
+
+    Lengths and masses of legs have shape (..., 3). Inertias grow with the mass, centres of mass stay as designed.
 
     Attributes:
         design: what all arms of the kind have in common.
@@ -62,11 +65,6 @@ class ArmUnit:
 
     design: OmnidDesign
     x: Array
-
-    @classmethod
-    def as_designed(cls, design: OmnidDesign) -> ArmUnit:
-        """No deviation."""
-        return cls(design, np.zeros(COUNT))
 
     def of(self, name: str) -> Array:
         """Deviations of one group, shape (..., entries)."""
@@ -89,65 +87,163 @@ class ArmUnit:
 
     @property
     def up(self) -> Array:
-        """See ``Arm``."""
+        """Unit vector against gravity in the arm's own frame, shape (..., 3)."""
         return self.R_ba[..., 2, :]
 
     @property
     def radius_m(self) -> Array:
-        """See ``Arm``."""
+        """Base radius minus platform radius."""
         return self.design.radius_m + self.of("radius")
 
     @property
     def proximal_length_m(self) -> Array:
-        """See ``Arm``."""
+        """Driven axis to knee."""
         return self.design.proximal_length_m + self.of("proximal_length")
 
     @property
     def rod_length_m(self) -> Array:
-        """See ``Arm``."""
+        """Knee to platform joint."""
         return self.design.rod_length_m + self.of("rod_length")
 
     @property
     def proximal_mass_kg(self) -> Array:
-        """See ``Arm``."""
+        """Mass of a driven link."""
         return self.design.proximal_mass_kg * (1.0 + self.of("proximal_mass_ratio"))
 
     @property
     def proximal_com_m(self) -> float:
-        """See ``Arm``; the centre of mass stays where it is designed."""
+        """Driven axis to the link's centre of mass."""
         return self.design.proximal_com_m
 
     @property
     def proximal_inertia_kgm2(self) -> Array:
-        """See ``Arm``; grows with the mass."""
+        """Inertia of a driven link about its axis."""
         return self.design.proximal_inertia_kgm2 * (1.0 + self.of("proximal_mass_ratio"))
 
     @property
     def rod_mass_kg(self) -> Array:
-        """See ``Arm``."""
+        """Mass of a leg's rod, or rods."""
         return self.design.rod_mass_kg * (1.0 + self.of("rod_mass_ratio"))
 
     @property
     def wrist_mass_kg(self) -> Array:
-        """See ``Arm``; shape (..., 1)."""
+        """Mass of all that translates with the wrist, shape (..., 1)."""
         return self.design.wrist_mass_kg * (1.0 + self.of("wrist_mass_ratio"))
 
     @property
     def yoke_inertia_kgm2(self) -> Triple:
-        """See ``Arm``."""
+        """Principal moments of the gimbal's first body."""
         return self.design.yoke_inertia_kgm2
 
     @property
     def ring_inertia_kgm2(self) -> Triple:
-        """See ``Arm``."""
+        """Principal moments of its second body."""
         return self.design.ring_inertia_kgm2
 
     @property
     def flange_inertia_kgm2(self) -> Triple:
-        """See ``Arm``."""
+        """Principal moments of its last body."""
         return self.design.flange_inertia_kgm2
 
     @property
     def gravity_mps2(self) -> float:
-        """See ``Arm``."""
+        """Magnitude of gravity."""
         return self.design.gravity_mps2
+
+
+Arms = OmnidDesign | ArmUnit
+"""One arm or several: as designed, all alike, or as they are, side by side in leading axes of ``ArmUnit.x``."""
+
+
+def design_of(arms: Arms) -> OmnidDesign:
+    """What arms are meant to be."""
+    return arms.design if isinstance(arms, ArmUnit) else arms
+
+
+def arm_of(arms: Arms, robot: int) -> Arms:
+    """The arm of one robot (from 0) among several."""
+    return ArmUnit(arms.design, arms.x[robot]) if isinstance(arms, ArmUnit) else arms
+
+
+def true_joints(arms: Arms, phi: Array, theta: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """True driven angles [rad], gimbal angles [rad] and spring torques [N m] from readings, shape (..., 3) each.
+
+    Arms as designed read the truth: the arrays themselves come back.
+    """
+    if not isinstance(arms, ArmUnit):
+        return phi, theta, tau
+    return phi - arms.of("phi_zero"), theta - arms.of("theta_zero"), arms.true_tau(tau)
+
+
+def levelled(arms: Arms, R: Array, h: Array) -> tuple[Array, Array]:
+    """Orientations (..., 3, 3) and wrists (..., 3) [m] from the arms' own frames to {b}, which is level."""
+    if not isinstance(arms, ArmUnit) or not arms.of("tilt").any():
+        return R, h
+    return arms.R_ba @ R, (arms.R_ba @ h[..., None])[..., 0]
+
+
+def units_to_list(units: ArmUnit) -> list[dict[str, list[float]]]:
+    """One object per robot, with every group of ``GROUPS`` as a list; ``x`` has shape (N, ``COUNT``)."""
+    return [{group.key: x[AT[group.name]].tolist() for group in GROUPS} for x in units.x]
+
+
+def units_from_list(values: list[Any], design: OmnidDesign, where: str) -> ArmUnit:
+    """Inverse of ``units_to_list``; messages call the list ``where``.
+
+    Raises:
+        InputError: a key is unknown or missing, or a value is not finite, or not such that an arm can have it.
+    """
+    x = np.empty((len(values), COUNT))
+    for i, entry in enumerate(values):
+        read = Fields(entry, [group.key for group in GROUPS], f"{where}[{i}]")
+        x[i] = np.concatenate([read.array(group.key, (len(group.entries),)) for group in GROUPS])
+    units = ArmUnit(design, x)
+    check_units(units, where)
+    return units
+
+
+def check_units(units: ArmUnit, where: str) -> None:
+    """Whether such arms can be: lengths and masses, and the springs' stiffness, are greater than 0.
+
+    Raises:
+        InputError: they cannot.
+    """
+    for group in GROUPS:
+        if group.name.endswith("_ratio"):
+            least = -1.0
+        elif group.name in ("radius", "proximal_length", "rod_length"):
+            least = -getattr(units.design, f"{group.name}_m")
+        else:
+            continue
+        values = units.of(group.name)
+        bad = np.argwhere(~(values > least))
+        if len(bad):
+            robot, value = int(bad[0][0]), float(values[tuple(bad[0])])
+            raise InputError(f"{where}[{robot}]: {group.key} is {value:g}; it must be greater than {least:g}")
+
+
+# The zero of theta_x turns {i} about its x axis, and no carry shows it: frames are the encoders' or the drawing's.
+ENCODERS = "frames {i} as the encoders define them: each turned about its x axis by the zero of that theta_x"
+MIXED = "Frames are the encoders' in one and the drawing's in the other: of the payload, the mass alone is compared."
+
+
+def frames_said(zero_sd_rad: float) -> str:
+    """The frames of encoders, with the tolerance of their zeros."""
+    return f"{ENCODERS} (0 +- {np.rad2deg(zero_sd_rad):.2g} deg, which is not in the standard errors)"
+
+
+def in_encoder_frames(units: ArmUnit | None) -> bool:
+    """Whether theta_x is taken as it is read, for robots as designed (None) or as calibrated."""
+    return units is None or not units.of("theta_zero")[..., 2].any()
+
+
+def seen_by_encoders(zeros: Array, R_1i: Array, p_1i: Array, *vectors: Array) -> list[Array]:
+    """What a drawing has, in the frames of encoders.
+
+    Args:
+        zeros: of theta_x of every robot, reading minus truth [rad], shape (N,).
+        R_1i, p_1i: grasp frames, shapes (N, 3, 3) and (N, 3).
+        vectors: any others in {1}, as columns.
+    """
+    turn = Rotation.from_rotvec(np.outer(zeros, [1.0, 0.0, 0.0])).as_matrix()
+    return [turn[0].T @ R_1i @ turn, p_1i @ turn[0], *(turn[0].T @ vector for vector in vectors)]

@@ -1,20 +1,122 @@
-"""A calibration: the robots as they are, what they carried, how well each is known, and how well it foretells."""
+"""A calibration: the robots as they are, what they carried, how well each is known, and how well it predicts."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+from scipy.linalg import null_space
 
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
-from estimator.arrays import Array
-from estimator.calibrate.prior import Prior
-from estimator.estimate.frames import in_encoder_frames
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.rigid_team.residual import Bases
+from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit, in_encoder_frames
+from estimator.arrays import Array, inertia_matrix
+from estimator.errors import InputError
+from estimator.estimate.grasps import GraspEstimate
+from estimator.estimate.inertia import PrincipalInertia, about_com, principal_inertia
+from estimator.estimate.uncertainty import numerical_jacobian, standard_errors
+from estimator.recording.model import Recording
+from estimator.rigid_team import Bases
+from estimator.strict import check_known, is_number, read_toml
+
+GRASPS, INERTIAL = "grasps", "inertial_parameters"
+"""Kinds of unknowns besides ``GROUPS``, in ``CalibratedTrial.shares``."""
+MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Standard deviations of the deviations in ``estimator.arm.unit.GROUPS``; 0 holds a group as designed.
+
+    The defaults are the spread of robots out of the box that reproduces the errors of the paper's team. A wrong prior
+    hardly matters where the data tell: three times too narrow or too wide gives the same.
+
+    Attributes:
+        encoder_zero_rad: of phi, theta_z and theta_y zeros [rad]; theta_x zeros only turn the grasp frames.
+        geometry_m: of base radius, platform radius, proximal and rod length, each [m].
+        stiffness_ratio: of each spring's relative stiffness [-]; their mean is held unless a weight is known.
+        tau_zero_Nm: of each torque zero [N m].
+        tilt_rad: of a base about x and y [rad].
+        arm_mass_ratio: of the mass of each proximal link and rod and of all at the wrist, relative [-].
+        arm_weight_ratio: of all arms' masses together, relative [-].
+    """
+
+    encoder_zero_rad: float = float(np.deg2rad(1.0))
+    geometry_m: float = 1e-3
+    stiffness_ratio: float = 0.02
+    tau_zero_Nm: float = 0.02
+    tilt_rad: float = 0.0
+    arm_mass_ratio: float = 0.0
+    arm_weight_ratio: float = 0.05
+
+    def factor(self, robots: int, *, hold_scale: bool) -> Array:
+        """A matrix B, shape (N ``COUNT``, k): the deviations of N robots are B z, z standard normal and independent.
+
+        ``hold_scale`` makes the mean of all springs' ratios 0.
+        """
+        columns = np.diag(np.tile(self._sd(), robots))
+        springs = (np.arange(robots)[:, None] * COUNT + np.r_[AT["stiffness_ratio"]]).ravel()
+        masses = (np.arange(robots)[:, None] * COUNT + MASSES).ravel()
+        parts = [columns]
+        if hold_scale:
+            columns[:, springs] = 0.0
+            apart = np.zeros((len(columns), len(springs) - 1))
+            apart[springs] = self.stiffness_ratio * null_space(np.ones((1, len(springs))))
+            parts.append(apart)
+        together = np.zeros((len(columns), 1))
+        together[masses] = self.arm_weight_ratio
+        factor = np.hstack([*parts, together])
+        return factor[:, factor.any(axis=0)]
+
+    def _sd(self) -> Array:
+        """Standard deviations in the order of ``ArmUnit.x``, shape (``COUNT``,)."""
+        out = np.zeros(COUNT)
+        out[AT["phi_zero"]] = out[AT["theta_zero"]] = self.encoder_zero_rad
+        out[AT["theta_zero"].stop - 1] = 0.0
+        out[AT["radius"]] = np.sqrt(2.0) * self.geometry_m
+        out[AT["proximal_length"]] = out[AT["rod_length"]] = self.geometry_m
+        out[AT["stiffness_ratio"]] = self.stiffness_ratio
+        out[AT["tau_zero"]] = self.tau_zero_Nm
+        out[AT["tilt"]] = self.tilt_rad
+        out[MASSES] = self.arm_mass_ratio
+        return out
+
+    def scaled(self, factor: float) -> Prior:
+        """All of them larger or smaller."""
+        return Prior(*(factor * getattr(self, field.name) for field in fields(self)))
+
+
+LARGEST = {
+    "encoder_zero_rad": 0.35,
+    "geometry_m": 0.05,
+    "stiffness_ratio": 0.5,
+    "tau_zero_Nm": 5.0,
+    "tilt_rad": 0.2,
+    "arm_mass_ratio": 0.5,
+    "arm_weight_ratio": 0.5,
+}
+"""Largest standard deviation that can be meant, by field: above, somebody wrote degrees, millimetres or percent."""
+
+
+def read_prior(path: Path | str) -> Prior:
+    """Read a prior: any of the fields of ``Prior``, defaults for the others.
+
+    Raises:
+        InputError: the file cannot be read, a key is unknown, or a value is outside what it may be.
+    """
+    path = Path(path)
+    values = read_toml(path, "prior of a calibration")
+    names = [field.name for field in fields(Prior)]
+    check_known(values, names, str(path))
+    for name, value in values.items():
+        if not is_number(value) or not 0.0 <= value <= LARGEST[name]:
+            unit = {"rad": " rad", "m": " m", "Nm": " N m"}.get(name.rsplit("_", 1)[-1], "")
+            raise InputError(
+                f"{path}: {name} is {value!r:.60}; it must be a standard deviation from 0 to {LARGEST[name]:g}{unit}"
+            )
+    return Prior(**{name: float(value) for name, value in values.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +144,6 @@ class CalibratedTrial:
     """How well one recording fits; pairs are (loops, balance), chi2 over the numbers compared.
 
     Attributes:
-        name: the recording's.
         kind: "random", "periodic", "static" or "free".
         payload: index into ``Calibration.payloads``, or None.
         duration_s: evaluated length [s].
@@ -126,15 +227,102 @@ class Calibration:
     @property
     def untouched(self) -> tuple[str, ...]:
         """Deviations of which the recordings told hardly anything: their error is above 0.9 of the prior's."""
-        out = []
-        for robot in range(self.robots):
-            for group in GROUPS:
-                for k, entry in enumerate(group.entries):
-                    at = AT[group.name].start + k
-                    prior = self.prior_sd[robot, at]
-                    if (
-                        prior > 0
-                        and np.sqrt(self.covariance[robot * COUNT + at, robot * COUNT + at]) > 0.9 * prior
-                    ):
-                        out.append(f"omnid{robot + 1}.{group.name}{entry}")
-        return tuple(out)
+        prior, own = self.prior_sd.ravel(), np.sqrt(np.diag(self.covariance))
+        names = deviation_names(self.robots)
+        return tuple(names[k] for k in np.flatnonzero((prior > 0) & (own > 0.9 * prior)))
+
+
+def deviation_names(robots: int) -> list[str]:
+    """``omnid1.phi_zero1`` and so on: a name for every entry of ``ArmUnit.x``, robot by robot."""
+    entries = [f"{group.name}{entry}" for group in GROUPS for entry in group.entries]
+    return [f"omnid{robot}.{entry}" for robot in range(1, robots + 1) for entry in entries]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A payload's mass, centre of mass in {1}, inertia about it in the axes of {1}, and principal moments.
+
+    Attributes:
+        covariance: of the mass, p_1c and xx, xy, xz, yy, yz, zz of the inertia, that of a held spring scale included,
+            shape (10, 10).
+        by_scale: derivative of the same by the common spring scale, shape (10,).
+    """
+
+    mass_kg: float
+    p_1c: Array
+    inertia: Array
+    covariance: Array
+    by_scale: Array
+    principal: PrincipalInertia
+
+    @property
+    def mass_se_kg(self) -> float:
+        """Standard error of the mass [kg]."""
+        return float(np.sqrt(self.covariance[0, 0]))
+
+    @property
+    def p_1c_se_m(self) -> Array:
+        """Standard errors of the centre of mass [m], shape (3,)."""
+        return standard_errors(self.covariance[1:4, 1:4])
+
+    @property
+    def inertia_se(self) -> Array:
+        """Standard errors of the inertia [kg m^2], shape (3, 3)."""
+        return inertia_matrix(standard_errors(self.covariance[4:, 4:]))
+
+
+def grasps_of(payload: CalibratedPayload, scale_sd: float) -> GraspEstimate:
+    """A payload's grasps with the error of a held spring scale in their covariance."""
+    by_scale = payload.by_scale[:-10]
+    covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
+    return replace(payload.grasps, covariance=covariance)
+
+
+def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
+    """Numbers about the centre of mass; ``scale_sd`` is that of ``Calibration``."""
+    at = payload.parameters
+    values = about_com(at)
+    step = np.maximum(np.abs(at), 1e-3)  # parameters of different units
+    J = numerical_jacobian(lambda x: about_com(at + step * x), np.zeros(10)) / step
+    by_scale = J @ payload.by_scale[-10:]
+    covariance = J @ payload.covariance[-10:, -10:] @ J.T + scale_sd**2 * np.outer(by_scale, by_scale)
+    inertia = inertia_matrix(values[4:])
+    principal = principal_inertia(inertia, covariance[4:, 4:])
+    return Carried(float(values[0]), values[1:4], inertia, covariance, by_scale, principal)
+
+
+def calibrated(recording: Recording, calibration: Calibration, called: str = "the calibration") -> Recording:
+    """A recording with the calibration's robots in its metadata; its samples stay as they were read.
+
+    What the metadata said of the robots before gives way. ``called`` is how messages call the calibration.
+
+    Raises:
+        InputError: it is of another number of robots, or of another design.
+    """
+    metadata = recording.metadata
+    units = units_for(calibration, metadata.robots, metadata.design, recording.name, called)
+    return replace(recording, metadata=replace(metadata, units=units))
+
+
+def units_for(
+    calibration: Calibration, robots: int, design: OmnidDesign, name: str, called: str = "the calibration"
+) -> ArmUnit:
+    """The calibration's robots, for a log of so many robots of a design; messages use the names of both.
+
+    Raises:
+        InputError: it is of another number of robots, or of another design.
+    """
+    if calibration.robots != robots:
+        raise InputError(
+            f"{called} is of {_count(calibration.robots)} and {name} of {_count(robots)}; a calibration is for the "
+            "robots it was made with, in their order"
+        )
+    if calibration.design != design:
+        raise InputError(
+            f"{called} and {name} differ in design; a calibration is for the robots it was made with"
+        )
+    return calibration.units
+
+
+def _count(robots: int) -> str:
+    return "1 robot" if robots == 1 else f"{robots} robots"

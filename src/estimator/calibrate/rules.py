@@ -12,7 +12,7 @@ ROW_S = 0.25
 LOBES = 3
 """Half length, in rows, of the kernel that they are weighed with. Chosen: white noise then correlates by 0.013."""
 ROLL_OFF = 0.5
-"""Of that kernel. Chosen: nothing passes above 3 Hz."""
+"""Roll-off of that kernel. Chosen: nothing passes above 3 Hz."""
 TRIM_S = 2.0
 """Dropped at both ends against the filters' transients. Chosen, as in the paper."""
 STILL_RADPS = 1.5e-3
@@ -69,7 +69,7 @@ COARSE = 0.5
 """Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
 CONVERGED = 0.001
 """The same that ends all. Measured: at 0.02, signals were adjusted to unknowns a step back; at 0.002, what held robots'
-errors do to the payload was foretold up to 3.4 % off, at 0.001 and at 0.0001 less than 3 %."""
+errors do to the payload was predicted up to 3.4 % off, at 0.001 and at 0.0001 less than 3 %."""
 MISFIT = 1.3
 """chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
 teams with nothing else wrong; what noise adds to it is 0.03."""

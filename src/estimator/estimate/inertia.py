@@ -11,23 +11,144 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arrays import Array
-from estimator.estimate.fusion import acceleration_noise, fuse, fusion_changes
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, WeakDirection, axis, combination, judge
-from estimator.estimate.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
+from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.uncertainty import (
-    WINDOW_S,
+    StepReport,
+    WeakDirection,
     Window,
+    axis,
+    combination,
+    judge,
     standard_errors,
     window_covariance,
     window_normals,
     windows,
 )
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import (
+    acceleration_noise,
+    fuse,
+    fusion_changes,
+    inertia_regressor,
+    inertia_regressor_changes,
+)
+from estimator.signals import GraspData
 from estimator.statistics import rms
+
+AXES_SE_LIMIT_RAD = np.deg2rad(20)
+"""Principal axes less certain than this are not reported."""
+
+
+@dataclass(frozen=True)
+class PrincipalInertia:
+    """Principal moments and axes.
+
+    Attributes:
+        moments: principal moments, ascending [kg m^2], shape (3,).
+        moments_se: their standard errors [kg m^2], shape (3,).
+        R_1c: principal axes as columns in {1} (= axes of {b}), right-handed, shape (3, 3); of the four
+            choices of signs the one of smallest rotation angle, as in Table I. None when undetermined.
+        R_1c_covariance: covariance of the error rotation in {1} [rad^2], shape (3, 3), or None.
+    """
+
+    moments: Array
+    moments_se: Array
+    R_1c: Array | None
+    R_1c_covariance: Array | None
+
+    @property
+    def axis_angle_rad(self) -> Array | None:
+        """Rotation vector of R_1c [rad], shape (3,), or None."""
+        return None if self.R_1c is None else Rotation.from_matrix(self.R_1c).as_rotvec()
+
+    @property
+    def axis_angle_se_rad(self) -> Array | None:
+        """Standard errors of the components of the rotation vector [rad], shape (3,), or None."""
+        if self.R_1c is None or self.R_1c_covariance is None:
+            return None
+        return standard_errors(so3.rotvec_covariance(self.R_1c, self.R_1c_covariance))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        axes, axes_se, covariance = self.axis_angle_rad, self.axis_angle_se_rad, self.R_1c_covariance
+        return {
+            "principal_kgm2": self.moments.tolist(),
+            "principal_se_kgm2": self.moments_se.tolist(),
+            "R_1c_axis_angle_deg": None if axes is None else np.rad2deg(axes).tolist(),
+            "R_1c_se_deg": None if axes_se is None else np.rad2deg(axes_se).tolist(),
+            "R_1c_covariance_rad2": None if covariance is None else covariance.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> PrincipalInertia:
+        """Inverse of ``to_dict``; other keys are left alone."""
+        axes, covariance = values["R_1c_axis_angle_deg"], values["R_1c_covariance_rad2"]
+        return cls(
+            np.array(values["principal_kgm2"]),
+            np.array(values["principal_se_kgm2"]),
+            None if axes is None else Rotation.from_rotvec(axes, degrees=True).as_matrix(),
+            None if covariance is None else np.array(covariance),
+        )
+
+
+def about_origin(mass: float, c: Array, inertia: Array) -> Array:
+    """(m, m c, J about the origin), shape (10,), from mass [kg], centre of mass [m], inertia about it [kg m^2]."""
+    about = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.concatenate([[mass], mass * c, inertia_parameters(about)])
+
+
+def about_com(parameters: Array) -> Array:
+    """Inverse of ``about_origin``: (m, c, inertia about c), shape (10,)."""
+    m = parameters[0]
+    c = parameters[1:4] / m
+    inertia = inertia_matrix(parameters[4:]) - m * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.concatenate([[m], c, inertia_parameters(inertia)])
+
+
+def project_positive(inertia: Array) -> tuple[Array, bool]:
+    """Footnote 1: replace negative eigenvalues by zero; second result tells whether there were any."""
+    values, vectors = np.linalg.eigh(inertia)
+    if values[0] >= 0:
+        return inertia, False
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T, True
+
+
+def principal_inertia(inertia: Array, covariance: Array) -> PrincipalInertia:
+    """Equation (27) with standard errors by first-order perturbation.
+
+    From the matrix in {b}, axes of {1} [kg m^2], and the covariance of its six parameters (20) [kg^2 m^4].
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    axes = _smallest_rotation(axes)
+    # r_k^T dI r_l as a linear map of the six parameters; off-diagonal entries count twice.
+    maps = {}
+    for k in range(3):
+        for m in range(k, 3):
+            outer = np.outer(axes[:, k], axes[:, m])
+            maps[k, m] = np.array([outer[a, b] + (outer[b, a] if a != b else 0.0) for a, b in ORDER])
+    J = np.array([maps[k, k] for k in range(3)])
+    moments_se = standard_errors(J @ covariance @ J.T)
+
+    # Error rotation about c mixes a and b: (r_b^T dI r_a) / (lambda_a - lambda_b), (a, b, c) cyclic.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        about = np.array(
+            [maps[min(a, b), max(a, b)] / (moments[a] - moments[b]) for a, b in ((1, 2), (2, 0), (0, 1))]
+        )
+    rotation = about @ covariance @ about.T if np.all(np.isfinite(about)) else np.full((3, 3), np.inf)
+    if not np.all(np.diag(rotation) < AXES_SE_LIMIT_RAD**2):
+        return PrincipalInertia(moments, moments_se, None, None)
+    return PrincipalInertia(moments, moments_se, axes, axes @ rotation @ axes.T)
+
+
+def _smallest_rotation(axes: Array) -> Array:
+    """Signs of the columns such that they are right-handed and the rotation angle is smallest."""
+    choices = [axes * np.array(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]
+    choices = [R if np.linalg.det(R) > 0 else -R for R in choices]
+    return max(choices, key=np.trace)
+
 
 PARAMETERS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 SE_LIMIT = 1 / 3
@@ -94,33 +215,11 @@ class InertiaEstimate:
         )
 
 
-def momentum_regressor(w: Array) -> Array:
-    """L(w) with L(w) I_reg = I w and I_reg as in (20), shapes (..., 3) -> (..., 3, 6); (21) is L(alpha)."""
-    w = np.asarray(w, dtype=float)
-    x, y, z = w[..., 0], w[..., 1], w[..., 2]
-    L = np.zeros((*w.shape, 6))
-    L[..., 0, 0], L[..., 0, 1], L[..., 0, 2] = x, y, z
-    L[..., 1, 1], L[..., 1, 3], L[..., 1, 4] = x, y, z
-    L[..., 2, 2], L[..., 2, 4], L[..., 2, 5] = x, y, z
-    return L
-
-
-def inertia_regressor(omega: Array, alpha: Array) -> Array:
-    """A + B of (21)-(24): (A + B) I_reg = I alpha + omega x I omega, shapes (..., 3) -> (..., 3, 6).
-
-    B = [omega] L(omega). The paper prints B as six rows of three: its rows 1-3 are columns 1-3 and its rows
-    4-6 are columns 4-6 of the 3 x 6 matrix meant.
-    """
-    return momentum_regressor(alpha) + so3.skew(omega) @ momentum_regressor(omega)
-
-
 def estimate_inertia(
     trials: Sequence[GraspData],
     grasps: GraspEstimate,
     p_1c: Array,
     upstream: tuple[Array, Array] | None = None,
-    window_s: float = WINDOW_S,
-    step: str = "inertia",
 ) -> tuple[InertiaEstimate | None, StepReport]:
     """Inertia by (26) from one or several trials.
 
@@ -130,8 +229,6 @@ def estimate_inertia(
         p_1c: centre of mass in {1} [m], shape (3,).
         upstream: covariance of p_1c without the part due to the grasps, shape (3, 3), and derivative of p_1c
             by the grasp errors, shape (3, 6(N-1)); None takes p_1c as exact.
-        window_s: length of the windows for the covariance [s].
-        step: name of the step in the report.
 
     Returns:
         The estimate, or None when a direction is not determined, and the report.
@@ -139,7 +236,7 @@ def estimate_inertia(
     parts = [_equations(trial, grasps, p_1c) for trial in trials]
     X, y = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
-    report = rotational_excitation(X, alpha_noise, step)
+    report = rotational_excitation(X, alpha_noise)
     if not report.determined:
         return None, report
     parameters = _solve(X, y)
@@ -149,7 +246,7 @@ def estimate_inertia(
         why = f"the moments do not follow the motion (explained {signal:.2g} N m, left {noise:.2g} N m)"
         return None, refuse(report, np.eye(6), why)
 
-    covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
+    covariance = window_covariance(*window_normals(X, residual, trial_windows(trials)))
     moment_scale, alpha_scale = rms(y), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
     report = refuse_uncertain(report, covariance, SE_LIMIT * moment_scale / alpha_scale)
     if not report.determined:
@@ -160,20 +257,20 @@ def estimate_inertia(
     return InertiaEstimate.of(parameters, covariance, noise, signal), report
 
 
-def trial_windows(trials: Sequence[GraspData], window_s: float) -> list[Window]:
+def trial_windows(trials: Sequence[GraspData]) -> list[Window]:
     """Windows over the samples of several trials put one after the other."""
     out, first = [], 0
     for trial in trials:
-        out += windows(trial.samples, trial.rate_hz, window_s, first)
+        out += windows(trial.samples, trial.rate_hz, first)
         first += trial.samples
     return out
 
 
-def rotational_excitation(X: Array, alpha_noise: float, step: str) -> StepReport:
+def rotational_excitation(X: Array, alpha_noise: float) -> StepReport:
     """Judge the regressor (Q, 3, 6) against the noise of the angular acceleration [rad/s^2]."""
     flat = X.reshape(-1, 6)
     return judge(
-        step,
+        "inertia",
         PARAMETERS,
         flat.T @ flat / len(X),
         alpha_noise,
@@ -257,27 +354,7 @@ def by_upstream(
     return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
 
 
-def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, moment: Array) -> Array:
-    """Changes of sum_q (A + B)^T m, with A + B as of ``inertia_regressor``, by changes of the motion, (K, 6).
-
-    Args:
-        omega: angular velocity [rad/s], shape (Q, 3).
-        d_omega, d_alpha: changes of it and of the angular acceleration, shape (K, Q, 3).
-        moment: m, shape (Q, 3).
-    """
-    # L(w)^T m is linear in w m^T, and [omega]^T m = m x omega.
-    outer = np.swapaxes(d_alpha, 1, 2) @ moment + np.swapaxes(d_omega, 1, 2) @ so3.cross(moment, omega)
-    outer += omega.T @ so3.cross(moment, d_omega)
-    both = outer + np.swapaxes(outer, 1, 2)
-    i, j = np.triu_indices(3)
-    return np.where(i == j, 0.5, 1.0) * both[:, i, j]
-
-
 def thinned(trials: Sequence[GraspData]) -> list[GraspData]:
-    """Every so-and-so-many-th sample of the trials, about a thousand in all."""
+    """Evenly spaced samples of the trials, about a thousand in all."""
     stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
-    names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
-    return [
-        replace(t, rate_hz=t.rate_hz / stride, **{name: getattr(t, name)[::stride] for name in names})
-        for t in trials
-    ]
+    return [trial.every(stride) for trial in trials]

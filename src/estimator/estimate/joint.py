@@ -13,24 +13,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator import so3
 from estimator.arrays import Array
-from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse, tilt_scatter
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, cross_information
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import (
     InertiaEstimate,
-    inertia_regressor,
+    about_com,
     refuse,
     refuse_uncertain,
     rotational_excitation,
     thinned,
     trial_windows,
 )
-from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.statics import ComEstimate, MassEstimate, check_lifted, judge_com
-from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
-from estimator.signals.grasp_data import GraspData
+from estimator.estimate.uncertainty import (
+    StepReport,
+    cross_information,
+    numerical_jacobian,
+    window_covariance,
+    window_normals,
+)
+from estimator.rigid_team import acceleration_noise, payload_equations, tilt_scatter
+from estimator.signals import GraspData
 from estimator.statistics import rms
 
 COM_SE_LIMIT_M = 0.3
@@ -56,35 +59,10 @@ class JointEstimate:
     parameters: Array
 
 
-def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) -> Array:
-    """Regressor of (f, M) at the origin of {1} by (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz).
-
-    Args:
-        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {1}, shape (Q, 3).
-        specific_force: G = a + g up in {1} [m/s^2], shape (Q, 3).
-
-    Returns:
-        Shape (Q, 6, 10), force rows first.
-    """
-    W = so3.skew(omega)
-    Y = np.zeros((len(omega), 6, 10))
-    Y[:, :3, 0] = specific_force
-    Y[:, :3, 1:4] = so3.skew(alpha) + W @ W
-    Y[:, 3:, 1:4] = -so3.skew(specific_force)
-    Y[:, 3:, 4:] = inertia_regressor(omega, alpha)
-    return Y
-
-
 def estimate_joint(
-    trials: Sequence[GraspData], grasps: GraspEstimate, window_s: float = WINDOW_S, step: str = "inertia"
+    trials: Sequence[GraspData], grasps: GraspEstimate
 ) -> tuple[JointEstimate, tuple[StepReport, ...]]:
-    """Ten inertial parameters from any motion; fewer are reported when the motion is poor.
-
-    Args:
-        trials: one or several trials of the same payload and N >= 1 robots, holds included.
-        grasps: the grasp frames.
-        window_s: length of the windows for the covariance [s].
-        step: name of the inertia step in the reports.
+    """Ten inertial parameters from any motion of one payload, holds included; fewer where the motion is poor.
 
     Returns:
         The estimate and the reports on the centre of mass and the inertia.
@@ -92,11 +70,10 @@ def estimate_joint(
     Raises:
         InputError: the robots do not carry anything (the mass comes out as zero or negative).
     """
-    motions = [fuse(trial, grasps) for trial in trials]
-    Y, w, used = _equations(motions, trials)
+    Y, w = _equations(trials, grasps)
     gravity = trials[0].gravity_mps2
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
-    inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
+    inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise)
     theta, weights = _weighted_solve(Y, w)
     check_lifted(theta[0])
     residual = w - Y @ theta
@@ -106,9 +83,9 @@ def estimate_joint(
         "the payload hardly tilts about any axis across it",
     )  # fmt: skip
 
-    scale = np.sqrt(np.einsum("qrk,qrk->k", Y, Y) / used)
+    scale = np.sqrt(np.einsum("qrk,qrk->k", Y, Y) / len(w))
     scale[scale == 0] = 1.0
-    parts = trial_windows(trials, window_s)
+    parts = trial_windows(trials)
     J_weighted = weights[:, None] * Y
     J_weighted /= scale  # in place: these arrays are the largest of an estimate
     normals, scores = window_normals(J_weighted, weights * residual, parts)
@@ -116,17 +93,16 @@ def estimate_joint(
     covariance = _open_covariance(normals, scores) / np.outer(scale, scale)
 
     def moved(x: Array) -> Array:
-        equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
-        return _centred(_solve(equations[0], equations[1], weights))
+        return about_com(_solve(*_equations(thin, grasps.moved(x)), weights))
 
     # All ten stay in the fit, however weak: what is not reported is an uncertainty of what is.
     thin = thinned(trials)
-    J_own = numerical_jacobian(_centred, theta)
+    J_own = numerical_jacobian(about_com, theta)
     J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
     own_covariance = J_own @ covariance @ J_own.T
     covariance = own_covariance + J @ grasps.covariance @ J.T
 
-    values = _centred(theta)
+    values = about_com(theta)
     mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), force_rms)
     if com_report.determined:
         why = "its part cannot be told from the inertia's"
@@ -155,16 +131,10 @@ def _open_covariance(normals: Array, scores: Array) -> Array:
     return told @ window_covariance(told.T @ normals @ told, scores @ told) @ told.T + _OPEN * open_ @ open_.T
 
 
-def _equations(motions: Sequence[BodyMotion], trials: Sequence[GraspData]) -> tuple[Array, Array, int]:
-    """Regressor (Q, 6, 10), wrench (Q, 6) as (f, M), and Q over all trials."""
-    Y = np.concatenate(
-        [
-            newton_euler_regressor(m.omega, m.alpha, m.acceleration + trial.gravity_mps2 * m.up)
-            for m, trial in zip(motions, trials, strict=True)
-        ]
-    )
-    w = np.concatenate([np.concatenate([m.force, m.moment], axis=1) for m in motions])
-    return Y, w, len(w)
+def _equations(trials: Sequence[GraspData], grasps: GraspEstimate) -> tuple[Array, Array]:
+    """Regressor (Q, 6, 10) and wrench (Q, 6) as (f, M) over all trials."""
+    parts = [payload_equations(trial, grasps) for trial in trials]
+    return np.concatenate([Y for Y, _ in parts]), np.concatenate([w for _, w in parts])
 
 
 def _solve(Y: Array, w: Array, weights: Array) -> Array:
@@ -187,14 +157,6 @@ def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
         left = np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 2))), floor)
         weights = np.repeat(left[0] / left, 3)
     return _solve(Y, w, weights), weights
-
-
-def _centred(parameters: Array) -> Array:
-    """(m, m c, J about {1}) -> (m, c, inertia about c)."""
-    m = parameters[0]
-    c = parameters[1:4] / m
-    shift = m * (c @ c * np.eye(3) - np.outer(c, c))
-    return np.concatenate([[m], c, parameters[4:] - inertia_parameters(shift)])
 
 
 def _tilt_noise(trials: Sequence[GraspData], grasps: GraspEstimate) -> float:

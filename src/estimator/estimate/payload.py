@@ -16,13 +16,13 @@ from estimator.estimate.consistency import (
     check_disagreement_is_noise,
     check_rigid,
     check_same_payload,
+    withheld,
     wrench_balance,
 )
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.identifiability import StepReport
+from estimator.estimate.grasps import GraspEstimate, estimate_grasps
 from estimator.estimate.inertia import InertiaEstimate, estimate_inertia
 from estimator.estimate.joint import estimate_joint
+from estimator.estimate.leftover import contradiction, left_over, steps_of
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import (
     CONTRADICTION,
@@ -31,18 +31,12 @@ from estimator.estimate.statics import (
     estimate_from_holds,
     rounding_kg,
 )
-from estimator.estimate.uncertainty import WINDOW_S
-from estimator.estimate.withheld import withheld
+from estimator.estimate.uncertainty import StepReport
 from estimator.filtering import trim_slice
-from estimator.held import doubtful, without_held
-from estimator.leftover.contradiction import contradiction
-from estimator.leftover.leftover import left_over
-from estimator.leftover.steps import steps_of
+from estimator.quantisation import doubtful, without_held
 from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
-from estimator.signals.grasp_data import GraspData
-from estimator.signals.holds import Hold, find_holds
-from estimator.signals.process import process_recording
+from estimator.signals import GraspData, Hold, find_holds, process_recording
 
 MASS_TOLERANCE = 0.05
 """Recordings whose masses differ by more than this share are not of one payload, if beyond ``MASS_SIGMAS`` as well.
@@ -51,21 +45,12 @@ MASS_SIGMAS = 6.0
 """The same in sums of both standard errors. Chosen."""
 
 
-def mass_alone(
-    data: GraspData, holds: Sequence[Hold], grasps: GraspEstimate | None, window_s: float = WINDOW_S
-) -> MassEstimate | None:
-    """The mass by one recording alone, as ``estimate_payload`` has it; None where it does not tell.
-
-    Args:
-        data: the recording.
-        holds: its static holds.
-        grasps: grasp frames from this recording alone, or None where it does not determine them.
-        window_s: length of the windows for standard errors [s].
-    """
+def mass_alone(data: GraspData, holds: Sequence[Hold], grasps: GraspEstimate | None) -> MassEstimate | None:
+    """The mass by one recording alone, with its holds and grasps; None where it does not tell."""
     try:
         mass, com, _ = estimate_from_holds(holds, grasps, data.gravity_mps2)
         if com is None and grasps is not None:
-            return estimate_joint([data], grasps, window_s)[0].mass
+            return estimate_joint([data], grasps)[0].mass
     except (InputError, FloatingPointError, np.linalg.LinAlgError):
         return None
     return mass
@@ -89,6 +74,8 @@ def check_one_payload(masses: Iterable[tuple[str, MassEstimate | None]]) -> None
 
 Method = Literal["auto", "staged", "joint"]
 
+TRIM_S = 2.0
+"""Dropped at both ends of each recording [s]."""
 RESTING = 0.5
 """A recording that rests for more than this share of its time does not serve the inertia, if another does."""
 
@@ -97,8 +84,6 @@ def estimate_payload(
     recordings: Iterable[Recording],
     method: Method = "auto",
     cutoff_hz: float = 5.0,
-    trim_s: float = 2.0,
-    window_s: float = WINDOW_S,
     say: Callable[[str], object] = lambda _: None,
     *,
     compare_masses: bool = False,
@@ -113,8 +98,6 @@ def estimate_payload(
             holds; inertia from motion); ``"joint"``, one least squares for mass, centre of mass and inertia;
             ``"auto"``, staged when the holds determine the centre of mass, else joint.
         cutoff_hz: cut-off of the low-pass filter [Hz].
-        trim_s: time dropped at both ends of each recording [s].
-        window_s: length of the windows for standard errors [s].
         say: takes the name of the stage that begins.
         compare_masses: also refuse recordings that, each alone, say different masses (see ``check_one_payload``).
         withhold: leave out what the balance of forces does not bear out (see ``withheld``).
@@ -128,11 +111,9 @@ def estimate_payload(
     with within_arithmetic(names):
         for recording in recordings:
             names.append(recording.name)
-            trials.append(trial_of(recording, cutoff_hz, trim_s))
+            trials.append(trial_of(recording, cutoff_hz))
             del recording  # or the next one would be read before this one is let go
-        return estimate_from_trials(
-            trials, method, window_s, say, compare_masses=compare_masses, withhold=withhold
-        )
+        return estimate_from_trials(trials, method, say, compare_masses=compare_masses, withhold=withhold)
 
 
 @contextmanager
@@ -151,14 +132,14 @@ def within_arithmetic(names: Sequence[str]) -> Iterator[None]:
         ) from error
 
 
-def trial_of(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> Trial:
+def trial_of(recording: Recording, cutoff_hz: float = 5.0) -> Trial:
     """A recording processed for ``estimate_from_trials``; arguments and errors as for ``estimate_payload``."""
     check_carries(recording, "estimated")
     labels, steps = recording.metadata, steps_of(recording, cutoff_hz)
     recording, held, doubt = without_held(recording)
-    data = process_recording(recording, cutoff_hz, trim_s)
+    data = process_recording(recording, cutoff_hz, TRIM_S)
     if held:
-        left_out = doubtful(doubt, labels.rate_hz, cutoff_hz)[trim_slice(len(doubt), labels.rate_hz, trim_s)]
+        left_out = doubtful(doubt, labels.rate_hz, cutoff_hz)[trim_slice(len(doubt), labels.rate_hz, TRIM_S)]
         data = data.at(~left_out)
     return Trial(recording.name, labels.trial, labels.payload, data, steps, labels.team, labels.units)
 
@@ -166,7 +147,6 @@ def trial_of(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) 
 def estimate_from_trials(
     trials: Sequence[Trial],
     method: Method = "auto",
-    window_s: float = WINDOW_S,
     say: Callable[[str], object] = lambda _: None,
     *,
     compare_masses: bool = False,
@@ -186,7 +166,7 @@ def estimate_from_trials(
     ]
     flags: list[str] = []
     say("grasps")
-    grasps, steps = _grasps(trials, records, flags, window_s)
+    grasps, steps = _grasps(trials, records, flags)
     if grasps is not None:
         for k, trial in enumerate(trials):
             if trial.steps is not None:
@@ -208,7 +188,7 @@ def estimate_from_trials(
         if grasps is None:
             raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
         say("mass, centre of mass and inertia")
-        joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
+        joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps)
         least = rounding_kg(every_hold, trials[0].data.gravity_mps2)
         mass, com, inertia = replace(joint.mass, se=max(joint.mass.se, least)), joint.com, joint.inertia
         steps += joint_steps
@@ -220,11 +200,11 @@ def estimate_from_trials(
         if method == "staged":
             say("inertia")
             data = [trials[k].data for k in moving]
-            inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream, window_s)
+            inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream)
             steps.append(step)
         say("each recording alone")
         for k in moving:
-            records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method, window_s))
+            records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method))
         for k, trial in enumerate(trials):
             known = inertia or records[k].inertia
             force, moment = wrench_balance(trial.data, grasps, com.mass, com.p_1c, known)
@@ -239,7 +219,7 @@ def estimate_from_trials(
     if compare_masses and len(trials) > 1:
         say("the mass of each recording")
         check_one_payload(
-            (trial.name, mass_alone(trial.data, found, record.grasps, window_s))
+            (trial.name, mass_alone(trial.data, found, record.grasps))
             for trial, found, record in zip(trials, holds, records, strict=True)
         )
     estimate = PayloadEstimate(
@@ -275,11 +255,11 @@ def _units(trials: Sequence[Trial]) -> ArmUnit | None:
 
 
 def _grasps(
-    trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str], window_s: float
+    trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str]
 ) -> tuple[GraspEstimate | None, list[StepReport]]:
     """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
     for k, trial in enumerate(trials):
-        alone, steps = _grasps_of([trial], window_s)
+        alone, steps = _grasps_of([trial])
         records[k] = replace(records[k], grasps=alone)
         if alone is not None:
             flags += check_rigid(trial.name, alone)
@@ -287,15 +267,13 @@ def _grasps(
             check_disagreement_is_noise(trial.name, steps)
     found = [(record.name, record.grasps) for record in records if record.grasps is not None]
     check_agreement([name for name, _ in found], [grasps for _, grasps in found])
-    pooled, steps = _grasps_of(trials, window_s)
+    pooled, steps = _grasps_of(trials)
     return pooled, list(steps)
 
 
-def _grasps_of(
-    trials: Sequence[Trial], window_s: float
-) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
+def _grasps_of(trials: Sequence[Trial]) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
     """Grasps, with what rounding leaves of joints that rest."""
-    grasps, reports = estimate_grasps([trial.data for trial in trials], window_s)
+    grasps, reports = estimate_grasps([trial.data for trial in trials])
     told = [trial.steps.still_rad2 / len(trials) ** 2 for trial in trials if trial.steps is not None]
     return (grasps.rounded(np.sum(told, axis=0)) if grasps and told else grasps), reports
 
@@ -307,13 +285,11 @@ def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[in
     return moving or list(range(len(trials)))
 
 
-def _alone(
-    trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str, window_s: float
-) -> InertiaEstimate | None:
+def _alone(trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str) -> InertiaEstimate | None:
     if method == "joint":
-        return estimate_joint([trial.data], grasps, window_s)[0].inertia
+        return estimate_joint([trial.data], grasps)[0].inertia
     upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
-    return estimate_inertia([trial.data], grasps, com.p_1c, upstream, window_s)[0]
+    return estimate_inertia([trial.data], grasps, com.p_1c, upstream)[0]
 
 
 def inertia_flags(inertia: InertiaEstimate) -> list[str]:

@@ -21,11 +21,10 @@ from scipy.optimize import brentq
 from estimator import so3
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.fusion import fused_up, tilt_scatter, total_wrench
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, cross_information, judge
-from estimator.estimate.uncertainty import numerical_jacobian
-from estimator.signals.holds import Hold
+from estimator.estimate.grasps import GraspEstimate
+from estimator.estimate.uncertainty import StepReport, cross_information, judge, numerical_jacobian
+from estimator.rigid_team import fused_up, tilt_scatter, total_wrench
+from estimator.signals import Hold
 from estimator.statistics import rms
 
 CONTRADICTION = "the wrenches contradict each other"
@@ -35,13 +34,7 @@ CONTRADICTION_M = 0.02
 
 @dataclass(frozen=True)
 class MassEstimate:
-    """Mass from the vertical forces of the holds.
-
-    Attributes:
-        mass: m [kg].
-        se: its standard error [kg].
-        residual_rms: rms of the vertical force balance over the holds [N].
-    """
+    """Mass [kg], its standard error [kg], and the rms of the vertical force balance over the holds [N]."""
 
     mass: float
     se: float
@@ -50,11 +43,9 @@ class MassEstimate:
 
 @dataclass(frozen=True)
 class ComEstimate:
-    """Mass and centre of mass from the holds, with their common covariance.
+    """Mass [kg] and centre of mass in {1} [m] from the holds, with their common covariance.
 
     Attributes:
-        mass: the mass it goes with [kg].
-        p_1c: centre of mass in {1} [m], shape (3,).
         covariance: of (m [kg], p_1c [m]), grasp errors included, shape (4, 4).
         own_covariance: the same without the part due to the grasps.
         grasp_jacobian: derivative of p_1c by the grasp errors of ``GraspEstimate``, shape (3, 6(N-1)).
@@ -183,8 +174,7 @@ def judge_com(
 
     Args:
         information: of the directions against gravity, as ``cross_information`` gives it, shape (3, 3).
-        moment_rms: moments left over [N m].
-        weight: of the payload [N].
+        moment_rms: moments left over [N m], of a payload of some weight [N].
         tilt_noise: how well the tilt is known [rad].
         reason: why a direction is open, unless the moments make no sense.
     """

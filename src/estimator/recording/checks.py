@@ -43,11 +43,7 @@ def check_recording(recording: Recording) -> None:
 
 
 def check_carries(recording: Recording, done: str) -> None:
-    """Check that the robots carried something.
-
-    Args:
-        recording: any.
-        done: what is done with a payload, such as ``"estimated"``.
+    """Check that the robots carried something; ``done`` is what is done with a payload, such as ``"estimated"``.
 
     Raises:
         InputError: it is a free trial.

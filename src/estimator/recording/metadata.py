@@ -3,16 +3,90 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
-from estimator.arm.arms import Arms
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import COUNT, ArmUnit
-from estimator.arm.units_json import units_from_list, units_to_list
+from estimator.arm.unit import COUNT, Arms, ArmUnit, units_from_list, units_to_list
 from estimator.errors import InputError
-from estimator.recording.sampling import Sampling
-from estimator.strict import Fields, parse_json
+from estimator.strict import Fields, Rules, is_number, parse_json
+
+SENSORS = 9
+"""Channels of one robot before its commands."""
+Method = Literal["untouched", "filtered", "interpolated", "fitted"]
+"""Samples as they came; low-passed and thinned; interpolated, or polynomials fitted, then low-passed and thinned."""
+METHODS: tuple[Method, ...] = ("untouched", "filtered", "interpolated", "fitted")
+Level = Literal["joint", "wrist"]
+LEVELS: tuple[Level, ...] = ("joint", "wrist")
+_HERTZ = "a number of hertz, greater than 0 and less than 1e9"
+_SAMPLING: Rules = {
+    "native_hz": (_HERTZ, lambda x: is_number(x) and 0 < x < 1e9),
+    "first_s": ("a number of seconds, between -1e6 and 1e6", lambda x: is_number(x) and abs(x) <= 1e6),
+    "jitter_s": ("a number of seconds, from 0 to one", lambda x: is_number(x) and 0 <= x <= 1),
+    "missing": ("a share, at least 0 and less than 1", lambda x: is_number(x) and 0 <= x < 1),
+    "aligned": ("true or false", lambda x: isinstance(x, bool)),
+    "method": (f"one of {', '.join(METHODS)}", lambda x: x in METHODS),
+    "level": (f"one of {', '.join(LEVELS)}", lambda x: x in LEVELS),
+    "steps": (
+        f"{SENSORS} numbers, none negative",
+        lambda x: isinstance(x, list) and len(x) == SENSORS and all(is_number(y) and y >= 0 for y in x),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How one robot's sensors were read before its samples were brought onto the recording's grid.
+
+    A recording that was interpolated, filtered or thinned shows neither the step of an encoder nor the noise of a
+    single reading any more; errors that repeat while a joint rests are still in it. This tells them.
+
+    Attributes:
+        native_hz: rate of the samples [Hz], by the recording's clock.
+        first_s: when the first was taken, in the recording's time [s].
+        jitter_s: standard deviation of the instants from evenly spaced ones [s].
+        missing: share of samples that the log lacked.
+        aligned: whether its clock was set by the motion, so that the motion tells nothing of it any more.
+        method: what was done to them before the robots were brought together.
+        level: channels of the log, and so of ``steps``: "joint" or "wrist".
+        steps: rounding step of every channel of the log [rad, rad, N m] or [m, rad, N], 0 for none.
+    """
+
+    native_hz: float
+    first_s: float
+    jitter_s: float
+    missing: float
+    aligned: bool
+    method: Method
+    level: Level
+    steps: tuple[float, ...]
+
+    def steps_of(self, kind: int) -> Sequence[float]:
+        """Steps of phi (0), theta (1) or tau (2), three joints; 0 where the log had other channels."""
+        if self.level == "wrist" and kind != 1:
+            return (0.0, 0.0, 0.0)
+        return self.steps[3 * kind : 3 * kind + 3]
+
+    def later(self, start_s: float) -> Sampling:
+        """The same for a part of the recording that begins at ``start_s`` [s]."""
+        return replace(self, first_s=self.first_s - start_s)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values by name."""
+        return asdict(self) | {"steps": list(self.steps)}
+
+    @classmethod
+    def from_dict(cls, values: Any, where: str) -> Sampling:
+        """Parse and check.
+
+        Raises:
+            InputError: a key is unknown or missing, or a value of the wrong type or range.
+        """
+        Fields(values, tuple(_SAMPLING), where).check(_SAMPLING)
+        numbers = {key: float(values[key]) for key in ("native_hz", "first_s", "jitter_s", "missing")}
+        return cls(**values | numbers | {"steps": tuple(map(float, values["steps"]))})
+
 
 FORMAT = "mocobot-recording"
 VERSIONS = (1, 2, 3, 4, 5)
@@ -21,10 +95,9 @@ version 5 ``units``, of any trial; each is written only where it is needed."""
 FREE = "free"
 """Kind of trial in which the robots hold nothing."""
 TRIALS = ("random", "periodic", "static", FREE)
-Level = Literal["joint", "wrist"]
-LEVELS: tuple[Level, ...] = ("joint", "wrist")
 _REQUIRED = ("format", "version", "robots", "rate_hz", "trial", "source", "payload", "seed", "design")
-_OPTIONAL = ("control",)
+_NEWER = (), ("level",), ("level", "sampling"), ("level",), ("level", "units")
+"""Keys that each version requires besides."""
 
 
 @dataclass(frozen=True)
@@ -106,22 +179,21 @@ class RecordingMetadata:
 
     @classmethod
     def from_json(cls, text: str | bytes, where: str = "metadata") -> RecordingMetadata:
-        """Parse and check JSON metadata.
-
-        Args:
-            text: UTF-8 JSON.
-            where: what to call it in messages.
+        """Parse and check JSON metadata, which messages call ``where``.
 
         Raises:
             InputError: not JSON, a key unknown, missing or repeated, or a value of the wrong type or range.
         """
         values = parse_json(text, where)
-        _check_format(values, where)
-        version = values.get("version", 1)
-        newer = (), ("level",), ("level", "sampling"), ("level",), ("level", "units")
-        required = _REQUIRED + newer[version - 1]
-        optional = _OPTIONAL if version < 4 else ("sampling", *_OPTIONAL)
-        _check_values(Fields(values, required, where, optional))
+        # Before anything else: another version may well have other keys.
+        if values.get("format", FORMAT) != FORMAT:
+            raise InputError(f"{where}: format is {values['format']!r}; it must be {FORMAT!r}")
+        version = values.get("version", VERSIONS[0])
+        if type(version) is not int or version not in VERSIONS:
+            known = f"{', '.join(map(str, VERSIONS[:-1]))} and {VERSIONS[-1]}"
+            raise InputError(f"{where}: version is {version!r:.60}; this program reads versions {known}")
+        optional = ("control",) if version < 4 else ("sampling", "control")
+        Fields(values, _REQUIRED + _NEWER[version - 1], where, optional).check(_rules(values))
         kept = {key: value for key, value in values.items() if key not in ("format", "version")}
         design = OmnidDesign.from_dict(values["design"], where=f"{where}: design")
         if "sampling" in values:
@@ -133,12 +205,7 @@ class RecordingMetadata:
 
 
 def check_of_robots(units: ArmUnit, metadata: RecordingMetadata, what: str) -> None:
-    """Whether units are of as many robots, and of the same design.
-
-    Args:
-        units: robots as they are.
-        metadata: of a recording of robots.
-        what: how messages call the units.
+    """Whether units, which messages call ``what``, are of as many robots as a recording, and of the same design.
 
     Raises:
         InputError: they are not.
@@ -150,51 +217,33 @@ def check_of_robots(units: ArmUnit, metadata: RecordingMetadata, what: str) -> N
         raise InputError(f"{what}: of robots of another design than the recording's")
 
 
-def _check_format(values: dict[str, Any], where: str) -> None:
-    """Before anything else: another version may well have other keys."""
-    if values.get("format", FORMAT) != FORMAT:
-        raise InputError(f"{where}: format is {values['format']!r}; it must be {FORMAT!r}")
-    version = values.get("version", VERSIONS[0])
-    if type(version) is not int or version not in VERSIONS:
-        known = f"{', '.join(map(str, VERSIONS[:-1]))} and {VERSIONS[-1]}"
-        raise InputError(f"{where}: version is {version!r:.60}; this program reads versions {known}")
-
-
-def _check_values(fields: Fields) -> None:
-    def require(key: str, allowed: str, *, good: bool) -> None:
-        if not good:
-            fields.refuse(key, allowed)
-
-    values = fields.values
-    robots, rate, payload, seed = (values[key] for key in ("robots", "rate_hz", "payload", "seed"))
-    require("robots", "a whole number, at least 1", good=type(robots) is int and robots >= 1)
-    # A bound instead of isfinite, which overflows on whole numbers beyond the range of a float.
-    is_rate = type(rate) in (int, float) and 0 < rate < 1e9
-    require("rate_hz", "a number of hertz, greater than 0 and less than 1e9", good=is_rate)
-    trials = TRIALS if values["version"] >= 4 else TRIALS[:-1]
-    newer = (
-        ""
-        if FREE in trials or values["trial"] != FREE
-        else f" in version {values['version']} (4 has free trials)"
-    )
-    require("trial", f"one of {', '.join(trials)}{newer}", good=values["trial"] in trials)
-    require("source", "text", good=isinstance(values["source"], str))
+def _rules(values: dict[str, Any]) -> Rules:
+    """What is allowed in metadata of the version that they name."""
+    version, trial, robots = (values.get(key) for key in ("version", "trial", "robots"))
+    trials = TRIALS if (version or 0) >= 4 else TRIALS[:-1]
+    newer = f" in version {version} (4 has free trials)" if trial == FREE and FREE not in trials else ""
     # It is printed; control characters and half surrogates are not for terminals.
-    is_label = payload is None or (isinstance(payload, str) and payload.isprintable())
-    require("payload", "text or null, all of it printable", good=is_label)
-    empty = payload is None or values["trial"] != FREE
-    require("payload", "null in a free trial, whose robots hold nothing", good=empty)
-    require("seed", "a whole number or null", good=seed is None or type(seed) is int)
-    fields.object("design")
-    if "level" in fields:
-        require("level", f"one of {', '.join(LEVELS)}", good=values["level"] in LEVELS)
-    if "sampling" in fields:
-        sampling = values["sampling"]
-        good = isinstance(sampling, list) and len(sampling) == robots
-        require("sampling", "a list with one object for each robot", good=good)
-    if "units" in fields:
-        units = values["units"]
-        good = isinstance(units, list) and len(units) == robots
-        require("units", "a list with one object for each robot", good=good)
-    if "control" in fields:
-        require("control", "an object (leave it out if unknown)", good=isinstance(values["control"], dict))
+    label = "text or null, all of it printable"
+    if trial == FREE and isinstance(values.get("payload"), str) and values["payload"].isprintable():
+        label = "null in a free trial, whose robots hold nothing"
+
+    def is_label(x: Any) -> bool:
+        return x is None or (trial != FREE and isinstance(x, str) and x.isprintable())
+
+    def one_each(x: Any) -> bool:
+        return isinstance(x, list) and len(x) == robots
+
+    return {
+        "robots": ("a whole number, at least 1", lambda x: type(x) is int and x >= 1),
+        # A bound instead of isfinite, which overflows on whole numbers beyond the range of a float.
+        "rate_hz": (_HERTZ, lambda x: type(x) in (int, float) and 0 < x < 1e9),
+        "trial": (f"one of {', '.join(trials)}{newer}", lambda x: x in trials),
+        "source": ("text", lambda x: isinstance(x, str)),
+        "payload": (label, is_label),
+        "seed": ("a whole number or null", lambda x: x is None or type(x) is int),
+        "design": ("an object", lambda x: isinstance(x, dict)),
+        "level": (f"one of {', '.join(LEVELS)}", lambda x: x in LEVELS),
+        "sampling": ("a list with one object for each robot", one_each),
+        "units": ("a list with one object for each robot", one_each),
+        "control": ("an object (leave it out if unknown)", lambda x: isinstance(x, dict)),
+    }

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arm.arms import Arms, arm_of, true_joints
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
+from estimator.arm.unit import Arms, arm_of, true_joints
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.metadata import Level, RecordingMetadata
@@ -13,12 +13,7 @@ from estimator.recording.metadata import Level, RecordingMetadata
 # Column suffixes in array order: one (Q, N, 3) array per field.
 _THETA, _REF = ("theta_z", "theta_y", "theta_x"), ("ref_x", "ref_y", "ref_z")
 CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
-    "joint": {
-        "phi": ("phi1", "phi2", "phi3"),
-        "theta": _THETA,
-        "tau": ("tau1", "tau2", "tau3"),
-        "ref": _REF,
-    },
+    "joint": {"phi": ("phi1", "phi2", "phi3"), "theta": _THETA, "tau": ("tau1", "tau2", "tau3"), "ref": _REF},
     "wrist": {
         "h": ("h_x", "h_y", "h_z"),
         "theta": _THETA,

@@ -11,10 +11,10 @@ import numpy as np
 
 from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
+from estimator.calibrate.calibration import Prior, read_prior
+from estimator.calibrate.flanges import in_drawing_frames
 from estimator.calibrate.json import calibration_to_dict
-from estimator.calibrate.outcome.flanges import in_drawing_frames
-from estimator.calibrate.outcome.text import format_calibration
-from estimator.calibrate.prior import Prior, read_prior
+from estimator.calibrate.text import format_calibration
 from estimator.errors import InputError
 from estimator.files import holds, whole_folder
 from estimator.recording.model import Recording

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import ArmUnit
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.apply import calibrated, units_for
+from estimator.calibrate.calibration import Calibration, calibrated, units_for
 from estimator.errors import InputError, RepeatedRowsError
 from estimator.recording.model import Recording
 from mocobot.files.calibrations import read_calibration

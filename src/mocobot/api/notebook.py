@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
 from discrepancy.result.remains import remedy
+from estimator.arm.unit import frames_said
 from estimator.calibrate.calibration import Calibration
-from estimator.estimate.frames import frames_said
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from discrepancy.result.read import read_diagnosis
+from estimator.arm.unit import seen_by_encoders
 from estimator.errors import InputError
-from estimator.estimate.frames import seen_by_encoders
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import check_target
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of

@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
 from estimator.errors import InputError
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from estimator.recording.model import Recording
 from mocobot.api.given import Robots, recordings_of
 from mocobot.api.simulation import simulate_trials

@@ -8,10 +8,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from estimator.arm.unit import AT
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.arm.unit import AT, frames_said
+from estimator.calibrate.text import SHOWN, shown_groups
 from estimator.errors import InputError
-from estimator.estimate.frames import frames_said
 from estimator.files import whole_folder, write_json, write_text
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording

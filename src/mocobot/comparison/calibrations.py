@@ -4,15 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from estimator.arm.unit import AT, COUNT, GROUPS
-from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedPayload, Calibration
-from estimator.calibrate.outcome.carried import carried
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.arm.unit import AT, COUNT, GROUPS, MIXED, in_encoder_frames
+from estimator.arrays import Array, inertia_parameters
+from estimator.calibrate.calibration import CalibratedPayload, Calibration, carried
+from estimator.calibrate.text import SHOWN, shown_groups
 from estimator.errors import InputError
-from estimator.estimate.frames import MIXED, in_encoder_frames
 from estimator.estimate.inertia import PARAMETERS
-from estimator.estimate.principal import inertia_parameters
 from mocobot.comparison.difference import Group
 from mocobot.comparison.estimates import XYZ, grasp_groups
 

@@ -6,12 +6,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arrays import Array
+from estimator.arm.unit import MIXED, in_encoder_frames
+from estimator.arrays import Array, inertia_parameters
 from estimator.errors import InputError
-from estimator.estimate.frames import MIXED, in_encoder_frames
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import PARAMETERS
-from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from mocobot.comparison.difference import Group
 

@@ -14,8 +14,7 @@ from typing import Any
 
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
-from estimator.calibrate.outcome.text import format_calibration
-from estimator.calibrate.outcome.unit_toml import unit_toml
+from estimator.calibrate.text import format_calibration, unit_toml
 from estimator.errors import InputError
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text

@@ -12,7 +12,7 @@ from scipy.special import erf
 
 from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
-from estimator.recording.sampling import SENSORS
+from estimator.recording.metadata import SENSORS
 from mocobot_inspect.stream.noise import noise_level, wild
 from mocobot_logs.log import NS, Stamps
 

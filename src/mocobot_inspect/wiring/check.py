@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arm.arms import Arms, design_of
 from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import Arms, design_of
 from mocobot_inspect.signals import Signals
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit, team_misfit
 from mocobot_inspect.wiring.mistakes import SUSPICIONS, Mistake, suspects, wrong_zero

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.delta import (
     LegGeometry,
+    driven_motion,
     inverse_kinematics,
     is_in_reach,
     is_reachable,
@@ -14,10 +14,8 @@ from estimator.arm.delta import (
     wrist_motion,
 )
 from estimator.arm.design import OmnidDesign
-from estimator.arm.dynamics import arm_torque
-from estimator.arm.gimbal import angular_motion, rotation
-from estimator.arm.unit import ArmUnit
-from estimator.arm.wrist_level import driven_motion
+from estimator.arm.dynamics import angular_motion, arm_torque, rotation
+from estimator.arm.unit import Arms, ArmUnit, arm_of, design_of
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.checks import TORQUE_FACTOR

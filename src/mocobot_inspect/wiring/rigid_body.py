@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.estimate.identifiability import FACTOR, cross_information
-from estimator.estimate.joint import newton_euler_regressor
+from estimator.estimate.uncertainty import FACTOR, cross_information
+from estimator.rigid_team import newton_euler_regressor
 from estimator.so3 import chordal_mean, cross
 from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Grasp

@@ -39,10 +39,9 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
-from estimator.files import check_place, holds, whole_file, whole_folder
-from estimator.processes import scratch_folder
+from estimator.files import check_place, holds, scratch_folder, whole_file, whole_folder
 from estimator.recording.model import Recording
 from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from estimator.recording.sampling import Method
+from estimator.recording.metadata import Method
 from mocobot_logs.log import NS, Array, Stamps
 from mocobot_logs.resample.fill import fill_gaps, polynomial_weights, side
 

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from estimator.recording.sampling import Method
+from estimator.recording.metadata import Method
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from estimator.recording.sampling import Sampling
+from estimator.recording.metadata import Sampling
 from mocobot_logs.log import NS, Array, Stamps
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness

@@ -7,7 +7,7 @@ import numpy as np
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
 from estimator.quantisation import rounding_step
-from estimator.recording.sampling import SENSORS, Method
+from estimator.recording.metadata import SENSORS, Method
 from mocobot_logs.log import NS, Array, Samples, Stamps, joined
 from mocobot_logs.readings import repeated
 from mocobot_logs.resample.fill import Merger

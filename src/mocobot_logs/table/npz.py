@@ -10,8 +10,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.archive import refuse_other_packing
 from estimator.errors import InputError
+from estimator.files import refuse_other_packing
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.table.arrays import ArrayTable, Stored, read_exactly

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.inputs import Unpacked
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.parquet import METADATA_KEY
-from estimator.recording.parquet_claims import claimed_bytes
+from estimator.recording.parquet import METADATA_KEY, claimed_bytes
 from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.log import Stamps
 from mocobot_logs.table.stamps import from_numbers

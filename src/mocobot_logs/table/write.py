@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pcsv
 
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
 from estimator.files import whole_file
 from estimator.recording.model import Recording

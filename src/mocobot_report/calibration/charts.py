@@ -8,9 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from estimator.arm.unit import AT, Group
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.shares import GRASPS, INERTIAL
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.calibrate.calibration import GRASPS, INERTIAL, Calibration
+from estimator.calibrate.text import SHOWN, shown_groups
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import axis, chart, dots, figure, literal, log_axis, row_axis
 from mocobot_report.blocks.html import Node, el

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import carried
-from estimator.calibrate.outcome.text import frames_sentence
+from estimator.calibrate.calibration import Calibration, carried
+from estimator.calibrate.text import frames_sentence
 from mocobot_report.blocks.book import Book, section, tabs
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, plain, with_error

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from estimator.arm.unit import AT
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.calibrate.text import SHOWN, shown_groups
 from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.blocks.units import short_names
 from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.arm.unit import AT
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import carried, grasps_of
-from estimator.calibrate.outcome.text import DEG, MASSES, SHOWN, alike, shown_groups
+from estimator.calibrate.calibration import Calibration, carried, grasps_of
+from estimator.calibrate.text import DEG, MASSES, SHOWN, alike, shown_groups
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, plain
 from mocobot_report.blocks.tables import Entry, Num, component, measurement, quantity, table

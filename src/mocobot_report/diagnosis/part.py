@@ -22,7 +22,7 @@ from discrepancy.result.read import (
 from discrepancy.result.remains import farthest, remedy, sizes_of
 from discrepancy.result.text_gain import foretold_torques
 from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import LIST
 from mocobot_report.blocks.book import Book, section

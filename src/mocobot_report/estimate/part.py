@@ -12,12 +12,12 @@ import numpy as np
 import plotly.graph_objects as go
 from scipy.signal import welch
 
+from estimator.arm.unit import frames_said
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.frames import frames_said
-from estimator.estimate.identifiability import FACTOR
+from estimator.estimate.leftover import CONTRADICTS
 from estimator.estimate.result import PayloadEstimate
-from estimator.leftover.contradiction import CONTRADICTS
+from estimator.estimate.uncertainty import FACTOR
 from estimator.statistics import rms_length
 from mocobot_report.blocks.book import Book, section, tabs
 from mocobot_report.blocks.charts import axis, chart, dots, figure, line, log_axis, row_axis

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from estimator.arrays import inertia_matrix
 from estimator.errors import InputError
-from estimator.inertia import inertia_matrix
 from mocobot_sim.effects.base import Effect
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from estimator.arrays import Array
-from estimator.inertia import inertia_parameters
+from estimator.arrays import Array, inertia_parameters
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.design import omnid_design
 

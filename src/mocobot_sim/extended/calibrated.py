@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import Carried, carried
+from estimator.calibrate.calibration import Calibration, Carried, carried
 from estimator.errors import InputError
 from mocobot_sim.effects.base_tilt import BaseTilt
 from mocobot_sim.effects.catalogue import apply_effects

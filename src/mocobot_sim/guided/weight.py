@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.arm import gimbal
+from estimator.arm import dynamics as gimbal
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate

@@ -18,9 +18,9 @@ from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.result import PayloadEstimate
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from estimator.recording.model import Recording
-from estimator.signals.process import process_recording
+from estimator.signals import process_recording
 from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
 from mocobot_sim.paper.published import payload_truth
 from mocobot_sim.paper.scoring import TrialSummary, score, score_fit

@@ -7,8 +7,7 @@ another payload's recordings have calibrated them.
 from collections.abc import Sequence
 
 from estimator.calibrate.calibrate import calibrate, start_estimate
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Calibration, Prior
 from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording

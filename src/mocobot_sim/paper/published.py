@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.unit import seen_by_encoders
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.frames import seen_by_encoders
 from estimator.strict import Fields, read_toml
 
 

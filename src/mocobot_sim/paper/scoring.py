@@ -18,9 +18,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedPayload
-from estimator.calibrate.outcome.carried import carried
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.calibrate.calibration import CalibratedPayload, carried
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.published import PayloadTruth
 from mocobot_sim.scene.as_built import AsBuilt, theta_x_zeros, units_of

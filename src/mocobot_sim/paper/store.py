@@ -10,11 +10,10 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.archive import read_archive, words, write_archive
 from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
-from estimator.files import make_folder, whole_file
+from estimator.files import make_folder, read_archive, whole_file, words, write_archive
 from estimator.recording.model import Recording
 from mocobot_sim.paper.scoring import TrialSummary
 

@@ -9,7 +9,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from estimator.arrays import Array
-from estimator.processes import scratch_folder
+from estimator.files import scratch_folder
 from mocobot_sim.paper.store import Store
 
 EVERY_S = 0.2

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from estimator.arm.arms import Arms
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
+from estimator.arm.unit import Arms
 from estimator.arrays import Array
 from mocobot_view.bodies.robot import GIMBAL, LEGS
 

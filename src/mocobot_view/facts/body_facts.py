@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import single_robot
+from estimator.estimate.grasps import single_robot
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_view.facts.placement import Grasps

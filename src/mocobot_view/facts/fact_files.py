@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.unit import seen_by_encoders
 from estimator.errors import InputError
-from estimator.estimate.frames import seen_by_encoders
 from estimator.estimate.result import PayloadEstimate
 from estimator.strict import Fields, read_json
 from mocobot_sim.scene.as_built import theta_x_zeros

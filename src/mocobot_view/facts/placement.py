@@ -10,8 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arm.arms import Arms
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import Arms, ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import NamedCause
-from estimator.arm.arms import levelled, true_joints
 from estimator.arm.design import OmnidDesign
-from estimator.arm.gimbal import rotation
+from estimator.arm.dynamics import rotation
+from estimator.arm.unit import levelled, true_joints
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate

@@ -8,17 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from discrepancy.result.read import WrittenDiagnosis
-from estimator.arm.arms import levelled, true_joints
-from estimator.arm.gimbal import rotation
+from estimator.arm.dynamics import rotation
+from estimator.arm.unit import levelled, true_joints
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.fusion import fuse
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
-from estimator.signals.grasp_data import GraspData
-from estimator.signals.process import process_recording
+from estimator.rigid_team import fuse
+from estimator.signals import GraspData, process_recording
 from estimator.statistics import rms
 from mocobot_view.bodies.payload_shape import bars, cad_shape, drawn_payload
 from mocobot_view.bodies.poses import BodyMotion, body_motion

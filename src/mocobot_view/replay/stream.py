@@ -8,8 +8,8 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
+from estimator.arm.unit import frames_said
 from estimator.arrays import Array
-from estimator.estimate.frames import frames_said
 from estimator.statistics import rms, rms_length
 from mocobot_view import colours
 from mocobot_view.colours import FORCE_M_PER_N, FRAME_M, Colour

@@ -1,8 +1,8 @@
 """The trace of that spring: the torque sensor reads what the hose takes besides what the link gets."""
 
 from discrepancy.team.causes.base import ReadingError, one_joint
-from estimator.arm.arms import design_of
 from estimator.arm.delta import inverse_kinematics
+from estimator.arm.unit import design_of
 
 
 class JointSpring(ReadingError):

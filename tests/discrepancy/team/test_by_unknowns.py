@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared
-from estimator.rigid_team.residual import balance, pose_error
+from estimator.rigid_team import balance, pose_error
 from team_case import exact
 
 

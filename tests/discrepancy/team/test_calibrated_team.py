@@ -17,7 +17,7 @@ from discrepancy.team.linear.trial_linear import TrialLinear, linearise
 from estimator.arm.unit import AT, ArmUnit
 from estimator.errors import InputError
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import poses, start_bases
+from estimator.rigid_team import poses, start_bases
 from team_case import true_shared
 from uncalibrated_team import knowing, uncalibrated
 

@@ -11,7 +11,7 @@ from discrepancy.candidate import Transient
 from discrepancy.team.candidates import in_shapes
 from discrepancy.team.causes import CAUSES, cable
 from estimator.arm.delta import forward_kinematics
-from estimator.inertia import inertia_parameters
+from estimator.arrays import inertia_parameters
 from outside_wrench import check_wrench, point, relieved, reported
 from recorded_team import COM, GRASPS, HOME, STEP_S
 from team_case import DESIGN, assert_close, rate_of, residual_of

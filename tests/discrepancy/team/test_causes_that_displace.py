@@ -15,7 +15,7 @@ from discrepancy.team.causes.yielding import lagging
 from discrepancy.team.linear.trial_linear import linearise
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
 from estimator.arm.dynamics import arm_torque
-from estimator.rigid_team.residual import balance
+from estimator.rigid_team import balance
 from outside_wrench import reported
 from team_case import DESIGN, assert_close, rate_of, residual_of
 

@@ -12,10 +12,10 @@ from discrepancy.team.linear.start import linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.rig import TeamRig
+from estimator.arrays import inertia_parameters
 from estimator.estimate.payload import estimate_payload
-from estimator.estimate.principal import inertia_parameters
-from estimator.recording.sampling import Sampling
-from estimator.rigid_team.residual import Shared
+from estimator.recording.metadata import Sampling
+from estimator.rigid_team import Shared
 from hidden.logger import Logger
 from team_case import exact, residual_of
 

@@ -12,7 +12,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.free_while import free_while, in_parts, pieces_while
 from discrepancy.team.causes.grasp_play import displaced
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
-from estimator.estimate.principal import inertia_parameters
+from estimator.arrays import inertia_parameters
 from patchwork import dense
 from team_case import DESIGN, exact, residual_of
 

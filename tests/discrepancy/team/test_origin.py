@@ -13,8 +13,7 @@ from discrepancy.team.linear.start import Sensed, exact_residual
 from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
-from estimator.arm.arms import true_joints
-from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
+from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit, true_joints
 from team_case import DESIGN, exact
 from uncalibrated_team import SPREAD
 

@@ -14,7 +14,7 @@ from discrepancy.team.linear.trial_linear import filtered
 from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
-from estimator.rigid_team.residual import balance, grasp_data
+from estimator.rigid_team import balance, grasp_data
 from team_case import DESIGN, exact, residual_of
 
 DRAWS = 12

@@ -21,8 +21,8 @@ from discrepancy.team.linear.trial_linear import filtered, linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.rigid_team.residual import Bases, Shared
+from estimator.estimate.grasps import GraspEstimate
+from estimator.rigid_team import Bases, Shared
 from mocobot_sim.effects.catalogue import EFFECTS
 from patchwork import dense
 from team_case import DESIGN, assert_close, exact, rate_of, residual_of

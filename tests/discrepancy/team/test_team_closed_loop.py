@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from discrepancy.team.closed_loop import team_of
-from estimator.estimate.principal import inertia_matrix
-from estimator.rigid_team.residual import Bases, pose_error
+from estimator.arrays import inertia_matrix
+from estimator.rigid_team import Bases, pose_error
 from mocobot_sim.effects import make_effect
 from team_case import true_bases, true_shared
 

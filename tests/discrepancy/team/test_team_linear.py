@@ -8,8 +8,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics
-from estimator.rigid_team.residual import balance, grasp_data, pose_error, pose_residual, poses, start_bases
-from estimator.rigid_team.slots import PHI
+from estimator.arm.motion import PHI
+from estimator.rigid_team import balance, grasp_data, pose_error, pose_residual, poses, start_bases
 from recorded_team import GRASPS
 from team_case import DESIGN, exact, residual_of, true_bases, true_shared
 

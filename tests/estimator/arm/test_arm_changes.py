@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from estimator.arm.motion import BY_UNIT, COUNT, STEPS, ArmChanges, ArmData
 from estimator.arm.unit import COUNT as DEVIATIONS
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
-from estimator.rigid_team.residual import robot_data
-from estimator.rigid_team.slots import COUNT, STEPS
-from estimator.signals.arm_changes import BY_UNIT, ArmChanges
-from estimator.signals.arm_data import ArmData
+from estimator.rigid_team import robot_data
 from omnid_design import DESIGN
 
 INSTANTS = 12

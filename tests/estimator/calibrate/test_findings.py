@@ -1,16 +1,37 @@
-"""Recordings that do not belong together, or that something else acts on: a finding says which, and what."""
+"""What a calibration is worth: findings, trials left out, shares, and the way down."""
+
+from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import AT, COUNT, ArmUnit
+from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import GRASPS, INERTIAL, Prior
+from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.findings import held_out, shares
+from estimator.calibrate.least_squares import (
+    CarriedTrial,
+    Fit,
+    Given,
+    Layout,
+    Problem,
+    Quadratic,
+    TrialFit,
+    Unknowns,
+    fit,
+    solved,
+)
+from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from estimator.filtering import low_pass
 from estimator.recording.model import Recording
+from omnid_design import DESIGN
 from synthetic_team import Load, carry, draw_path, draw_units, load, with_noise
 
 Team = tuple[ArmUnit, Load, list[Recording]]
@@ -176,3 +197,148 @@ def test_the_recording_that_fits_worst_is_named(team: Team) -> None:
     assert found.startswith("No calibration explains first (")
     assert "; second (" in found
     assert "most in second" in found
+
+
+HELD = Prior(*[0.0] * 7)
+
+
+def test_held_out_is_what_a_calibration_without_the_trial_says():
+    rng = np.random.default_rng(8)
+    units, held = draw_units(3, Prior(), rng), load(3, rng)
+    exact = [carry(units, held, draw_path(held, rng), rng, 10.0) for _ in range(3)]
+    recordings = [with_noise(one.recording, 2e-5, 0.01, rng) for one in exact]
+    sensing = Sensing.of(recordings)
+    trials = [CarriedTrial(Rows.of(one), 0, sensing) for one in recordings]
+    designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
+    bases = tuple(one.bases for one in exact)
+    given = Given(trials, Unknowns(designed, (held.shared,), bases), Prior())
+    whole = fit(given)
+    predicted = held_out(whole)
+
+    for k in range(3):
+        rest = fit(given.only([i for i in range(3) if i != k]))
+        # Robots and payload are held, the bases alone are moved to where this trial fits best.
+        at = rest.point.unknowns
+        one = TrialEquations.of(trials[k].rows, sensing)
+        shared, base = at.carried[0], whole.point.unknowns.bases[k]
+        for _ in range(3):
+            rowed = one.at(at.units, shared, base)
+            weight = np.linalg.inv(rowed.covariance)
+            H = np.einsum("qca,qcd,qdb->ab", rowed.by_bases, weight, rowed.by_bases)
+            g = np.einsum("qca,qcd,qd->a", rowed.by_bases, weight, rowed.residual)
+            base = base.moved(-np.linalg.solve(H, g))
+        # Adjusted signals change the last digits of the weights only.
+        residual, covariance = one.residual(at.units, shared, base), one.at(at.units, shared, base).covariance
+        for found, rows in zip(predicted[k] or (), (slice(0, 12), slice(12, 18)), strict=True):
+            part = residual[:, rows]
+            chi2 = np.einsum("qc,qcd,qd->", part, np.linalg.inv(covariance[:, rows, rows]), part) / part.size
+            assert found == pytest.approx(chi2, rel=0.03)
+            assert found > 0.8
+
+
+def test_the_only_trial_of_a_payload_cannot_be_held_out():
+    rng = np.random.default_rng(9)
+    units, held = draw_units(3, Prior(), rng), load(3, rng)
+    exact = carry(units, held, draw_path(held, rng), rng, 10.0)
+    trial = CarriedTrial(Rows.of(exact.recording), 0, Sensing.of([exact.recording]))
+    found = fit(Given([trial], Unknowns(units, (held.shared,), (exact.bases,)), Prior()))
+    assert held_out(found) == [None]
+
+
+def test_shares_are_those_of_the_noise() -> None:
+    """Least squares of plain rows: the result is M_k e_k summed over recordings, whose noise e_k is white."""
+    rng = np.random.default_rng(5)
+    layout = Layout(2, 2, 2)
+    own = np.arange(layout.size)
+    held = np.r_[AT["tilt"], COUNT + np.r_[AT["tilt"]]]
+    free = np.setdiff1d(own, held)
+    trials = [np.r_[layout.of_units, layout.of_payload(k), layout.of_trial(k)] for k in range(2)]
+    trials.append(np.r_[layout.of_units])  # a free one
+    rows = [rng.normal(size=(300 + 200 * k, len(index))) for k, index in enumerate(trials)]
+    information = np.eye(layout.size)  # a weak prior
+    for A, index in zip(rows, trials, strict=True):
+        information[np.ix_(index, index)] += A.T @ A
+    C = np.zeros((layout.size, layout.size))
+    C[np.ix_(free, free)] = np.linalg.inv(information[np.ix_(free, free)])
+    parts = [
+        Quadratic(index, A.T @ A, np.zeros(len(index)), 0.0, len(A))
+        for A, index in zip(rows, trials, strict=True)
+    ]
+    carried = tuple(TrialFit(part, part, part) for part in parts[:2])
+    fields: dict[str, Any] = dict.fromkeys(Fit.__dataclass_fields__)
+    fields |= {"layout": layout, "covariance": C, "point": SimpleNamespace(trials=carried, alone=(parts[2],))}
+    found = shares(cast(Any, Fit)(**fields))
+    assert len(found) == 3
+    M = [C[:, index] @ A.T for A, index in zip(rows, trials, strict=True)]
+    variance = [np.sum(m**2, axis=1) for m in M]
+    grasps, inertial = ([np.r_[of(k)] for k in range(2)] for of in (layout.of_payload, layout.of_inertia))
+    kinds = {
+        "rod_length": np.r_[AT["rod_length"], COUNT + np.r_[AT["rod_length"]]],
+        GRASPS: np.concatenate([at[:-10] for at in grasps]),
+        INERTIAL: np.concatenate(inertial),
+    }
+    for kind, at in kinds.items():
+        for share, part in zip(found, variance, strict=True):
+            np.testing.assert_allclose(share[kind], np.mean(part[at] / np.diag(C)[at]))
+        assert 0.98 < sum(share[kind] for share in found) < 1.0  # the rest is the prior's
+    assert "tilt" not in found[0]
+    assert found[2][INERTIAL] < 0.1 < found[2]["rod_length"]
+
+
+def problem_of(teams: int) -> Problem:
+    """Two trials of one payload, carried by one team or by two, and where a calibration begins."""
+    rng = np.random.default_rng(33)
+    held = load(3, rng)
+    units = [draw_units(3, Prior(), rng) for _ in range(teams)]
+    exact = [carry(units[k % teams], held, draw_path(held, rng), rng, 12.0) for k in range(2)]
+    recordings = [with_noise(one.recording, 2e-5, 0.01, rng) for one in exact]
+    sensing = Sensing.of(recordings)
+    trials = [CarriedTrial(Rows.of(one), 0, sensing) for one in recordings]
+    designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
+    start = Unknowns(designed, (held.shared,), tuple(one.bases for one in exact))
+    return Problem(Given(trials, start, Prior()))
+
+
+def test_steps_of_one_team_are_whole() -> None:
+    problem = problem_of(1)
+    point, damping = problem.start(), 0.0
+    for _ in range(3):
+        whole = solved(*problem.normal(point))[0]
+        lower, tried, damping = problem.lower(point, damping, 5)
+        assert lower is not None
+        assert tried == 1
+        assert lower.z == pytest.approx(point.z + whole, rel=1e-12, abs=1e-15)
+        point = lower
+    assert point.value / point.rows < 1.1
+
+
+def test_steps_between_two_teams_go_down_where_whole_ones_go_up() -> None:
+    problem = problem_of(2)
+    whole = problem.start()
+    highest = whole.value
+    for _ in range(2):
+        whole = problem.moved(whole, solved(*problem.normal(whole))[0])
+    assert whole.value > 3.0 * highest
+    problem = problem_of(2)
+    point, damping = problem.start(), 0.0
+    damped = 0
+    for _ in range(4):
+        lower, tried, damping = problem.lower(point, damping, 10)
+        assert lower is not None
+        assert lower.value < point.value * (1.0 + rules.RISE)
+        damped += tried > 1
+        point = lower
+    assert damped > 0
+    assert point.value < highest
+
+
+def test_where_no_step_goes_down_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    again, problem = problem_of(1), problem_of(1)
+    point = again.start()
+    expected = again.at(point.unknowns, point.z).g
+    point = problem.start()
+    monkeypatch.setattr(rules, "RISE", -1.0)
+    assert problem.lower(point, 0.0, 4)[:2] == (None, 4)
+    np.testing.assert_array_equal(
+        problem.at(point.unknowns, point.z).g, expected
+    )  # signals are where they were

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from estimator.signals.grasp_data import GraspData
+from estimator.signals import GraspData
 from rigid_body_data import Body, body_pose
 
 GRAVITY = 9.81

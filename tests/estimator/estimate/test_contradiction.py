@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 
 from estimator.estimate.grasps import estimate_grasps
+from estimator.estimate.leftover import (
+    FINEST_NM,
+    FINEST_RAD,
+    UNKNOWN_NM,
+    UNKNOWN_RAD,
+    Leftover,
+    beyond_noise,
+    contradiction,
+    left_over,
+    steps_of,
+)
 from estimator.estimate.payload import estimate_payload
-from estimator.estimate.result import PayloadEstimate
-from estimator.estimate.text import format_estimate
-from estimator.leftover.contradiction import beyond_noise, contradiction
-from estimator.leftover.leftover import Leftover, left_over
-from estimator.leftover.steps import FINEST_NM, FINEST_RAD, UNKNOWN_NM, UNKNOWN_RAD, steps_of
-from estimator.signals.process import process_recording
+from estimator.estimate.result import PayloadEstimate, format_estimate
+from estimator.signals import process_recording
 from recorded_team import Sines, carry
 
 BITS_16 = 2 * np.pi / 2**16

@@ -1,13 +1,20 @@
-"""Every fault of a recording gets one sentence with file, column, row, value and what is allowed."""
+"""What is checked in the samples, and what they tell of their sensors."""
+
+from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from estimator.arm.delta import inverse_kinematics
 from estimator.errors import InputError
+from estimator.filtering import differentiate, low_pass
+from estimator.quantisation import Repeats, angle_of, doubtful, held_spans, quantisation_step, without_held
 from estimator.recording.checks import RATE_TOLERANCE, check_duration, check_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording, write_recording
 from omnid_design import DESIGN
 from recordings import metadata, small_recording
 
@@ -188,3 +195,232 @@ def test_duration_must_outlast_the_trim():
         InputError, match=r"^trial.parquet: 400 samples are too few: dropping 2 s at each end"
     ):
         check_duration(recording, 2.0)
+
+
+def noisy(rng: np.random.Generator, rows: int = 4000, step: float = 0.0, noise: float = 0.01) -> np.ndarray:
+    """A robot at rest: six encoders that stand and three torques."""
+    tau = rng.normal(1.0, noise, (rows, 3))
+    tau = np.round(tau / step) * step if step else tau
+    return np.concatenate([np.full((rows, 6), 0.25), tau], axis=1)
+
+
+def rows_of(recording: Recording, index: np.ndarray) -> Recording:
+    fields = {name: getattr(recording, name)[index] for name in ("phi", "theta", "tau")}
+    return replace(recording, time=np.arange(len(index)) / 100.0, ref=None, **fields)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.01])
+@pytest.mark.parametrize("times", [2, 3, 40, 4000])
+def test_a_reading_written_again_is_found(times: int, step: float) -> None:
+    rng = np.random.default_rng(1)
+    index = np.arange(8000) // times
+    found = Repeats([6, 7, 8]).of(noisy(rng, step=step)[index])
+    again = np.concatenate([[False], np.diff(index) == 0])
+    assert np.mean(found[again]) > (0.97 if step else 1.0 - 1e-9)
+    assert np.sum(found & ~again) < (0.03 * 8000 / times if step else 1)
+
+
+def test_readings_that_are_equal_by_chance_stay() -> None:
+    rng = np.random.default_rng(2)
+    values = noisy(rng, step=0.02)
+    assert np.sum(np.all(values[1:] == values[:-1], axis=1)) > 200
+    assert not Repeats([6, 7, 8]).of(values).any()
+    assert not Repeats([1]).of(np.round(rng.normal(0.0, 0.4, (4000, 2)) * [0.0, 1.0])).any()  # one joint
+
+
+def test_a_resting_robot_without_noise_in_its_torques_repeats_itself() -> None:
+    q = np.round(200 * np.sin(np.arange(4000) / 500.0))  # stairs of a coarse encoder, and a load in per cent
+    stairs = np.column_stack([q, np.round(q / 80)])
+    assert np.mean(np.all(stairs[1:] == stairs[:-1], axis=1)) > 0.5
+    assert not Repeats([1]).of(stairs).any()
+    assert not Repeats([]).of(np.zeros((3000, 2))).any()  # positions alone tell nothing
+
+
+def test_blocks_do_not_matter() -> None:
+    values = noisy(np.random.default_rng(3))[np.arange(6000) // 5]
+    one, parts = Repeats([6, 7, 8]), Repeats([6, 7, 8])
+    assert np.array_equal(one.of(values), np.concatenate([parts.of(values[:2048]), parts.of(values[2048:])]))
+
+
+def test_a_recording_with_repeated_rows_is_refused(tmp_path) -> None:
+    path = tmp_path / "stuck.parquet"
+    write_recording(rows_of(small_recording(), np.minimum(np.arange(600), 400)), path)
+    with pytest.raises(InputError, match="199 of 600 rows of omnid1 repeat the one before, first row 401"):
+        read_recording(path)
+    write_recording(rows_of(small_recording(), np.arange(600) - (np.arange(600) == 300)), path)
+    assert len(read_recording(path).time) == 600  # one row changes nothing
+
+
+def test_smooth_efforts_tell_nothing() -> None:
+    """Noise-free motion between holds, as a simulation without sensors has it: equal rows are the robot's."""
+    t = np.arange(4000) / 100.0
+    hold = np.clip(np.sin(0.5 * t), -0.5, 0.5)  # moves, then rests
+    values = np.column_stack([hold, np.cos(hold), 3.0 * hold**2])
+    assert not Repeats([2]).of(values).any()
+    noisy = values + np.array([0.0, 0.0, 0.01]) * np.random.default_rng(0).standard_normal(values.shape)
+    noisy[1000:1400] = noisy[1000]
+    assert Repeats([2]).of(noisy).sum() == 399
+
+
+def test_few_levels_tell_a_step_where_asked() -> None:
+    """A payload at rest: the encoder flickers between neighbouring values."""
+    resting = 0.3 + 1e-3 * np.array([0, 1, 1, 0, 2, 1, 0, 0, 2])
+    assert quantisation_step(resting) is None
+    assert quantisation_step(resting, levels=2) == pytest.approx(1e-3, rel=1e-9)
+    assert quantisation_step(resting[:4], levels=2) == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_a_constant_has_no_step_however_few_levels_are_asked_for() -> None:
+    assert quantisation_step(np.full(50, 0.1), levels=1) is None
+    # One value that came out as two that differ in rounding.
+    assert quantisation_step(np.array([0.1, np.nextafter(0.1, 1.0), 0.1]), levels=2) is None
+    assert quantisation_step(np.empty(0), levels=2) is None
+
+
+@pytest.mark.parametrize("digits", [1e-15, 1e-13, 1e-12, 1e-11])
+def test_values_that_differ_in_rounding_are_one(digits: float) -> None:
+    rng = np.random.default_rng(0)
+    values = 2e-7 * rng.integers(0, 400000, 5000)
+    disturbed = values * (1.0 + digits * rng.standard_normal(len(values)))
+    assert quantisation_step(disturbed) == pytest.approx(2e-7, rel=1e-5)
+
+
+def test_gaps_far_wider_than_a_step_do_not_hide_it() -> None:
+    """A channel that visits two distant places only."""
+    here = 1e-4 * np.arange(12)
+    assert quantisation_step(np.concatenate([here, 5.00007 + here])) == pytest.approx(1e-4, rel=1e-9)
+
+
+RATE_HZ, STEP = 100.0, 2.0 * np.pi / 2**16
+TIME = np.arange(3000) / RATE_HZ
+GAPS = ((400, 406), (900, 920), (1105, 1118), (1500, 1515), (2400, 2410))
+"""First reading that is kept, and the first that is another."""
+
+
+def rounded(x: np.ndarray) -> np.ndarray:
+    return STEP * np.round(x / STEP + 0.3)
+
+
+def sways() -> np.ndarray:
+    """Up to 0.6 rad/s, at no gap slower than ten steps a sample."""
+    return 0.4 + 0.2 * np.sin(2.0 * TIME) + 0.05 * np.sin(6.1 * TIME + 0.4)
+
+
+def holding(x: np.ndarray, gaps=GAPS) -> np.ndarray:
+    out = x.copy()
+    for first, stop in gaps:
+        out[first:stop] = out[first]
+    return out
+
+
+def moving_team(held: np.ndarray | None = None) -> Recording:
+    """Three robots whose joints sway, each by itself; of robot 2 the second driven angle is given."""
+    recording = small_recording(len(TIME))
+    phases = np.arange(18).reshape(2, 1, 3, 3)
+    angles = rounded(0.4 + 0.2 * np.sin(1.7 * TIME[:, None, None] + phases))
+    phi = angles[0]
+    if held is not None:
+        phi[:, 1, 1] = held
+    return replace(recording, phi=phi, theta=angles[1])
+
+
+def test_every_gap_is_found_with_a_reading_more_at_either_end():
+    assert held_spans(holding(rounded(sways())), STEP) == [(first, stop + 1) for first, stop in GAPS]
+
+
+def test_one_more_reading_on_the_way_in_and_out_hides_no_gap():
+    """What is resampled has a reading between the held value and the next."""
+    x = holding(rounded(sways()))
+    first, stop = GAPS[1]
+    x[[first, stop - 1]] += STEP
+    assert (first + 1, stop) in held_spans(x, STEP)
+
+
+def test_a_joint_that_rested_before_is_held_no_longer_than_it_moves():
+    still = np.maximum(TIME - 10.05, 0.0)
+    x = holding(rounded(np.where(TIME < 14.0, 0.4 + 0.5 * still**2, sways())), ((1000, 1015), *GAPS[3:]))
+    (start, stop), *_ = held_spans(x, STEP)
+    assert stop == 1016
+    assert 1000 <= start <= 1003
+
+
+def sticks() -> np.ndarray:
+    """It comes to rest under friction, stays, breaks away faster and faster, and so on."""
+    speed = np.maximum(np.abs(np.sin(1.3 * TIME)) - 0.4, 0.0) * np.sign(np.sin(1.3 * TIME))
+    return np.cumsum(speed) / RATE_HZ
+
+
+def behind_a_gap() -> np.ndarray:
+    """An encoder behind a gear with play stands at every turn."""
+    out, at = [], 0.0
+    for x in sways():
+        at = min(max(at, x - 2e-3), x + 2e-3)
+        out.append(at)
+    return np.array(out)
+
+
+@pytest.mark.parametrize(
+    "x",
+    [
+        sways(),
+        1e-3 * sways(),
+        np.full(len(TIME), 0.3),
+        sticks(),
+        behind_a_gap(),
+        0.2 * np.clip(np.sin(TIME), -0.5, 0.5),
+        1e-4 * np.random.default_rng(3).standard_normal(len(TIME)),
+    ],
+    ids=["moves", "creeps", "rests", "sticks", "play", "stops", "noise"],
+)
+def test_what_a_moving_angle_does_is_not_held(x):
+    assert held_spans(rounded(x), STEP) == []
+
+
+def test_held_readings_are_interpolated_onto_the_encoders_steps():
+    true = rounded(sways())
+    recording, (held,), doubt = without_held(moving_team(holding(true)))
+    assert angle_of(held.column, 3) == (0, 1, 1)
+    assert len(held.spans) == len(GAPS)
+    assert held.nats > 100.0
+    off = (recording.phi[:, 1, 1] - true) / STEP
+    np.testing.assert_allclose(off, np.round(off), atol=1e-6)
+    spoilt = holding(true) != true
+    assert np.abs(off).max() < 0.05 * np.abs((holding(true) - true) / STEP).max()
+    assert set(np.flatnonzero(off)) <= set(np.flatnonzero(doubt)) | set(np.flatnonzero(np.abs(off) < 1.5))
+    assert np.all(
+        np.isin(np.flatnonzero(doubt > 1.0), np.flatnonzero(np.convolve(spoilt, np.ones(5), "same") > 0))
+    )
+
+
+def test_a_team_that_moves_is_as_it_was_read():
+    recording = moving_team()
+    same, held, doubt = without_held(recording)
+    assert not held
+    assert not doubt.any()
+    np.testing.assert_array_equal(same.phi, recording.phi)
+
+
+def test_readings_that_scatter_by_more_than_their_steps_are_none_that_are_held():
+    """Some are equal by chance, where the joint is about to turn."""
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        recording = moving_team(rounded(sways() + rng.normal(0.0, STEP, len(TIME))))
+        assert not without_held(recording)[1]
+
+
+def test_an_encoder_slower_than_the_log_is_left_as_it_is():
+    slow = rounded(sways())[np.arange(len(TIME)) // 10 * 10]
+    assert not without_held(moving_team(slow))[1]
+
+
+def test_beyond_doubtful_samples_held_readings_change_less_than_noise():
+    """In value, rate and acceleration of the filtered angle."""
+    true = rounded(sways())
+    recording, _, doubt = without_held(moving_team(holding(true)))
+    kept = ~doubtful(doubt, RATE_HZ, 5.0)
+    assert 0.3 < kept.mean() < 0.95
+    off, noise = recording.phi[:, 1, 1] - true, true - (sways() + 0.3 * STEP)
+    for _ in range(3):
+        changed, usual = (low_pass(x, RATE_HZ, 5.0) for x in (off, noise))
+        assert np.abs(changed[kept]).max() < 2.0 * usual.std()
+        off, noise = (differentiate(x, RATE_HZ) for x in (off, noise))

@@ -1,18 +1,31 @@
+"""Recordings in files: bits, columns, metadata, levels, versions, and files that are none."""
+
+from __future__ import annotations
+
 import dataclasses
 import json
 import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from discrepancy.team.diagnosis import diagnose_team
+from estimator.arm.delta import forward_kinematics
 from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.calibrate.rows import Resolution
 from estimator.errors import InputError
-from estimator.recording.metadata import RecordingMetadata
+from estimator.estimate.payload import estimate_payload
+from estimator.recording.metadata import RecordingMetadata, Sampling
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
 from omnid_design import DESIGN
+from recorded_team import MASS, Sines, carry
 from recordings import metadata, small_recording
 
 FIELDS = ("time", "phi", "theta", "tau", "ref")
@@ -427,15 +440,6 @@ def test_a_failed_write_keeps_the_old_file(path, monkeypatch):
     assert os.listdir(path.parent) == [path.name]
 
 
-def test_targets_that_cannot_be_written(tmp_path):
-    (tmp_path / "file").write_text("")
-    (tmp_path / "folder").mkdir()
-    for target in ("file/trial.parquet", "folder", "a" * 300):
-        with pytest.raises(InputError, match=r"cannot be written \(.+\)"):
-            write_recording(small_recording(rows=20), tmp_path / target)
-    assert sorted(os.listdir(tmp_path)) == ["file", "folder"]
-
-
 def test_new_files_have_ordinary_permissions(path):
     write_recording(small_recording(rows=20), path)
     path.with_name("other").touch()
@@ -465,3 +469,279 @@ def test_lists_become_float64():
     recording = Recording(good.time.tolist(), good.phi.tolist(), good.theta, good.tau, None, good.metadata)
     assert recording.phi.dtype == np.float64
     assert np.array_equal(recording.phi, good.phi)
+
+
+SAMPLING = tuple(Sampling(100.0, 0.0, 0.0, 0.0, False, "filtered", "joint", (0.01,) * 9) for _ in range(3))
+
+
+@pytest.mark.parametrize("level", ["joint", "wrist"])
+@pytest.mark.parametrize("sampling", [None, SAMPLING])
+def test_round_trip(tmp_path: Path, level: str, sampling: tuple[Sampling, ...] | None) -> None:
+    written = small_recording(rows=40, trial="free", level=level, sampling=sampling, seed=3)
+    write_recording(written, tmp_path / "free.parquet")
+    read = read_recording(tmp_path / "free.parquet")
+    assert read.metadata == written.metadata
+    np.testing.assert_allclose(read.phi, written.phi, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(read.tau, written.tau, rtol=0, atol=1e-10)
+    told = json.loads(pq.read_schema(tmp_path / "free.parquet").metadata[b"mocobot"])
+    assert (told["version"], told["trial"], told["payload"], told["level"]) == (4, "free", None, level)
+    assert ("sampling" in told) == (sampling is not None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "version"),
+    [({}, 1), ({"level": "wrist"}, 2), ({"sampling": SAMPLING}, 3), ({"trial": "free"}, 4)],
+)
+def test_a_newer_version_is_written_only_where_it_is_needed(changes: dict[str, object], version: int) -> None:
+    text = metadata(**changes).to_json()
+    assert json.loads(text)["version"] == version
+    assert RecordingMetadata.from_json(text) == metadata(**changes)
+
+
+def test_a_payload_that_nobody_holds_is_not_written(tmp_path: Path) -> None:
+    recording = small_recording(rows=40, trial="free", payload="a")
+    with pytest.raises(
+        InputError, match="payload is 'a'; it must be null in a free trial, whose robots hold nothing"
+    ):
+        write_recording(recording, tmp_path / "free.parquet")
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_of_a_payload_comes_out_of_it() -> None:
+    carried = small_recording()
+    free = replace(carried, metadata=replace(carried.metadata, trial="free"), name="free.parquet")
+    sentence = (
+        "free.parquet: trial is 'free': the robots hold nothing, so nothing can be {}; "
+        "mocobot calibrate --free takes it"
+    )
+    for recordings in ([free], [carried, free]):
+        with pytest.raises(InputError) as caught:
+            estimate_payload(recordings)
+        assert str(caught.value) == sentence.format("estimated")
+        with pytest.raises(InputError) as caught:
+            diagnose_team(recordings)
+        assert str(caught.value) == sentence.format("diagnosed")
+
+
+TOLD = Sampling(
+    400.0, 0.25, 2e-4, 0.02, False, "interpolated", "joint", (1e-4,) * 3 + (2e-4,) * 3 + (0.01, 0.0, 0.02)
+)
+
+
+def test_it_is_written_and_read() -> None:
+    values = json.loads(json.dumps(TOLD.to_dict()))
+    assert Sampling.from_dict(values, "m") == TOLD
+    whole = values | {"native_hz": 400, "first_s": 0, "jitter_s": 0, "missing": 0, "steps": [0] * 9}
+    found = Sampling.from_dict(whole, "m")
+    assert [type(x) for x in (found.native_hz, found.first_s, found.jitter_s, found.missing)] == [float] * 4
+    assert {type(step) for step in found.steps} == {float}
+
+
+def test_steps_of_each_kind() -> None:
+    assert [TOLD.steps_of(kind) for kind in range(3)] == [(1e-4,) * 3, (2e-4,) * 3, (0.01, 0.0, 0.02)]
+    wrist = replace(TOLD, level="wrist")
+    assert [wrist.steps_of(kind) for kind in range(3)] == [(0.0,) * 3, (2e-4,) * 3, (0.0,) * 3]
+
+
+def test_a_part_begins_later() -> None:
+    assert TOLD.later(1.5) == replace(TOLD, first_s=-1.25)
+
+
+@pytest.mark.parametrize(
+    ("key", "good", "bad", "allowed"),
+    [
+        ("native_hz", [1e-3, 9.9e8], [0, -1.0, 1e9, "400", None],
+         "a number of hertz, greater than 0 and less than 1e9"),
+        ("first_s", [-1e6, 1e6], [-1.1e6, 1.1e6, None], "a number of seconds, between -1e6 and 1e6"),
+        ("jitter_s", [0.0, 1.0], [-1e-9, 1.01, True], "a number of seconds, from 0 to one"),
+        ("missing", [0.0, 0.999], [-1e-9, 1.0, "0"], "a share, at least 0 and less than 1"),
+        ("aligned", [True, False], [0, 1, None], "true or false"),
+        ("method", ["untouched", "filtered", "fitted"], ["", "thinned", 1],
+         "one of untouched, filtered, interpolated, fitted"),
+        ("level", ["joint", "wrist"], ["", "base", 1], "one of joint, wrist"),
+        ("steps", [[0] * 9, [1.0] * 9], [[0] * 8, [0] * 10, [0] * 8 + [-1e-9], [0] * 8 + ["0"], None],
+         "9 numbers, none negative"),
+    ],
+)  # fmt: skip
+def test_values_and_what_they_must_be(key: str, good: list[Any], bad: list[Any], allowed: str) -> None:
+    values = TOLD.to_dict()
+    for value in good:
+        read = Sampling.from_dict(values | {key: value}, "m")
+        assert getattr(read, key) == (tuple(value) if key == "steps" else value)
+    for value in bad:
+        with pytest.raises(InputError) as error:
+            Sampling.from_dict(values | {key: value}, "m")
+        assert str(error.value) == f"m: {key} is {value!r:.60}; it must be {allowed}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "version"),
+    [
+        ({}, 1),
+        ({"level": "wrist"}, 2),
+        ({"sampling": (TOLD,) * 3}, 3),
+        ({"trial": "free", "sampling": (TOLD,) * 3}, 4),
+        ({"trial": "free"}, 4),
+        ({"units": ArmUnit(DESIGN, np.full((3, COUNT), 1e-4))}, 5),
+    ],
+)
+def test_versions(changes: dict[str, Any], version: int) -> None:
+    """Each is written where it is needed, and every one is read."""
+    made = metadata(**changes)
+    text = made.to_json()
+    assert json.loads(text)["version"] == version
+    found = RecordingMetadata.from_json(text)
+    assert (found.level, found.trial, found.sampling) == (made.level, made.trial, made.sampling)
+    for other in (0, 6):
+        with pytest.raises(InputError, match=r"^there: .*version"):
+            RecordingMetadata.from_json(json.dumps(json.loads(text) | {"version": other}), "there")
+
+
+def test_readings_that_a_sample_is_made_of() -> None:
+    """At 100 Hz of 400 and of 50 Hz: a quarter of a reading's variance, and twice."""
+    slow, untold = replace(TOLD, native_hz=50.0), small_recording()
+    found = Resolution.of(small_recording(sampling=(TOLD, slow, TOLD)))
+    np.testing.assert_allclose(found.share, [[0.25], [2.0], [0.25]])
+    np.testing.assert_allclose(found.step, np.tile(TOLD.steps, (3, 1)))
+    np.testing.assert_allclose(Resolution.of(untold).share, np.ones((3, 1)))
+
+
+def at_wrist(recording: Recording) -> Recording:
+    return dataclasses.replace(recording, metadata=dataclasses.replace(recording.metadata, level="wrist"))
+
+
+@pytest.fixture
+def wrist_path(tmp_path):
+    return tmp_path / "trial.parquet"
+
+
+@pytest.mark.parametrize("ref", [True, False])
+def test_the_file_at_wrist_level_is_the_documented_one(wrist_path, ref: bool) -> None:
+    recording = at_wrist(small_recording(rows=20, robots=2, ref=ref))
+    write_recording(recording, wrist_path)
+    table = pq.read_table(wrist_path)
+    of_one = ["h_x", "h_y", "h_z", "theta_z", "theta_y", "theta_x", "force_x", "force_y", "force_z"]
+    of_one += ["ref_x", "ref_y", "ref_z"] if ref else []
+    assert table.column_names == ["time"] + [f"omnid{i}.{name}" for i in (1, 2) for name in of_one]
+    values = json.loads(table.schema.metadata[b"mocobot"])
+    assert (values["version"], values["level"]) == (2, "wrist")
+    h = np.array([table[f"omnid2.h_{axis}"].to_pylist() for axis in "xyz"]).T
+    assert h == pytest.approx(forward_kinematics(recording.phi[:, 1], DESIGN), abs=1e-15)
+    read = read_recording(wrist_path)
+    assert read.metadata == recording.metadata
+    assert np.array_equal(read.theta, recording.theta)
+    assert read.phi == pytest.approx(recording.phi, abs=1e-12)
+    assert read.tau == pytest.approx(recording.tau, abs=1e-10)
+    assert (read.ref is not None) == ref
+
+
+def test_joint_level_may_be_said_in_version_2(wrist_path) -> None:
+    write_recording(small_recording(rows=20), wrist_path)
+    table = pq.read_table(wrist_path)
+    values = json.loads(table.schema.metadata[b"mocobot"]) | {"version": 2, "level": "joint"}
+    pq.write_table(table.replace_schema_metadata({"mocobot": json.dumps(values)}), wrist_path)
+    assert np.array_equal(read_recording(wrist_path).phi, small_recording(rows=20).phi)
+
+
+def spoiled(wrist_path, column: str, change) -> str:
+    """What is said about a file of 50 rows whose row 7 is changed in one column."""
+    write_recording(at_wrist(small_recording(rows=50)), wrist_path)
+    table = pq.read_table(wrist_path)
+    values = table[column].to_numpy().copy()
+    values[7] = change(values[7])
+    table = table.set_column(table.column_names.index(column), column, pa.array(values))
+    pq.write_table(table, wrist_path)
+    with pytest.raises(InputError) as caught:
+        read_recording(wrist_path)
+    message = str(caught.value)
+    assert message.startswith(f"{wrist_path}: ")
+    assert "\n" not in message
+    return message[len(f"{wrist_path}: ") :]
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "words"),
+    [
+        (
+            "omnid2.h_z",
+            lambda _: 0.7,
+            "omnid2.h_x, .h_y, .h_z in row 7: leg 1 cannot reach the wrist position (",
+        ),
+        ("omnid2.h_z", lambda _: -0.2, "omnid2.h_x, .h_y, .h_z in row 7: the wrist position ("),
+        ("omnid3.h_x", lambda _: np.nan, "column 'omnid3.h_x' is nan in 1 of 50 rows, first in row 7"),
+        (
+            "omnid3.force_x",
+            lambda _: np.inf,
+            "column 'omnid3.force_x' is inf in 1 of 50 rows, first in row 7",
+        ),
+        (
+            "omnid1.force_z",
+            lambda _: 1e4,
+            "tau1 of omnid1, which follows from its force_x, force_y, force_z and",
+        ),
+        ("omnid1.theta_y", lambda _: 1.2, "column 'omnid1.theta_y' reaches 1.2 rad"),
+        ("time", lambda _: 0.0, "time goes back in row 7"),
+    ],
+)
+def test_faults_name_the_files_own_columns(wrist_path, column: str, change, words: str) -> None:
+    assert words in spoiled(wrist_path, column, change)
+
+
+def test_driven_angles_out_of_range_are_said_of_the_position(wrist_path) -> None:
+    recording = at_wrist(small_recording(rows=20))
+    recording.phi[3, 1, 2] = -0.9
+    write_recording(recording, wrist_path)
+    with pytest.raises(
+        InputError, match=r"phi3 of omnid2, which follows from its h_x, h_y, h_z, reaches -0\.9 rad"
+    ):
+        read_recording(wrist_path)
+
+
+def test_millimetres_are_recognised(wrist_path) -> None:
+    write_recording(at_wrist(small_recording(rows=20)), wrist_path)
+    table = pq.read_table(wrist_path)
+    for name in table.column_names:
+        if ".h_" in name:
+            index = table.column_names.index(name)
+            table = table.set_column(index, name, pa.array(1e3 * table[name].to_numpy()))
+    pq.write_table(table, wrist_path)
+    with pytest.raises(InputError, match=r"omnid1.h_x, .h_y, .h_z in row 0: leg .* - .* millimetres$"):
+        read_recording(wrist_path)
+
+
+def test_columns_of_the_other_level_are_unknown(wrist_path) -> None:
+    write_recording(at_wrist(small_recording(rows=20)), wrist_path)
+    table = pq.read_table(wrist_path)
+    names = [name.replace("h_x", "phi1") for name in table.column_names]
+    pq.write_table(table.rename_columns(names).replace_schema_metadata(table.schema.metadata), wrist_path)
+    with pytest.raises(
+        InputError, match=r"unknown column 'omnid1.phi1'.*; the columns at wrist level are .* h_x"
+    ):
+        read_recording(wrist_path)
+
+
+def test_what_has_no_wrist_position_is_not_written(wrist_path) -> None:
+    recording = at_wrist(small_recording(rows=20))
+    recording.phi[4, 1] = [3.0, 0.6, 0.6]
+    with pytest.raises(
+        InputError,
+        match=r"recording: omnid2: a leg is folded past its stretched position at phi = \(3, 0\.6, 0\.6\) rad",
+    ):
+        write_recording(recording, wrist_path)
+    assert not wrist_path.exists()
+
+
+def test_estimates_are_those_of_the_joint_level(wrist_path) -> None:
+    """Exact sensors; what differs is the rounding of the conversion, through differences and least squares."""
+    rng = np.random.default_rng(4)
+    motion = Sines.draw(rng, [0.05, 0.06, 0.04, 0.02, 0.02, 0.02], 20, 0.1, 1.5)
+    carried = carry(motion, Sines.draw(rng, [5.0] * 3, 8, 0.1, 1.5), 30.0)
+    wrist, joint = at_wrist(carried.recording), carried.recording
+    write_recording(wrist, wrist_path)
+    wrist, joint = estimate_payload([read_recording(wrist_path)]), estimate_payload([joint])
+    assert wrist.flags == joint.flags
+    assert wrist.mass.mass == pytest.approx(joint.mass.mass, rel=1e-9)
+    assert wrist.p_1c == pytest.approx(joint.p_1c, abs=1e-9)
+    assert wrist.grasps.p_1i == pytest.approx(joint.grasps.p_1i, abs=1e-9)
+    assert wrist.inertia.inertia == pytest.approx(joint.inertia.inertia, abs=1e-7)
+    assert joint.mass.mass == pytest.approx(MASS, rel=1e-3)

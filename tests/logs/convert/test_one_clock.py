@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from array_log import ArrayLog, stream, tones
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
 from mocobot_logs.log import CHANNELS, REF, Samples
 from mocobot_logs.one_clock import to_recording

@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from estimator.calibrate.calibration import CalibratedPayload
 from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.inertia import InertiaEstimate
-from estimator.estimate.principal import principal_inertia
+from estimator.estimate.grasps import GraspEstimate
+from estimator.estimate.inertia import InertiaEstimate, principal_inertia
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import MassEstimate
 from mocobot_sim.paper.published import PAYLOADS, payload_truth, printed_truth, published_errors

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.calibration import CalibratedTrial, Calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import CalibratedTrial, Calibration, Prior
 from estimator.errors import InputError
-from estimator.estimate.identifiability import StepReport, WeakDirection
+from estimator.estimate.leftover import Leftover
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import MassEstimate
-from estimator.leftover.leftover import Leftover
-from estimator.rigid_team.residual import Bases
+from estimator.estimate.uncertainty import StepReport, WeakDirection
+from estimator.rigid_team import Bases
 from mocobot_sim.paper.experiment import TrialSummary
 from mocobot_sim.paper.store import Store
 from recordings import metadata, small_recording

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 
 import mocobot
 from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arrays import inertia_parameters
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.errors import InputError
-from estimator.estimate.principal import inertia_parameters
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases
+from estimator.rigid_team import Bases
 from invented_calibration import invented_calibration
 from mocobot.api.simulation import SimulatedRecording
 from mocobot_sim.effects.base_tilt import BaseTilt

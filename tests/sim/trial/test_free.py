@@ -11,7 +11,7 @@ import pytest
 from effect_cases import example
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import arm_torque
-from estimator.arm.numbers import Arm
+from estimator.arm.unit import Arms as Arm
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.errors import InputError
 from mocobot_sim.control.control import home_phi

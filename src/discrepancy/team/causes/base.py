@@ -14,7 +14,7 @@ from discrepancy.numbers import Numbers, number
 from discrepancy.team.linear.patches import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.arms import Arms
+from estimator.arm.unit import Arms
 from estimator.arrays import Array
 
 Shape = Mapping[str, float]

@@ -15,10 +15,10 @@ from discrepancy.team.linear.patches import PATCH_COLUMNS, Patches
 from discrepancy.team.linear.rest import REST_RAD_PER_S
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.gimbal import moment_about_axes
+from estimator.arm.dynamics import moment_about_axes
+from estimator.arm.motion import TAU, THETA
 from estimator.arrays import Array
 from estimator.filtering import differentiate
-from estimator.rigid_team.slots import TAU, THETA
 
 PRESLIDING_OPEN_SHARE = 0.5
 """Of its limit, by which friction that gives way may differ from Prandtl's law until it slips. Measured on LuGre, Dahl

@@ -6,7 +6,7 @@ import numpy as np
 
 from discrepancy.team.causes.base import Cause, ReadingError, one_joint, stack
 from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
-from estimator.rigid_team.slots import PHI
+from estimator.arm.motion import PHI
 
 
 class LinkLength(ReadingError):

@@ -9,10 +9,8 @@ import numpy as np
 from discrepancy.candidate import Transient
 from discrepancy.team.causes.base import Cause, Shape, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arrays import Array
-from estimator.estimate.fusion import fusion_matrix
-from estimator.inertia import ORDER, inertia_matrix, inertia_parameters
-from estimator.rigid_team.residual import balance
+from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
+from estimator.rigid_team import balance, fusion_matrix
 
 MASS_OVER_S = 60.0
 """In which a mass that drifts becomes as much as its columns say. Chosen: any will do; in a minute it is as much as one

@@ -4,8 +4,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import ReadingError, one_joint, one_robot
-from estimator.arm.arms import design_of
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import ArmUnit, design_of
 
 
 class Late(ReadingError):

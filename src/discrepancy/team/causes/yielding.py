@@ -7,9 +7,9 @@ from scipy.signal import cont2discrete, lfilter
 
 from discrepancy.team.causes.base import Cause, Shape, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.gimbal import rate_matrix
+from estimator.arm.dynamics import rate_matrix
+from estimator.arm.motion import THETA
 from estimator.arrays import Array
-from estimator.rigid_team.slots import THETA
 
 RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
 """Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds

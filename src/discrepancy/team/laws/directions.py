@@ -6,9 +6,9 @@ import numpy as np
 
 from discrepancy.team.laws.place import Place
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.gimbal import moment_about_axes
+from estimator.arm.dynamics import moment_about_axes
+from estimator.arm.motion import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 from estimator.arrays import Array
-from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 
 
 def directions_at(linear: TrialLinear, place: Place) -> Array:

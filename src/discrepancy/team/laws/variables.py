@@ -6,8 +6,8 @@ import numpy as np
 
 from discrepancy.team.laws.variable import TIME, Kind, Variable
 from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arm.motion import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 from estimator.arrays import Array
-from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 
 _JOINTS: dict[str, tuple[slice, str, str, str, Kind]] = {
     "phi": (PHI, "angle of driven joint {j} of robot {i}", "phi", "rad", "angle"),

@@ -20,10 +20,10 @@ from discrepancy.team.linear.jacobian import by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered
+from estimator.arm.motion import PHI, TAU, THETA
 from estimator.arrays import Array
-from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_error
-from estimator.rigid_team.slots import PHI, TAU, THETA
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import Bases, Shared, balance, grasp_data, pose_error
+from estimator.signals import GraspData
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
-from estimator.rigid_team.residual import Bases, Shared, balance
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import Bases, Shared, balance
+from estimator.signals import GraspData
 from estimator.so3 import inverse_left_jacobian
 
 STEP = 1e-5

@@ -10,7 +10,7 @@ from scipy.signal import butter, periodogram, sosfiltfilt
 
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
-from estimator.recording.sampling import SENSORS
+from estimator.recording.metadata import SENSORS
 from mocobot_logs.resample.resampling import Resampling
 
 NOISE_SEED = 20250

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from estimator.arrays import Array
-from estimator.estimate.principal import inertia_matrix
-from estimator.rigid_team.residual import Shared
+from estimator.arrays import Array, inertia_matrix
+from estimator.rigid_team import Shared
 
 INERTIA_OFF = 0.3
 """Share by which the inertia that turns noise into moments may be off. Chosen: then these are off by as much at most;

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.arm.arms import Arms, arm_of, levelled
+from estimator.arm.motion import COUNT, PHI, STEPS, THETA, ArmData, arm_data
+from estimator.arm.unit import Arms, arm_of, levelled
 from estimator.arrays import Array
-from estimator.estimate.fusion import fuse, fusion_matrix
-from estimator.rigid_team.changes import needed_wrench, vee
-from estimator.rigid_team.residual import Bases, Shared
-from estimator.rigid_team.slots import COUNT, PHI, STEPS, THETA
-from estimator.signals.arm_data import ArmData, arm_data
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import Bases, Shared, fuse, fusion_matrix, needed_wrench, vee
+from estimator.signals import GraspData
 from estimator.so3 import cross
 
 TEAM_JACOBIAN_HZ = 25.0

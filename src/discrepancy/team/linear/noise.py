@@ -22,7 +22,7 @@ from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
-from estimator.recording.sampling import SENSORS
+from estimator.recording.metadata import SENSORS
 from mocobot_logs.resample.resampling import Resampling
 
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15

@@ -15,7 +15,7 @@ from discrepancy.team.linear.patches import Patch, Patches
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-from estimator.held import doubtful
+from estimator.quantisation import doubtful
 
 SHORTEST_HOLD_S = 1.2
 """Left of a hold, to be one row. Chosen."""

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.gimbal import rate_matrix
+from estimator.arm.dynamics import rate_matrix
+from estimator.arm.motion import TAU, THETA
 from estimator.arrays import Array
 from estimator.filtering import differentiate
-from estimator.rigid_team.slots import TAU, THETA
 
 PLAY_FORCE_N = 0.4
 """Below which a payload may be anywhere in its play. Chosen."""

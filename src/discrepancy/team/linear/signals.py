@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from estimator.arm.arms import true_joints
+from estimator.arm.unit import true_joints
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass, trim_slice
-from estimator.held import without_held
+from estimator.quantisation import without_held
+from estimator.recording.metadata import Sampling
 from estimator.recording.model import Recording
-from estimator.recording.sampling import Sampling
 
 TEAM_SMOOTH_HZ = 12.0
 """Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""

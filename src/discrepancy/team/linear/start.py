@@ -18,14 +18,13 @@ from discrepancy.team.linear.rest import Resting, Tolerances, draws_at_a_time
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from discrepancy.team.linear.whitening import Whitening
-from estimator.arm.arms import Arms
-from estimator.arrays import Array
+from estimator.arm.unit import Arms
+from estimator.arrays import Array, inertia_parameters
 from estimator.errors import InputError
-from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import (
+from estimator.rigid_team import (
     Bases,
     Shared,
     balance,

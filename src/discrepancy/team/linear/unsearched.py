@@ -8,7 +8,7 @@ from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise
 from estimator.arrays import Array
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared, poses, start_bases
+from estimator.rigid_team import Shared, poses, start_bases
 
 
 def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) -> TrialLinear:

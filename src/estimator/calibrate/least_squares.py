@@ -1,0 +1,489 @@
+"""The least squares of a calibration: loops and balance of all trials, priors on the robots, weighed payloads.
+
+Gauss-Newton from the robots as designed, on few rows first, then on all. Coordinates z are such that the robots' prior
+is standard normal; unknowns that are held have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, cho_factor, cho_solve
+
+from estimator.arm.unit import AT, COUNT, ArmUnit
+from estimator.arrays import Array
+from estimator.calibrate import rules
+from estimator.calibrate.calibration import CalibratedPayload, Calibration, Prior
+from estimator.calibrate.equations import AloneEquations, Curvature, Rowed, TrialEquations
+from estimator.calibrate.rows import Rows, Sensing
+from estimator.errors import InputError
+from estimator.rigid_team import Bases, Shared
+
+
+class Unknowns(NamedTuple):
+    """The robots side by side, grasps and inertial parameters of every payload, and bases in every trial."""
+
+    units: ArmUnit
+    carried: tuple[Shared, ...]
+    bases: tuple[Bases, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each unknown lies in one vector: robots, then payloads, then trials, as many as there are of each."""
+
+    robots: int
+    payloads: int
+    trials: int
+
+    @property
+    def of_units(self) -> slice:
+        """All robots, ``COUNT`` each."""
+        return slice(0, self.robots * COUNT)
+
+    @property
+    def per_payload(self) -> int:
+        """Grasps of robots 2 on, and ten inertial parameters."""
+        return 6 * (self.robots - 1) + 10
+
+    def of_payload(self, payload: int) -> slice:
+        """One payload's grasps (d_i, e_i for i >= 2), then (m, m c, J about {1})."""
+        start = self.of_units.stop + payload * self.per_payload
+        return slice(start, start + self.per_payload)
+
+    def of_inertia(self, payload: int) -> slice:
+        """The latter part of it."""
+        stop = self.of_payload(payload).stop
+        return slice(stop - 10, stop)
+
+    def of_trial(self, trial: int) -> slice:
+        """One trial's bases (x, y, z, yaw for i >= 2)."""
+        size = 4 * (self.robots - 1)
+        start = self.of_payload(self.payloads).start + trial * size
+        return slice(start, start + size)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns, held ones included."""
+        return self.of_trial(self.trials).start
+
+    def unit_indices(self, places: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Where the same entries of ``ArmUnit.x`` of all robots lie, robot by robot."""
+        return (np.arange(self.robots)[:, None] * COUNT + places).ravel()
+
+    def moved(self, at: Unknowns, dx: Array) -> Unknowns:
+        """Unknowns changed by a step."""
+        return Unknowns(
+            at.units.moved(dx[self.of_units].reshape(self.robots, COUNT)),
+            tuple(shared.moved(dx[self.of_payload(k)]) for k, shared in enumerate(at.carried)),
+            tuple(base.moved(dx[self.of_trial(k)]) for k, base in enumerate(at.bases)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """A sum of squares of whitened rows near some unknowns: chi2(dx) = c + 2 g . dx + dx . H dx.
+
+    Attributes:
+        index: which unknowns dx are.
+        H, g, c: as above, shapes (k, k), (k,), ().
+        count: rows in it.
+    """
+
+    index: NDArray[np.intp]
+    H: Array
+    g: Array
+    c: float
+    count: int
+
+    @classmethod
+    def of(cls, J: Array, residual: Array, covariance: Array, index: NDArray[np.intp]) -> Quadratic:
+        """From rows (n, C), their derivative (n, C, k) and the covariance of their noise (n, C, C)."""
+        factor = np.linalg.cholesky(covariance)
+        white = np.linalg.solve(factor, np.concatenate([J, residual[..., None]], axis=2))
+        flat = white.reshape(residual.size, -1)
+        gram = flat.T @ flat
+        return cls(index, gram[:-1, :-1], gram[:-1, -1], float(gram[-1, -1]), residual.size)
+
+    @property
+    def ratio(self) -> float:
+        """chi2 over the number of rows; 0 without rows."""
+        return self.c / max(1, self.count)
+
+    @property
+    def misfits(self) -> bool:
+        """Whether that is more than noise leaves."""
+        return self.ratio > max(rules.MISFIT, 1.0 + rules.MISFIT_SIGMAS * np.sqrt(2.0 / max(1, self.count)))
+
+    def plus(self, other: Quadratic) -> Quadratic:
+        """The sum of both, of the same unknowns."""
+        return Quadratic(
+            self.index, self.H + other.H, self.g + other.g, self.c + other.c, self.count + other.count
+        )
+
+    def at(self, dx: Array) -> float:
+        """chi2 after a step of all unknowns, shape (K,)."""
+        own = dx[self.index]
+        return float(self.c + 2.0 * self.g @ own + own @ self.H @ own)
+
+
+def normal_equations(parts: Sequence[Quadratic], size: int) -> tuple[Array, Array]:
+    """H (K, K) and g (K,) of all unknowns, summed over parts."""
+    H, g = np.zeros((size, size)), np.zeros(size)
+    for part in parts:
+        H[np.ix_(part.index, part.index)] += part.H
+        g[part.index] += part.g
+    return H, g
+
+
+def solved(H: Array, g: Array) -> tuple[Array, Array]:
+    """Step -H^-1 g and H^-1 of normal equations whose unknowns have different units."""
+    scale = 1.0 / np.sqrt(np.diag(H))
+    factor = cho_factor(H * np.outer(scale, scale))
+    return -scale * cho_solve(factor, scale * g), scale[:, None] * cho_solve(factor, np.diag(scale))
+
+
+class KnownMass(NamedTuple):
+    """A weighed payload: which one (from 0), what the scales say [kg], and its standard error [kg]."""
+
+    payload: int
+    mass_kg: float
+    se_kg: float
+
+
+class CarriedTrial(NamedTuple):
+    """Rows of a trial, which payload it carries (from 0), and the sensors of its robots."""
+
+    rows: Rows
+    payload: int
+    sensing: Sensing
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """All that a calibration is made from.
+
+    Attributes:
+        trials: those with a payload.
+        start: values to start from, the robots as designed, or as calibrated before.
+        prior: spread of the robots.
+        alone: recordings of unloaded arms.
+        known_mass: weighed payloads; with one, the common spring scale is free.
+        robots: an earlier calibration, whose robots are held; their errors go on to the rest.
+        held: the robots are those of the start and have no errors (``prior`` has no spread): a third quicker, and
+            trials know nothing of them.
+    """
+
+    trials: Sequence[CarriedTrial]
+    start: Unknowns
+    prior: Prior
+    alone: Sequence[AloneEquations] = ()
+    known_mass: Sequence[KnownMass] = ()
+    robots: Calibration | None = None
+    held: bool = False
+
+    def only(self, chosen: Sequence[int]) -> Given:
+        """Some of the trials, by index, with what they carry."""
+        carried = sorted({self.trials[k].payload for k in chosen})
+        start = Unknowns(
+            self.start.units,
+            tuple(self.start.carried[payload] for payload in carried),
+            tuple(self.start.bases[k] for k in chosen),
+        )
+        trials = [self.trials[k]._replace(payload=carried.index(self.trials[k].payload)) for k in chosen]
+        known = [
+            one._replace(payload=carried.index(one.payload))
+            for one in self.known_mass
+            if one.payload in carried
+        ]
+        return replace(self, trials=trials, start=start, known_mass=known)
+
+
+class TrialFit(NamedTuple):
+    """One trial at the solution: all its rows together, and either kind alone."""
+
+    all: Quadratic
+    loops: Quadratic
+    balance: Quadratic
+
+
+class Point(NamedTuple):
+    """The sum of squares near some unknowns.
+
+    Attributes:
+        unknowns: where.
+        z: the same in coordinates of ``Problem.basis``, relative to the start, shape (k,).
+        trials, alone, known: its parts: trials with a payload, recordings of unloaded arms, weighed masses.
+        H, g: normal equations of all unknowns without the prior, shapes (K, K) and (K,).
+        value: chi2 of all rows, and of the prior.
+        rows: how many there are, and coordinates that have a prior.
+    """
+
+    unknowns: Unknowns
+    z: Array
+    trials: tuple[TrialFit, ...]
+    alone: tuple[Quadratic, ...]
+    known: tuple[Quadratic, ...]
+    H: Array
+    g: Array
+    value: float
+    rows: int
+
+
+class Problem:
+    """Everything that is held against the unknowns, on some of the rows at first.
+
+    Attributes:
+        layout: where each unknown lies.
+        basis: unknowns from coordinates z, shape (K, k).
+        prior: information of the prior on z: 1 for the robots, 0 for the rest, shape (k,).
+        complete: whether all rows are in it.
+    """
+
+    def __init__(self, given: Given) -> None:
+        """On evenly spaced rows first, ``rules.COARSE_ROWS`` in all."""
+        self._given, start = given, given.start
+        self.layout = layout = Layout(len(start.units.x), len(start.carried), len(given.trials))
+        of_units = np.zeros((layout.of_units.stop, 0))
+        if given.robots is None:
+            of_units = given.prior.factor(layout.robots, hold_scale=not given.known_mass)
+        self.basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
+        self.prior = np.zeros(self.basis.shape[1])
+        self.prior[: of_units.shape[1]] = 1.0
+        # A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
+        # derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way. And
+        # where robots are held, motion may be so weak that those errors exceed what it shows of the inertia.
+        self._averaged = given.prior.arm_mass_ratio > 0.0 or not self.prior.any()
+        self._use_rows(max(1, sum(len(trial.rows.time) for trial in given.trials) // rules.COARSE_ROWS))
+
+    def _use_rows(self, every: int) -> None:
+        self.complete = every == 1
+        self._blocks = [
+            [
+                _Block(equations, self._averaged and self.complete)
+                for equations in _equations(trial, every, held=self._given.held)
+            ]
+            for trial in self._given.trials
+        ]
+
+    def on_all_rows(self, point: Point, dz: Array) -> Point:
+        """A step, and every row from there on."""
+        self._use_rows(1)
+        return self.moved(point, dz)
+
+    def start(self) -> Point:
+        """The sum of squares at the start, loops and balance apart."""
+        return self.at(self._given.start, np.zeros(self.basis.shape[1]), split=True)
+
+    def at(self, unknowns: Unknowns, z: Array, *, split: bool = False) -> Point:
+        """The sum of squares near some unknowns, which z says, too; loops and balance are told apart if ``split``.
+
+        Raises:
+            InputError: robots are such that their arms cannot be where they were.
+        """
+        split = split or self.complete
+        done = tuple(self._trial(k, unknowns, split=split) for k in range(self.layout.trials))
+        alone = tuple(_alone(equations, unknowns.units) for equations in self._given.alone)
+        known = tuple(self._weighed(one, unknowns) for one in self._given.known_mass)
+        parts = (*(trial.all for trial in done), *alone, *known)
+        H, g = normal_equations(parts, self.layout.size)
+        value = sum(part.c for part in parts) + float(self.prior @ z**2)
+        count = sum(part.count for part in parts) + int(np.count_nonzero(self.prior))
+        return Point(unknowns, z, done, alone, known, H, g, value, count)
+
+    def normal(self, point: Point) -> tuple[Array, Array]:
+        """Normal equations of z, prior included, shapes (k, k) and (k,)."""
+        H = self.basis.T @ point.H @ self.basis + np.diag(self.prior)
+        return H, self.basis.T @ point.g + self.prior * point.z
+
+    def moved(self, point: Point, dz: Array) -> Point:
+        """The same after a step; errors as for ``at``."""
+        return self.at(self.layout.moved(point.unknowns, self.basis @ dz), point.z + dz)
+
+    def lower(self, point: Point, damping: float, most: int) -> tuple[Point | None, int, float]:
+        """A damped step (D. W. Marquardt, J. SIAM 11, 1963): a point no higher, number of tries, next damping.
+
+        The point is None if all that were tried are higher. The covariance of the rows' noise is each point's own, so
+        that the sum may rise a little where it is least.
+
+        Args:
+            point: from where.
+            damping: by how much of itself the diagonal of the normal equations is raised; 0 is Gauss-Newton.
+            most: to be tried.
+        """
+        H, g = self.normal(point)
+        every = [block for blocks in self._blocks for block in blocks]
+        adjustments = [block.adjustment for block in every]
+        for tried in range(1, most + 1):
+            dz = solved(H + damping * np.diag(np.diag(H)), g)[0]
+            try:
+                there = self.moved(point, dz)
+            except (InputError, np.linalg.LinAlgError):  # no arm reaches there
+                there = None
+            if there is not None and there.value <= point.value * (1.0 + rules.RISE):
+                return there, tried, 0.0 if damping <= rules.LEAST_DAMPING else damping / rules.DAMPING
+            for block, before in zip(every, adjustments, strict=True):
+                block.adjustment = before
+            damping = max(rules.LEAST_DAMPING, damping * rules.DAMPING)
+        return None, most, damping
+
+    def _trial(self, k: int, at: Unknowns, *, split: bool) -> TrialFit:
+        """A trial at some unknowns; loops and balance apart only where asked."""
+        payload, layout = self._given.trials[k].payload, self.layout
+        of_units = slice(0, 0) if self._given.held else layout.of_units
+        index = np.r_[of_units, layout.of_payload(payload), layout.of_trial(k)]
+        sums: list[Quadratic | None] = [None, None, None]
+        for block in self._blocks[k]:
+            rowed = block.at(at.units, at.carried[payload], at.bases[k])
+            n, C = rowed.residual.shape
+            by_units = rowed.by_units.reshape(n, C, -1)[..., of_units]
+            J = np.concatenate([by_units, rowed.by_carried, rowed.by_bases], axis=2)
+            kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
+            for kind, rows in enumerate(kinds if split else kinds[:1]):
+                noise = rowed.scatter if kind else rowed.covariance
+                part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
+                before = sums[kind]
+                sums[kind] = part if before is None else before.plus(part)
+        total = sums[0]
+        assert total is not None
+        return TrialFit(total, sums[1] or total, sums[2] or total)
+
+    def _weighed(self, known: KnownMass, at: Unknowns) -> Quadratic:
+        place = np.array([self.layout.of_inertia(known.payload).start])
+        off = (at.carried[known.payload].pi[0] - known.mass_kg) / known.se_kg
+        return Quadratic(place, np.array([[1.0 / known.se_kg**2]]), np.array([off / known.se_kg]), off**2, 1)
+
+
+@dataclass(eq=False)
+class _Block:
+    """Rows of a trial, and what earlier steps found: how signals are adjusted, and the derivatives' curvature.
+
+    Derivatives of the balance are ``averaged`` over each row where every row counts.
+    """
+
+    equations: TrialEquations
+    averaged: bool
+    adjustment: Array | None = None
+    curvature: Curvature | None = None
+
+    def at(self, units: ArmUnit, shared: Shared, bases: Bases) -> Rowed:
+        """The rows at some unknowns; what is found of them is kept."""
+        if self.averaged:
+            self.curvature = self.equations.curvature(units, shared, bases, self.curvature)
+        rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature)
+        self.adjustment = rowed.adjustment
+        return rowed
+
+
+def _equations(trial: CarriedTrial, every: int, *, held: bool) -> list[TrialEquations]:
+    """Equations of one row in ``every``, in blocks; robots that are held need no derivatives."""
+    chosen = np.arange(0, len(trial.rows.time), every)
+    parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
+    return [TrialEquations.of(trial.rows.take(part), trial.sensing, held=held) for part in parts]
+
+
+def _alone(equations: AloneEquations, units: ArmUnit) -> Quadratic:
+    residual, by_own, covariance = equations.at(units)
+    n, N = residual.shape[:2]
+    J = np.zeros((n, N, 3, N, COUNT))
+    robots = np.arange(N)
+    J[:, robots, :, robots] = np.moveaxis(by_own, 1, 0)
+    shape = n * N, 3
+    return Quadratic.of(
+        J.reshape(*shape, -1), residual.reshape(shape), covariance.reshape(*shape, 3), np.arange(N * COUNT)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What came out.
+
+    Attributes:
+        point: the solution.
+        layout, basis, prior: as of ``Problem``.
+        covariance: of all unknowns, the mean spring scale held; zero for held ones, shape (K, K).
+        by_scale: derivative of all unknowns by the common spring scale that is held, shape (K,); zero where it is free.
+        before: chi2/n of loops and balance of every trial with the robots as designed, shape (trials, 2).
+        steps: Gauss-Newton steps.
+        converged: whether the last step was small.
+    """
+
+    point: Point
+    layout: Layout
+    basis: Array
+    prior: Array
+    covariance: Array
+    by_scale: Array
+    before: Array
+    steps: int
+    converged: bool
+
+    def payload(self, k: int, label: str | None) -> CalibratedPayload:
+        """A payload's numbers, by its index from 0."""
+        of, grasped = self.layout.of_payload(k), 6 * (self.layout.robots - 1)
+        shared, covariance = self.point.unknowns.carried[k], self.covariance[of, of]
+        grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
+        return CalibratedPayload(label, grasps, shared.pi, covariance, self.by_scale[of])
+
+
+def fit(given: Given) -> Fit:
+    """Calibrate.
+
+    Raises:
+        InputError, LinAlgError: arms cannot be where they were, or the equations cannot be solved.
+    """
+    problem = Problem(given)
+    layout, basis = problem.layout, problem.basis
+    point, steps, settled, damping = problem.start(), 0, False, 0.0
+    before = _with_robots_held(point, layout)
+    while True:
+        H, g = problem.normal(point)
+        dz, covariance_z = solved(H, g)
+        # Where much is left that no calibration explains, steps are small against what is left.
+        left = max(1.0, np.sqrt(point.value / point.rows))
+        size = float(np.max(np.abs(dz) / np.sqrt(np.diag(covariance_z)))) / left
+        if problem.complete:
+            settled = size < rules.CONVERGED
+            if settled or steps >= rules.MAX_STEPS:
+                break
+        elif size < rules.COARSE or steps >= rules.MAX_COARSE_STEPS:
+            point, steps = problem.on_all_rows(point, dz), steps + 1
+            continue
+        lower, tried, damping = problem.lower(point, damping, rules.MAX_STEPS - steps)
+        steps += tried
+        flat = lower is None or (tried > 1 and lower.value > (1.0 - rules.FLAT) * point.value)
+        point = lower or point
+        if flat and problem.complete:
+            break
+        if flat:
+            point = problem.on_all_rows(point, np.zeros(len(point.z)))
+
+    def followed(held: Array) -> Array:
+        """Changes of all unknowns with one of what is held, shapes (K, ...)."""
+        return held - basis @ (covariance_z @ (basis.T @ (point.H @ held)))
+
+    by_scale, covariance = np.zeros(layout.size), basis @ covariance_z @ basis.T
+    if given.robots is not None:
+        by_robots = followed(np.eye(layout.size)[:, layout.of_units])
+        by_scale = by_robots @ given.robots.by_scale.ravel()
+        covariance += by_robots @ given.robots.covariance @ by_robots.T
+    elif not given.known_mass:
+        by_scale[layout.unit_indices(np.r_[AT["stiffness_ratio"]])] = 1.0
+        by_scale = followed(by_scale)
+    return Fit(point, layout, basis, problem.prior, covariance, by_scale, before, steps, settled)
+
+
+def _with_robots_held(point: Point, layout: Layout) -> Array:
+    """chi2/n of loops and balance of every trial when payloads and bases alone are fitted, shape (trials, 2)."""
+    rest = np.arange(layout.of_units.stop, layout.size)
+    dx = np.zeros(layout.size)
+    if len(rest):
+        dx[rest] = solved(point.H[np.ix_(rest, rest)], point.g[rest])[0]
+    parts = [
+        (part.at(dx) / max(1, part.count)) for trial in point.trials for part in (trial.loops, trial.balance)
+    ]
+    return np.array(parts).reshape(-1, 2)

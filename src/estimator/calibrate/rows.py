@@ -1,0 +1,333 @@
+"""From the samples of a trial to nearly independent rows with known noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, correlate, find_peaks, sosfiltfilt
+from scipy.sparse import csr_array
+
+from estimator.arm.motion import COUNT
+from estimator.arrays import Array
+from estimator.calibrate import rules
+from estimator.filtering import MIN_SAMPLES, differentiate, low_pass
+from estimator.quantisation import rounding_step
+from estimator.recording.model import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Signals of one trial, thinned, and the linear map from there to rows.
+
+    Attributes:
+        s: filtered readings with rates and accelerations (``slots``), shape (q, N, 21).
+        operator: rows from the q instants, shape (n, q); rows in motion first.
+        time: middle of every row [s], shape (n,).
+        moving: how many rows are in motion.
+        gain: of white noise of one sample of an angle: covariance of what it leaves in a row of angle, rate and
+            acceleration, in units of its variance, shape (3, 3); in motion.
+        length: samples that a row averages over in a hold, shape (n,); 0 in motion.
+        travel: way that each driven and gimbal joint goes while a row is averaged [rad], shape (n, N, 6).
+        rate_hz: of the samples.
+        repeats: how often the same rounding errors come again, because the motion does, shape (N, 9) or 1.
+    """
+
+    s: Array
+    operator: csr_array
+    time: Array
+    moving: int
+    gain: Array
+    length: NDArray[np.intp]
+    travel: Array
+    rate_hz: float
+    repeats: Array | float
+
+    def __call__(self, x: Array) -> Array:
+        """Rows of samples, shape (q, ...) -> (n, ...)."""
+        return np.asarray(self.operator @ x.reshape(len(x), -1)).reshape(-1, *x.shape[1:])
+
+    def take(self, chosen: NDArray[np.intp]) -> Rows:
+        """Some of the rows, in order, with the instants that they need."""
+        operator = self.operator[chosen]
+        needed = np.unique(operator.indices)
+        return replace(
+            self,
+            s=self.s[needed],
+            operator=csr_array(operator[:, needed]),
+            time=self.time[chosen],
+            moving=int(np.sum(chosen < self.moving)),
+            length=self.length[chosen],
+            travel=self.travel[chosen],
+        )
+
+    @classmethod
+    def of(cls, recording: Recording) -> Rows:
+        """Rows of one recording, from where its joints move and rest."""
+        rate = recording.metadata.rate_hz
+        cutoff = min(rules.PRE_HZ, 0.4 * rate)
+        angles = np.concatenate([recording.phi, recording.theta], axis=2)
+        s = np.empty((len(angles), recording.metadata.robots, COUNT))
+        for first, x in ((0, recording.phi), (9, recording.theta)):
+            value = low_pass(x, rate, cutoff)
+            speed = differentiate(value, rate)
+            for k, part in enumerate((value, speed, differentiate(speed, rate))):
+                s[..., first + 3 * k : first + 3 * k + 3] = part
+        s[..., 18:] = low_pass(recording.tau, rate, cutoff)
+
+        stride = max(1, round(rate / rules.SAMPLE_HZ))
+        kernel, spacing = _kernel(rate / stride)
+        half = len(kernel) // 2
+        trim = round(rules.TRIM_S * rate)
+        holds, still = _holds(angles, rate, trim)
+        at = np.arange(0, len(angles), stride)
+        first, last = max(-(-trim // stride), half), min((len(angles) - trim) // stride, len(at) - half)
+        rows: list[tuple[NDArray[np.intp], Array]] = []
+        centres, length = [], []
+        beside = round(rules.BESIDE_S * rate)
+        for centre in range(first, last, spacing):
+            # Beside a hold, the kernel takes in the one rounding error that the hold's own row has already.
+            if not still[max(0, at[centre] - beside) : at[centre] + beside + 1].any():
+                rows.append((np.arange(centre - half, centre + half + 1), kernel))
+                centres.append(at[centre])
+                length.append(0)
+        moving = len(rows)
+        for start, stop in holds:
+            inside = np.arange(-(-start // stride), (stop - 1) // stride + 1)
+            rows.append((inside, np.full(len(inside), 1.0 / len(inside))))
+            centres.append((start + stop - 1) // 2)
+            length.append(stop - start)
+        operator = csr_array(
+            (
+                np.concatenate([weights for _, weights in rows]) if rows else np.zeros(0),
+                (
+                    np.repeat(np.arange(len(rows)), [len(columns) for columns, _ in rows]),
+                    np.concatenate([columns for columns, _ in rows]) if rows else np.zeros(0, dtype=int),
+                ),
+            ),
+            shape=(len(rows), len(at)),
+        )
+        thin = s[at]
+        speeds = np.abs(np.concatenate([thin[..., 3:6], thin[..., 12:15]], axis=2))
+        count = np.array([len(columns) for columns, _ in rows], dtype=float)
+        weights = abs(operator)
+        travel = weights @ speeds.reshape(len(at), -1) / np.maximum(weights.sum(axis=1), 1e-300)[:, None]
+        travel = np.asarray(travel).reshape(len(rows), -1, 6)
+        span = np.where(np.array(length) > 0, count * stride / rate, rules.ROW_S)
+        return cls(
+            thin,
+            operator,
+            recording.time[np.array(centres, dtype=int)] if rows else np.zeros(0),
+            moving,
+            _gain(rate, cutoff, stride, kernel),
+            np.array(length, dtype=np.intp),
+            travel * span[:, None, None],
+            rate,
+            _repeats(angles[trim : len(angles) - trim][~still[trim : len(angles) - trim]], rate),
+        )
+
+
+def _repeats(angles: Array, rate_hz: float) -> Array | float:
+    """Times that readings (Q, N, 6) come again to the last digit, of each angle and torque, shape (N, 9); 1 for none.
+
+    A commanded motion that repeats in whole samples repeats its rounding errors, too, and averaging over them does not
+    help. Periods are looked for where the autocorrelation of one joint is high.
+    """
+    shortest = round(rules.SHORTEST_PERIOD_S * rate_hz)
+    if len(angles) < 2 * shortest:
+        return 1.0
+    x = angles[:, 0, 0] - angles[:, 0, 0].mean()
+    alike = correlate(x, x, method="fft")[len(x) - 1 :] / np.arange(len(x), 0, -1)
+    lags = find_peaks(alike[: len(x) - shortest])[0]
+    lags = lags[lags >= shortest]
+    best = lags[np.argsort(-alike[lags])[: rules.PERIODS]]
+    lags = np.union1d(best, lags[alike[lags] > 0.9 * alike[best].max(initial=0.0)][: rules.PERIODS])
+    shares = np.array([np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0) for lag in lags])
+    if not len(lags) or shares.mean(axis=(1, 2)).max() < rules.REPEATED:
+        return 1.0
+    # The shortest multiple of the period after which a joint reads much the same: a slow one does after any.
+    first = np.argmax(shares > 0.8 * shares.max(axis=0), axis=0)
+    again = 1.0 + np.take_along_axis(shares, first[None], axis=0)[0] * (len(angles) / lags[first] - 1.0)
+    return np.concatenate([again, again[:, :3]], axis=1)
+
+
+def _kernel(rate_hz: float) -> tuple[Array, int]:
+    """Weights of a row in motion, their sum 1, and instants between rows.
+
+    A root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph Transmission
+    Theory, 1928): white noise in different rows does not correlate, so that what varies slowly is known as well as the
+    rows' covariance says. A windowed sinc's neighbours correlate by an eighth, which claims a seventh too much.
+    """
+    spacing, b = max(1, round(rules.ROW_S * rate_hz)), rules.ROLL_OFF
+    half = rules.LOBES * spacing
+    # An offset of a millionth keeps off the removable singularities at 0 and 1 / (4 b).
+    x = np.arange(-half, half + 1) / spacing + 1e-6
+    weights = np.sin(np.pi * x * (1.0 - b)) + 4.0 * b * x * np.cos(np.pi * x * (1.0 + b))
+    weights /= np.pi * x * (1.0 - (4.0 * b * x) ** 2)
+    weights += weights[::-1]
+    return weights / weights.sum(), spacing
+
+
+def _gain(rate_hz: float, cutoff_hz: float, stride: int, kernel: Array) -> Array:
+    """What a unit impulse in one sample leaves in a row, squared and summed over all samples, shape (3, 3)."""
+    half = max(round(1.5 * rate_hz), MIN_SAMPLES)
+    impulse = np.zeros(2 * half + 1)
+    impulse[half] = 1.0
+    value = low_pass(impulse, rate_hz, cutoff_hz)
+    speed = differentiate(value, rate_hz)
+    spread = np.zeros(stride * (len(kernel) - 1) + 1)
+    spread[::stride] = kernel
+    chains = np.array([np.convolve(x, spread) for x in (value, speed, differentiate(speed, rate_hz))])
+    # Even and odd parts: rates do not correlate with the others.
+    return chains @ chains.T
+
+
+def _holds(angles: Array, rate_hz: float, trim: int) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
+    """Spans of samples in which no joint of any robot moves, and all samples at rest, shape (Q,)."""
+    flat = angles.reshape(len(angles), -1)
+    speed = np.abs(differentiate(low_pass(flat, rate_hz, rules.STILL_HZ), rate_hz)).max(axis=1)
+    still = speed < rules.STILL_RADPS
+    still[:trim] = still[len(still) - trim :] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    settle, shortest = round(rules.SETTLING_S * rate_hz), round(rules.SHORTEST_HOLD_S * rate_hz)
+    spans = [(start + settle, stop - settle) for start, stop in edges.reshape(-1, 2)]
+    return [(start, stop) for start, stop in spans if stop - start >= shortest], still
+
+
+class Resolution(NamedTuple):
+    """What one recording says of its sensors; arrays of shape (N, 9): phi, theta, tau.
+
+    Attributes:
+        step: rounding step, 0 for a continuous channel [rad, N m].
+        white: standard deviation of all that is white in a sample, rounding included [rad, N m].
+        share: as in ``Sensing``, shape (N, 1).
+    """
+
+    step: Array
+    white: Array
+    share: Array
+
+    @classmethod
+    def of(cls, recording: Recording) -> Resolution:
+        """What one recording says."""
+        step, white = _steps(recording), _white(recording)
+        if recording.metadata.sampling is None:
+            # The ripple of a slow joint's rounding is no noise: without noise, no reading goes to and fro.
+            to_and_fro = _to_and_fro(recording, step)
+            noise = np.where(
+                to_and_fro < rules.TO_AND_FRO, rules.NOISE_TO_AND_FRO * to_and_fro * step, np.inf
+            )
+            white = np.minimum(white, np.sqrt(noise**2 + step**2 / 12.0))
+        return cls(step, white, _share(recording))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensing:
+    """Resolution of every channel; arrays of shape (N, 9): phi, theta, tau.
+
+    Attributes:
+        step: rounding step, 0 for a continuous channel [rad, N m].
+        sigma: standard deviation of white noise of a sample before rounding [rad, N m].
+        share: samples over readings, shape (N, 1) or 1: white errors of several readings that went into a sample, or
+            of one that went into several, have this share of their variance, as far as frequencies in a row go.
+    """
+
+    step: Array
+    sigma: Array
+    share: Array | float = 1.0
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording]) -> Sensing:
+        """Resolution of the sensors behind some recordings of the same robots, read and converted alike."""
+        return cls.pooled([Resolution.of(recording) for recording in recordings])
+
+    @classmethod
+    def pooled(cls, found: Sequence[Resolution]) -> Sensing:
+        """The same from what each says."""
+        step = np.median([one.step for one in found], axis=0)
+        white = np.sqrt(np.mean([one.white**2 for one in found], axis=0))
+        share = np.mean([one.share for one in found], axis=0)
+        return cls(step, np.sqrt(np.maximum(white**2 - share * step**2 / 12.0, 0.0)), share)
+
+    @classmethod
+    def of_each(cls, found: Sequence[Resolution]) -> list[Sensing]:
+        """The same for each recording, from all that were read and converted alike."""
+        rates = [tuple(np.round(one.share.ravel(), 3)) for one in found]
+        pools = {
+            rate: cls.pooled([one for one, its in zip(found, rates, strict=True) if its == rate])
+            for rate in set(rates)
+        }
+        return [pools[rate] for rate in rates]
+
+    def variances(self, rows: Rows) -> tuple[Array, Array]:
+        """Variance of one sample in motion, and of a row's mean in a hold, shape (n, N, 9) each.
+
+        In motion a joint that makes few steps while a row is averaged has few independent rounding errors; at rest it
+        has one, unless noise moves the reading to and fro.
+        """
+        least = np.repeat([rules.PHI_FLOOR_RAD, rules.THETA_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3) ** 2
+        floor = least * rows.rate_hz / rules.FLOOR_HZ
+        rounding, noise = self.step**2 / 12.0, self.sigma**2
+        step = np.maximum(self.step, 1e-300)
+        dithered = self.sigma > rules.DITHER * step * np.sqrt(self.share)
+        # Readings that count in a row in motion: those of a white signal.
+        samples = 1.0 / rows.gain[0, 0] / self.share
+        way = np.concatenate([rows.travel, np.full((*rows.travel.shape[:2], 3), np.inf)], axis=2)
+        independent = np.clip(1.0 + way / step, 1.0, samples)
+        repeats = np.where(dithered, 1.0, rows.repeats * samples / independent)
+        moving = noise + rounding * self.share * repeats + floor
+        long = np.maximum(rows.length, 1)[:, None, None]
+        lasting = np.clip(1.0 + way / step, 1.0, long)
+        lasting[..., 6:] = 1.0
+        held = noise / long + rounding / np.where(dithered, long, lasting) + rules.AT_REST**2 * least
+        return moving, np.broadcast_to(held, moving.shape)
+
+
+def _columns(recording: Recording) -> Array:
+    return np.concatenate([recording.phi, recording.theta, recording.tau], axis=2)
+
+
+def _steps(recording: Recording) -> Array:
+    told = recording.metadata.sampling
+    if told is not None:
+        return np.array([np.concatenate([one.steps_of(kind) for kind in range(3)]) for one in told])
+    return np.apply_along_axis(rounding_step, 0, _columns(recording))
+
+
+def _to_and_fro(recording: Recording, step: Array) -> Array:
+    """Share of slow changes, of a step at most, that the next one takes back, shape (N, 9); 1 where few are slow."""
+    change = np.rint(np.diff(_columns(recording), axis=0) / np.where(step > 0, step, np.inf))
+    slow = np.all([np.abs(change[1:]) <= 1, np.abs(change[:-1]) <= 1], axis=0)
+    back, count = np.sum(slow & (change[1:] * change[:-1] < 0), axis=0), np.sum(slow, axis=0)
+    return np.where((count < rules.LEAST_SLOW) | (step == 0), 1.0, back / np.maximum(count, 1))
+
+
+def _share(recording: Recording) -> Array:
+    """Rate of the samples over that of each robot's readings, shape (N, 1)."""
+    told, rate = recording.metadata.sampling, recording.metadata.rate_hz
+    if told is None:
+        return np.ones((recording.metadata.robots, 1))
+    return np.array([[rate / one.native_hz] for one in told])
+
+
+def _white(recording: Recording) -> Array:
+    """Standard deviation of all that is white in a sample, rounding included, shape (N, 9).
+
+    As it is told by what lies above all motion; of samples that were converted little is left there, and it is told by
+    the highest frequencies that a conversion lets pass.
+    """
+    told, rate = recording.metadata.sampling, recording.metadata.rate_hz
+    if told is None:
+        edges: tuple[float, ...] = (min(rules.NOISE_ABOVE_HZ, 0.4 * rate),)
+    else:
+        top = min(rules.PASSED * rate, 0.35 * min(one.native_hz for one in told))
+        edges = 0.6 * top, top
+    band = butter(4, edges if told else edges[0], btype="band" if told else "high", fs=rate, output="sos")
+    left = sosfiltfilt(band, _columns(recording), axis=0)
+    impulse = np.zeros(2 * round(2.0 * rate) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    kept = np.sum(sosfiltfilt(band, impulse) ** 2)
+    return 1.4826 * np.median(np.abs(left), axis=0) / np.sqrt(kept)

@@ -1,1 +1,0 @@
-"""Offsets between the robots' clocks."""

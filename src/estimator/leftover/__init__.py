@@ -1,1 +1,0 @@
-"""What no rigid payload explains of a recording, beside what noise leaves."""

@@ -1,1 +1,0 @@
-"""Robots on one rigid body: closed loops of poses, and the balance of wrenches."""

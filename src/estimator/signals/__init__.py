@@ -1,1 +1,0 @@
-"""From recordings to filtered motions and wrenches."""
