@@ -2,7 +2,13 @@
 
 Order as in the paper (section IV.C): random trials first; the grasps estimated from them construct the periodic
 motion and the static orientations; then everything is estimated, staged as in the paper and in one fit beside it.
+
+The fit is one least squares per payload, of closed loops and balance of wrenches of three trials. Robots that are as
+designed are held so. Robots that are not calibrate themselves on the same recordings, or are held as another payload's
+recordings have calibrated them.
 """
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -14,21 +20,84 @@ from joblib import Parallel
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
+from estimator.calibrate.calibrate import calibrate, start_estimate
 from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
+from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic
 from estimator.estimate.result import PayloadEstimate
 from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
-from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
-from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.scoring import TrialSummary, score, score_fit
-from mocobot_sim.paper.store import Store
-from mocobot_sim.paper.work import Progress, Work
+from mocobot_sim.paper.scoring import TrialSummary, payload_truth, score, score_fit
+from mocobot_sim.paper.store import Progress, Store, Work
 from mocobot_sim.scene.models import payload_path
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
+
+ONE_FIT = "nominal, one fit"
+SELF_CALIBRATED = "uncalibrated, self-calibrated"
+TRANSFER = "uncalibrated, transfer"
+COLUMNS = {"nominal": (ONE_FIT,), "uncalibrated": (SELF_CALIBRATED, TRANSFER)}
+"""What stands beside the column of a preset."""
+NO_SPREAD = Prior().scaled(0.0)
+"""Robots exactly as designed."""
+
+
+def three_trials(recordings: Sequence[Recording]) -> list[Recording]:
+    """The first recording of every kind of trial: a random, a static and a periodic one.
+
+    More of them would cost minutes, and noise is no longer what limits a fit of three.
+    """
+    first: dict[str, Recording] = {}
+    for recording in recordings:
+        first.setdefault(recording.metadata.trial, recording)
+    return list(first.values())
+
+
+def estimate_both(
+    recordings: Sequence[Recording], fitted: bool
+) -> tuple[PayloadEstimate, PayloadEstimate | None]:
+    """The staged estimate from one payload's recordings, and what a fit of three of them starts from, or None.
+
+    Recordings are processed once for both.
+
+    Args:
+        recordings: of the payload, read through one preset.
+        fitted: whether there will be a fit.
+
+    Raises:
+        InputError: nothing can be estimated from them.
+    """
+    with within_arithmetic([recording.name for recording in recordings]):
+        trials = [trial_of(recording) for recording in recordings]
+        first = [recordings.index(one) for one in three_trials(recordings)]
+        start = start_estimate([trials[k] for k in first]) if fitted else None
+        return estimate_from_trials(trials, "staged"), start
+
+
+def fit_trials(
+    recordings: Sequence[Recording],
+    preset: str,
+    robots: Calibration | None = None,
+    start: PayloadEstimate | None = None,
+) -> Calibration:
+    """Fit what one payload's recordings, read through one preset, say of it.
+
+    Args:
+        recordings: of the payload.
+        preset: of their sensors; robots of a calibrated one are held as designed, others calibrate themselves.
+        robots: how they came out with another payload, to be held so.
+        start: what ``start_estimate`` makes of them; None to make it here.
+
+    Raises:
+        InputError: the recordings do not determine it.
+    """
+    as_designed = robots is None and sensor_preset(preset).calibrated
+    starts = None if start is None else {recordings[0].metadata.payload: start}
+    return calibrate(recordings, prior=NO_SPREAD if as_designed else None, robots=robots, starts=starts)
+
 
 # Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
 Grasps = tuple[Array, Array]

@@ -1,17 +1,17 @@
-"""Tables II-V: the paper's columns, then those of every sensor preset, as rows of numbers.
+"""Tables II-V: the paper's columns, then those of every sensor preset, as rows of numbers and as text.
 
-Beside the staged estimate of a preset stands what one fit gives (``mocobot_sim.paper.fits``). Where the frames that the
-encoders define are known, grasps and centres of mass have rows in these, too.
+Beside the staged estimate of a preset stands what one fit gives (``mocobot_sim.paper.experiment``). Where the frames
+that the encoders define are known, grasps and centres of mass have rows in these, too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from typing import Any
 
-from mocobot_sim.paper.published import published_errors
-from mocobot_sim.paper.scoring import ENCODER_FRAMES, SPRING_SCALE
+from mocobot_sim.paper.scoring import ENCODER_FRAMES, SPRING_SCALE, published_errors
 
 PAIRS = ("12", "23", "31")
 MOMENTS = ("Ixx", "Iyy", "Izz")
@@ -283,3 +283,65 @@ def number(value: float | None) -> str:
     if value is None:
         return "none"
     return f"{value:.2g}" if value >= 1e-4 or value == 0 else f"{value:.1e}"
+
+
+def format_tables(scores: AllScores) -> str:
+    """All four tables.
+
+    Args:
+        scores: by preset, then payload, as in ``paper.json``.
+    """
+    blocks = []
+    for table in paper_tables(scores):
+        rows, last = [], ""
+        for row in table.rows:
+            head = f"({row.payload})" if row.payload != last else ""
+            label = row.quantity if row.unit == "deg" else f"{row.quantity} [{row.unit}]"
+            rows.append([head, _framed(label, row), *map(format_cell, row.cells)])
+            last = row.payload
+        shown = _align(_heads(["", "", *table.columns]), rows)
+        blocks.append(f"Table {table.number}. {table.title}\n{_wrapped(table.note)}\n\n{shown}")
+    return "\n\n".join(blocks)
+
+
+def format_summary(scores: AllScores) -> str:
+    """The summary as text."""
+    table = summary_table(scores)
+    rows = [
+        [_framed(f"{row.quantity} [{row.unit}]", row), *map(format_cell, row.cells)] for row in table.rows
+    ]
+    shown = _align(_heads([table.title, *table.columns]), rows)
+    return f"{shown}\n\n{_wrapped(table.note)}" if table.note else shown
+
+
+def format_cell(cell: Cell) -> str:
+    """``0.94 +- 0.21``, two significant digits; ``none`` where there is no number."""
+    value = number(cell.value)
+    return value if cell.spread is None else f"{value} +- {number(cell.spread)}"
+
+
+def _framed(label: str, row: Row) -> str:
+    return f"{label}, {row.frames}" if row.frames else label
+
+
+def _heads(columns: Sequence[str]) -> list[list[str]]:
+    """Heads in two lines where one has a comma."""
+    if not any(", " in column for column in columns):
+        return [list(columns)]
+    parts = [column.partition(", ") for column in columns]
+    return [[first + comma.strip() for first, comma, _ in parts], [second for _, _, second in parts]]
+
+
+def _wrapped(note: str) -> str:
+    held = note.replace(" %", "\0%")  # a number and its unit stay together
+    return "\n".join(wrap(held, 120)).replace("\0", " ")
+
+
+def _align(heads: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> str:
+    cells = [*heads, *rows]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in cells
+    ]
+    return "\n".join([*lines[: len(heads)], "-" * max(map(len, lines)), *lines[len(heads) :]])

@@ -1,4 +1,4 @@
-"""Exact linear springs and dampers made of soft equality constraints, solved together with the stiff ones.
+"""MuJoCo's constraint rows: stiff parts, stiction, and exact linear springs and dampers.
 
 A passive spring or damper on a light body is unstable at 1 ms, or is integrated implicitly where the constraint
 solver cannot see it and pulls the welds open. A soft ``equality`` row is part of the solver's own problem. MuJoCo
@@ -10,13 +10,28 @@ for ``solref = (-s, -b)``, a constant impedance d = ``solimp[0] = solimp[1]`` an
 coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, with s = 0, damping b / ((1 - d) A).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
-from mocobot_sim.scene.pymjcf import mjcf
+if TYPE_CHECKING:
+    import mujoco
+
+    from mocobot_sim.scene.pymjcf import mjcf
+
+_RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+STIFF: dict[str, Any] = {"solref": [0.004, 1.0], "solimp": _RIGID}
+"""What holds as a rigid part would: welds, and limits that nothing goes through."""
+STICK: dict[str, Any] = {"solreffriction": [-1.0, -1000.0], "solimpfriction": _RIGID}
+"""Coulomb friction that sticks, for ``frictionloss``.
+
+Under its limit, a friction row lets its coordinate creep at -R f / B: with the smallest R and a rate B that stops a
+coordinate within a millisecond, a coordinate of inertia I creeps at 1e-7 f / I [1/s].
+"""
 
 # Of d and of 1 - d: MuJoCo clips d to this range.
 _LEAST = 1e-4
@@ -84,8 +99,10 @@ def _constant_impedance(d: float) -> list[float]:
     return [float(d), float(d), 0.001, 0.5, 2.0]
 
 
-def tune(root: "mjcf.RootElement", model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
+def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
     """Set soft rows of a PyMJCF tree for the inertias of the model that it compiles to."""
+    import mujoco
+
     for row in rows:
         equality = model.equality(row.equality).id
         on = model.eq_obj1id[equality]
@@ -106,6 +123,8 @@ def tune(root: "mjcf.RootElement", model: mujoco.MjModel, rows: Sequence[SoftRow
 
 def row_compliance(model: mujoco.MjModel, joint: int) -> float:
     """Compliance of the spring row that holds a joint at zero, read back from the model; 0 if there is none."""
+    import mujoco
+
     for k in range(model.neq):
         if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj1id[k] == joint:
             s, soft = -model.eq_solref[k, 0], 1.0 - model.eq_solimp[k, 0]

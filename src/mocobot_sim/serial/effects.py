@@ -1,15 +1,21 @@
-"""What MJCF cannot say of a joint: torques by the state, one joint at a time."""
+"""Effects of a serial robot, and how those act that MJCF cannot say: torques by the state, one joint at a time."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
 from estimator.arrays import Array
-from mocobot_sim.serial.law import CREEP, direction
+from estimator.strict import Fields
+from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_name, check_numbers
+
+CREEP = 1e-3
+"""Speed over which dry friction changes its direction here [rad/s or m/s]: slow beside what joints do."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,129 @@ class RobotEffect:
         begins = tuple(f"{stem}_" for stem in stems)
         (name,) = (n for n in self.parameters if n in stems or n.startswith(begins))
         return float(self.parameters[name])
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Of all joints at one step.
+
+    Attributes:
+        time_s: since the start.
+        period_s: of a step.
+        q, dq: positions and rates, shape (J,).
+        ddq: accelerations of the step before, shape (J,).
+        load: torques that the masses behind the joints ask for, shape (J,).
+        torque: that the drives give, shape (J,).
+    """
+
+    time_s: float
+    period_s: float
+    q: Array
+    dq: Array
+    ddq: Array
+    load: Array
+    torque: Array
+
+    def signal(self, name: str) -> float:
+        """A signal by its name: ``time``, ``q_3``, ``direction_3`` and so on."""
+        if name == "time":
+            return self.time_s
+        kind, _, number = name.rpartition("_")
+        j = int(number) - 1
+        return direction(float(self.dq[j])) if kind == "direction" else float(getattr(self, kind)[j])
+
+
+def direction(speed: float) -> float:
+    """Direction of a motion in [-1, 1]."""
+    return math.tanh(speed / CREEP)
+
+
+TEXTS, NUMBERS = ("target", "function", "of", "times"), ("amplitude", "number", "second", "phase_rad")
+TARGET, TARGETS = re.compile(r"(torque|position)_[1-9][0-9]*"), "torque_3, position_3"
+SIGNAL = re.compile(r"time|(q|dq|ddq|direction|load|torque)_[1-9][0-9]*")
+SIGNALS = "time, q_3, dq_3, ddq_3, direction_3, load_3, torque_3"
+
+
+@dataclass(frozen=True)
+class JointLaw:
+    """``amplitude`` times a function of a signal, and times another signal where one is named, at a joint from 1.
+
+    Attributes:
+        target: ``torque_3``, what the torque of joint 3 holds besides, or ``position_3``, what its reading is off by,
+            which is an error of the log and not simulated.
+        function: as in ``mocobot_sim.functions.FUNCTIONS``.
+        of, times: signals, all in SI: ``time``, ``q_3``, ``dq_3``, ``ddq_3``, ``direction_3``, ``load_3`` and
+            ``torque_3``; ``times`` is empty where there is none.
+        amplitude: in the target's unit over those of the signals.
+        number, second, phase_rad: what the function has inside (docs/effects.md).
+    """
+
+    target: str
+    function: str
+    of: str
+    amplitude: float
+    number: float = 0.0
+    second: float = 0.0
+    phase_rad: float = 0.0
+    times: str = ""
+
+    def __post_init__(self) -> None:
+        """Check names and numbers.
+
+        Raises:
+            InputError: a name is not known, or a number is not allowed with this function.
+        """
+        check_name("target", self.target, bool(TARGET.fullmatch(self.target)), TARGETS)
+        check_name("function", self.function, self.function in FUNCTIONS, ", ".join(FUNCTIONS))
+        check_name("of", self.of, bool(SIGNAL.fullmatch(self.of)), SIGNALS)
+        check_name("times", self.times, not self.times or bool(SIGNAL.fullmatch(self.times)), SIGNALS)
+        check_numbers(self.function, self.number, self.second)
+
+    @property
+    def joint(self) -> int:
+        """At which joint, from 1."""
+        return int(self.target.rpartition("_")[2])
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is a torque, and no error of a reading."""
+        return self.target.startswith("torque")
+
+    def to_dict(self) -> dict[str, str | float]:
+        """Plain JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def of_dict(cls, values: Mapping[str, Any], where: str) -> JointLaw:
+        """From plain JSON values.
+
+        Raises:
+            InputError: they are no formula.
+        """
+        entry = Fields(values, (*TEXTS, *NUMBERS), where)
+        given: dict[str, Any] = {key: str(entry.values[key]) for key in TEXTS}
+        return cls(**given | {key: entry.number(key) for key in NUMBERS})
+
+
+class ActingLaw:
+    """A law in one run: it may remember what was, such as a play.
+
+    Attributes:
+        law: which.
+    """
+
+    def __init__(self, law: JointLaw) -> None:
+        self.law = law
+        self._function: Step | None = None
+
+    def torque(self, state: State) -> float:
+        """What it takes from the drive of its joint now [N m or N]; to be asked once a step."""
+        law = self.law
+        if self._function is None:
+            inside = Inside(law.number, law.second, law.phase_rad, state.period_s)
+            self._function = FUNCTIONS[law.function](inside)
+        out = law.amplitude * self._function(state.signal(law.of))
+        return out * state.signal(law.times) if law.times else out
 
 
 def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Array, dry: Array) -> Array:
@@ -80,67 +209,30 @@ def dry_levels(effects: Sequence[RobotEffect], v: Array, load: Array, time: floa
     return out
 
 
-def _coulomb(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("coulomb")
-
-
-def _viscous(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("viscous") * v
-
-
-def _asymmetric_coulomb(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("asymmetry") * direction(v)
-
-
-def _asymmetric_viscous(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("asymmetry") * abs(v)
-
-
-def _stribeck(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("excess") * math.exp(-abs(v) / e.number("fade"))
-
-
-def _sublinear(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("bend") * math.log1p(abs(v) / e.number("thins"))
-
-
-def _load_friction(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("share") * abs(load)
-
-
 def _warming(e: RobotEffect, v: float, load: float, time: float) -> float:
     more = e.number("more_Nm", "more_N") + e.number("more_Nms", "more_Ns") * abs(v)
     return more * math.exp(-time / e.number("over"))
 
 
-def _ripple(e: RobotEffect, q: float, v: float) -> float:
-    angle = e.number("turns") * q
+def _wave(e: RobotEffect, angle: float) -> float:
     return e.number("cosine") * math.cos(angle) + e.number("sine") * math.sin(angle)
 
 
-def _counterbalance(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("cosine") * math.cos(q) + e.number("sine") * math.sin(q)
-
-
-def _spring(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("stiffness") * (q - e.number("middle")) + e.number("offset")
-
-
 SMOOTH: dict[str, Callable[[RobotEffect, float, float], float]] = {
-    "friction": _viscous,
-    "asymmetric_viscous": _asymmetric_viscous,
-    "ripple": _ripple,
-    "counterbalance": _counterbalance,
-    "spring": _spring,
+    "friction": lambda e, q, v: e.number("viscous") * v,
+    "asymmetric_viscous": lambda e, q, v: e.number("asymmetry") * abs(v),
+    "ripple": lambda e, q, v: _wave(e, e.number("turns") * q),
+    "counterbalance": lambda e, q, v: _wave(e, q),
+    "spring": lambda e, q, v: e.number("stiffness") * (q - e.number("middle")) + e.number("offset"),
 }
 """Torques by position and speed, by cause; a slide's ripple counts waves per metre as ``turns`` over 2 pi."""
 
 DRY: dict[str, Callable[[RobotEffect, float, float, float], float]] = {
-    "friction": _coulomb,
-    "asymmetric_coulomb": _asymmetric_coulomb,
-    "stribeck": _stribeck,
-    "sublinear_friction": _sublinear,
-    "load_friction": _load_friction,
+    "friction": lambda e, v, load, time: e.number("coulomb"),
+    "asymmetric_coulomb": lambda e, v, load, time: e.number("asymmetry") * direction(v),
+    "stribeck": lambda e, v, load, time: e.number("excess") * math.exp(-abs(v) / e.number("fade")),
+    "sublinear_friction": lambda e, v, load, time: e.number("bend") * math.log1p(abs(v) / e.number("thins")),
+    "load_friction": lambda e, v, load, time: e.number("share") * abs(load),
     "warming": _warming,
 }
 """Dry friction by speed, load and time, by cause: against the motion, and at rest as much as keeps the joint there."""

@@ -1,13 +1,17 @@
-"""Effects that MJCF can say, put into a model."""
+"""Effects that MJCF can say, put into a serial robot's model; the model with all effects, ready to be rolled out."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
-from mocobot_sim.serial.effects import DRY, RobotEffect
+from estimator.errors import InputError
+from mocobot_sim.serial.effects import DRY, LAWS, ActingLaw, JointLaw, RobotEffect
 
 LEAST_MOMENT = 1e-3
 """Of a body's largest second moment of mass, the least that it has in any direction. Chosen: a thin sheet's."""
@@ -24,7 +28,10 @@ def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Arra
         centre: of mass, in the body's frame [m], shape (3,).
         inertia: about that centre, along the body's frame [kg m^2], shape (3, 3); as near as a body can have it.
     """
-    moments, axes = np.linalg.eigh(possible_inertia(inertia))
+    moments = np.linalg.eigvalsh(inertia)
+    if moments[0] < 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - _POSSIBLE):
+        inertia = real_inertia(inertia)
+    moments, axes = np.linalg.eigh(inertia)
     axes = axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
     body.mass, body.ipos, body.inertia = mass, centre, moments
     body.iquat = Rotation.from_matrix(axes).as_quat(scalar_first=True)
@@ -61,14 +68,6 @@ def inertial_of(model: mujoco.MjModel, body: int) -> tuple[float, Array, Array]:
     own = Rotation.from_quat(model.body_iquat[body], scalar_first=True).as_matrix()
     inertia = own @ np.diag(model.body_inertia[body]) @ own.T
     return float(model.body_mass[body]), np.array(model.body_ipos[body]), inertia
-
-
-def possible_inertia(inertia: Array) -> Array:
-    """An inertia as it is where a body can have it, else the nearest that one can, shape (3, 3)."""
-    moments = np.linalg.eigvalsh(inertia)
-    if moments[0] >= 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - _POSSIBLE):
-        return inertia
-    return real_inertia(inertia)
 
 
 def real_inertia(inertia: Array) -> Array:
@@ -215,3 +214,67 @@ def _spread(way: Array) -> Array:
 def _moments(effect: RobotEffect) -> Array:
     xx, yy, zz, xy, xz, yz = (effect.number(f"inertia_{axes}") for axes in INERTIA)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+Effect = RobotEffect | JointLaw
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A robot that a reference stepper can step.
+
+    Attributes:
+        model: compiled, with what MJCF can say; contacts, limits and actuators off, MuJoCo's ``implicitfast``, and
+            dry friction that hardly depends on the speed.
+        stepped: effects that the stepper adds.
+        left_out: which of the given effects are in neither, numbers from 0.
+    """
+
+    model: mujoco.MjModel
+    stepped: tuple[Effect, ...]
+    left_out: tuple[int, ...]
+
+    def running(self) -> list[RobotEffect | ActingLaw]:
+        """The stepper's effects for one run: laws may remember."""
+        return [ActingLaw(e) if isinstance(e, JointLaw) else e for e in self.stepped]
+
+
+def with_effects(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[mujoco.MjModel, list[bool]]:
+    """Put into a model what MJCF can say of effects; the model compiled, and which effects are in it.
+
+    Raises:
+        InputError: MuJoCo refuses the model with the effects in it.
+    """
+    try:
+        inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
+        return spec.compile(), inside
+    except (ValueError, RuntimeError) as error:
+        text = " ".join(str(error).split())
+        raise InputError(f"MuJoCo refuses the model with the causes in it ({text})") from error
+
+
+def build(spec: mujoco.MjSpec, effects: Sequence[Effect], step_s: float) -> Built:
+    """Put effects into a model.
+
+    Args:
+        spec: the nominal model; changed.
+        effects: what is off.
+        step_s: of the integration [s].
+
+    Raises:
+        InputError: MuJoCo refuses the model with the effects in it.
+    """
+    model, inside = with_effects(spec, effects)
+    off = mujoco.mjtDisableBit
+    for bit in (off.mjDSBL_CONTACT, off.mjDSBL_LIMIT, off.mjDSBL_ACTUATION, off.mjDSBL_AUTORESET):
+        model.opt.disableflags |= int(bit)
+    model.opt.integrator, model.opt.timestep = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST), step_s
+    model.dof_solref[:], model.dof_solimp[:] = SOLREF, SOLIMP
+    rest = [k for k, said in enumerate(inside) if not said]
+    stepped = tuple(effects[k] for k in rest if steps(effects[k]))
+    return Built(model, stepped, tuple(k for k in rest if not steps(effects[k])))
+
+
+def steps(effect: Effect) -> bool:
+    """Whether the stepper simulates an effect: errors of the log it does not."""
+    return effect.acts if isinstance(effect, JointLaw) else effect.cause in LAWS

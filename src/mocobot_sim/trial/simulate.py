@@ -1,5 +1,7 @@
 """From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,9 +16,8 @@ from estimator.recording.model import Recording
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects import Effect, apply_effects
 from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.free import build_free_team, check_robots
 from mocobot_sim.scene.payload import grasp_frames, load_payload
-from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.scene.scene import TeamScene, build_free_team, build_team, check_robots
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
 from mocobot_sim.trial.trajectories import (
     Trajectory,

@@ -13,7 +13,7 @@ from estimator.estimate.principal import (
     principal_inertia,
     project_positive,
 )
-from mocobot_sim.paper.published import PAYLOADS, payload_truth
+from mocobot_sim.paper.scoring import PAYLOADS, payload_truth
 from mujoco_body import mujoco_data
 from rigid_body_data import make_body, moving
 

@@ -8,13 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.base.design import BaseDesign, base_design
-from mocobot_sim.base.drive import BaseDrive, DriveLog
-from mocobot_sim.base.drive_kernel import update_drives
-from mocobot_sim.base.index import BaseIndex
-from mocobot_sim.base.mecanum import MecanumKinematics, axle_share
-from mocobot_sim.base.motion import Leg, moved, plan
-from mocobot_sim.base.solo import Snapshots, build_solo, compile_solo, drive_solo
+from mocobot_sim.base.design import BaseDesign, MecanumKinematics, axle_share, base_design
+from mocobot_sim.base.drive import BaseDrive, DriveLog, Snapshots, build_solo, compile_solo, drive_solo
+from mocobot_sim.kernels import update_drives
+from mocobot_sim.scene.team_index import BaseIndex
+from mocobot_sim.trial.trajectories import Leg, moved, plan
 
 DESIGN = base_design()
 TEXTBOOK = MecanumKinematics.textbook(DESIGN)

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mocobot_sim.base.design import HAND, base_design
-from mocobot_sim.base.drive import WheelContacts
-from mocobot_sim.base.index import BaseIndex
-from mocobot_sim.base.mecanum import MecanumKinematics, axle_share
-from mocobot_sim.base.rollers import wheel_reach
-from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.base.design import HAND, MecanumKinematics, axle_share, base_design
+from mocobot_sim.base.drive import WheelContacts, build_solo, compile_solo
+from mocobot_sim.scene.omnid import wheel_reach
+from mocobot_sim.scene.team_index import BaseIndex
 
 DESIGN = base_design()
 

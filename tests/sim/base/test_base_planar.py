@@ -6,7 +6,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.base.motion import (
+from mocobot_sim.trial.trajectories import (
     Leg,
     PlanarMotion,
     carried,

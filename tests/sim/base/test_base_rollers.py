@@ -10,11 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design, load_base_design
-from mocobot_sim.base.index import BaseIndex
-from mocobot_sim.base.rollers import wheel_reach
-from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.base.drive import build_solo, compile_solo
+from mocobot_sim.scene.omnid import wheel_reach
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.scene.team_index import TeamIndex
+from mocobot_sim.scene.team_index import BaseIndex, TeamIndex
 from payload_mjcf import TEAMS
 
 OMNID = Path(__file__).resolve().parents[3] / "models" / "omnid"

@@ -7,16 +7,22 @@ from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import base_design
-from mocobot_sim.base.drive import BaseDrive
-from mocobot_sim.base.follow import FollowingDrive
-from mocobot_sim.base.motion import Leg, PlanarMotion, carried, compose, plan, relative, yaw_of
-from mocobot_sim.base.solo import Snapshots
-from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
-from mocobot_sim.guided.hand import PushingHand
+from mocobot_sim.base.drive import BaseDrive, FollowingDrive, Snapshots
+from mocobot_sim.guided import FLOAT_GAINS, FloatArms, PushingHand
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home
-from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
+from mocobot_sim.trial.trajectories import (
+    RATE_HZ,
+    Leg,
+    PlanarMotion,
+    Trajectory,
+    carried,
+    compose,
+    plan,
+    relative,
+    yaw_of,
+)
 from mocobot_sim.trial.trial import run_trial
 
 DESIGN = base_design()

@@ -8,8 +8,7 @@ import pytest
 
 from effect_cases import SIZES
 from estimator.errors import InputError
-from mocobot_sim.effects.catalogue import EFFECTS, make_effect
-from mocobot_sim.effects.spec import allowed, paragraphs, parse_effect
+from mocobot_sim.effects.catalogue import EFFECTS, allowed, make_effect, paragraphs, parse_effect
 
 RATIOS = {"scale", "damping_ratio", "second_share", "amplitude", "number", "second"}
 """Parameters without a unit; of a law they have that of what it acts on."""

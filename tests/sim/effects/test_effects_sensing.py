@@ -8,9 +8,9 @@ from effect_cases import example, one_robot, team_with
 from mocobot_sim.control.control import lag_filter
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted
-from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import SensedLog
 
 DESIGN_K = 100.0
 

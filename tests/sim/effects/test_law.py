@@ -10,10 +10,10 @@ from effect_cases import one_robot, team_with
 from estimator.arm.delta import forward_kinematics, jacobian
 from estimator.errors import InputError
 from mocobot_sim.effects import apply_effects, effect_from_dict, effect_to_dict
+from mocobot_sim.effects.catalogue import parse_effect
 from mocobot_sim.effects.law import Law
-from mocobot_sim.effects.spec import parse_effect
 from mocobot_sim.extended.extended import load_extended, write_extended
-from mocobot_sim.laws.functions import FUNCTIONS
+from mocobot_sim.functions import FUNCTIONS
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted

@@ -17,12 +17,18 @@ from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.json import calibration_from_dict
 from mocobot.cli import main
 from mocobot_sim.paper import experiment
-from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
-from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER, fit_trials, three_trials
-from mocobot_sim.paper.published import payload_truth, published_errors
-from mocobot_sim.paper.scoring import score_fit
-from mocobot_sim.paper.tables import BY_ENCODERS, summary_table
-from mocobot_sim.paper.text import format_tables
+from mocobot_sim.paper.experiment import (
+    ONE_FIT,
+    SELF_CALIBRATED,
+    TRANSFER,
+    PaperPlan,
+    PaperResult,
+    fit_trials,
+    run_paper,
+    three_trials,
+)
+from mocobot_sim.paper.scoring import payload_truth, published_errors, score_fit
+from mocobot_sim.paper.tables import BY_ENCODERS, format_tables, summary_table
 from mocobot_sim.trial.sensors import SensorPreset, sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, draw_units
 

@@ -11,9 +11,9 @@ from joblib import Parallel, delayed
 
 from estimator.arrays import Array
 from mocobot_sim.paper import experiment
-from mocobot_sim.paper import work as shares_module
+from mocobot_sim.paper import store as shares_module
 from mocobot_sim.paper.experiment import PaperPlan, run_paper
-from mocobot_sim.paper.work import shares
+from mocobot_sim.paper.store import shares
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.simulate import Simulated

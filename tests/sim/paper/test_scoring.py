@@ -14,8 +14,15 @@ from estimator.estimate.inertia import InertiaEstimate
 from estimator.estimate.principal import principal_inertia
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import MassEstimate
-from mocobot_sim.paper.published import PAYLOADS, payload_truth, printed_truth, published_errors
-from mocobot_sim.paper.scoring import rotation_error_deg, score, score_fit
+from mocobot_sim.paper.scoring import (
+    PAYLOADS,
+    payload_truth,
+    printed_truth,
+    published_errors,
+    rotation_error_deg,
+    score,
+    score_fit,
+)
 from mocobot_sim.scene.as_built import AsBuilt
 
 

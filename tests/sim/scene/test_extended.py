@@ -14,8 +14,7 @@ from mocobot.cli import main
 from mocobot_sim.effects import EFFECTS
 from mocobot_sim.extended.extended import extra_of, load_extended, readme, write_extended
 from mocobot_sim.scene.as_built import CalibrationSpread
-from mocobot_sim.scene.free import build_free_team
-from mocobot_sim.scene.scene import build_team
+from mocobot_sim.scene.scene import build_free_team, build_team
 from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial

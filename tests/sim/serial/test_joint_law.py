@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimator.errors import InputError
-from mocobot_sim.serial.law import ActingLaw, JointLaw, State
+from mocobot_sim.serial.effects import ActingLaw, JointLaw, State
 
 STATE = State(
     3.0, 1e-3, np.array([0.1, 0.2]), np.array([0.0, -0.5]), np.zeros(2), np.zeros(2), np.array([4.0, 0.0])

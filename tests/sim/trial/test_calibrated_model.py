@@ -18,9 +18,8 @@ from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Bases
 from invented_calibration import invented_calibration
 from mocobot.api.simulation import SimulatedRecording
-from mocobot_sim.effects.base_tilt import BaseTilt
-from mocobot_sim.extended.calibrated import calibrated_team, write_calibrated
-from mocobot_sim.extended.extended import extra_of, load_extended
+from mocobot_sim.effects.geometry import BaseTilt
+from mocobot_sim.extended.extended import calibrated_team, extra_of, load_extended, write_calibrated
 from mocobot_sim.scene.as_built import units_as_built
 from mocobot_sim.scene.models import base_height_m, omnid_design
 from mocobot_sim.scene.scene import build_team

@@ -10,7 +10,7 @@ from effect_cases import example, team_with
 from estimator.errors import InputError
 from estimator.recording.parquet import read_recording, write_recording
 from mocobot_sim.scene.models import base_height_m
-from mocobot_sim.scene.payload_mjcf import payload_mjcf
+from mocobot_sim.scene.payload import payload_mjcf
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 from mocobot_sim.trial.sensors import measure, sensor_preset

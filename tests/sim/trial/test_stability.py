@@ -14,8 +14,7 @@ from command import run
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects import apply_effects, make_effect
-from mocobot_sim.scene.free import build_free_team
-from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene, build_free_team
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
 from mocobot_view.facts.fact_files import read_truth

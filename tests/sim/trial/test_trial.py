@@ -10,16 +10,16 @@ from scipy.spatial.transform import Rotation
 from closed_loop import ClosedLoop, base_poses
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains
-from mocobot_sim.control.kernel import wrist
 from mocobot_sim.errors import TrialError
+from mocobot_sim.kernels import wrist
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.trial import rows as rows_module
 from mocobot_sim.trial import trial as trial_module
-from mocobot_sim.trial.rows import Rows
+from mocobot_sim.trial import trial_log as rows_module
 from mocobot_sim.trial.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
 from mocobot_sim.trial.trial import between_commands, run_trial
+from mocobot_sim.trial.trial_log import Rows
 from payload_mjcf import TWO
 
 REACH, PROXIMAL, ROD = 0.18 - 0.062, 0.200, 0.368

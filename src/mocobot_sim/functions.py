@@ -1,4 +1,4 @@
-"""Functions of one signal, one value after the other, as a trial runs."""
+"""Functions of one signal, one value after the other, as a trial runs: what formulas at a place are made of."""
 
 from __future__ import annotations
 
@@ -117,3 +117,13 @@ def check_numbers(function: str, number: float, second: float) -> None:
         raise InputError(f"law: number is {number!r}; of {function} it is {what}")
     if function in WIDE and second <= 0.0:
         raise InputError(f"law: second is {second!r}; with {function} it must be above 0")
+
+
+def check_name(field: str, value: str, known: bool, words: str) -> None:
+    """Refuse a name in a law that is not known; ``words`` say what it may be.
+
+    Raises:
+        InputError: it is not known.
+    """
+    if not known:
+        raise InputError(f"law: {field} is {value!r:.60}; it must be one of {words}")

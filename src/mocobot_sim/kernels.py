@@ -1,8 +1,49 @@
-"""Arithmetic of the wrist controller (see ``control``), compiled where numba is installed."""
+"""Arithmetic that runs every control tick, compiled where numba is installed.
 
+numba keeps the machine code for the next process in the folder ``NUMBA_CACHE_DIR`` if that is set, else beside the
+source, else, where an installation cannot be written, in the user's cache folder. Where none of them can be written,
+every process compiles again.
+
+Without numba (``pip install 'mocobot[fast]'`` brings it) Python itself does the same arithmetic, to the same bits. It
+reads arrays through memoryviews: those give plain floats, with which Python is faster than with numpy's. A function
+that is compiled here therefore indexes arrays to the last axis (``a[i, k]``, never ``a[i]``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
 from math import cos, sin, sqrt
+from typing import Any
 
-from mocobot_sim.compiled import compiled, entry
+import numpy as np
+
+try:
+    from numba import njit
+except ImportError:
+    njit = None
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function when it is first called, without Python's lock while it runs; nothing without numba."""
+    if njit is None:
+        return function
+    try:
+        return njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # no folder can be written
+        return njit(nogil=True)(function)
+
+
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``compiled``, for what is called with arrays; they are changed in place."""
+    if njit is not None:
+        return compiled(function)
+
+    def called(*given: Any) -> Any:
+        return function(*[one.data if isinstance(one, np.ndarray) else one for one in given])
+
+    return called
+
 
 # The kernel works on tuples of three floats: an array per vector would cost more than the arithmetic.
 
@@ -144,3 +185,56 @@ def _solve(m, y):
         scale * (y[0] * c0[1] + y[1] * c1[1] + y[2] * c2[1]),
         scale * (y[0] * c0[2] + y[1] * c1[2] + y[2] * c2[2]),
     )
+
+
+@entry
+def update_drives(
+    qpos, qvel, ctrl, wheel_qpos, wheel_dof, drive, matrix, inverse, constants, pose, twist, odometry, angle, lag, speed
+):  # fmt: skip
+    """One control tick of all bases, in place.
+
+    Args:
+        qpos, qvel, ctrl: MuJoCo's.
+        wheel_qpos, wheel_dof, drive: addresses, shape (N, 4).
+        matrix, inverse: kinematics, shapes (4, 3), (3, 4).
+        constants: position gain [1/s], speed gain, integral gain, torque limit, period [s].
+        pose, twist: planned ones of this tick, shape (N, 3).
+        odometry: pose by odometry, shape (N, 3); brought up to date.
+        angle: wheel angles at the last tick, shape (N, 4); brought up to date.
+        lag: by how much the wheels lag their commanded angles [rad], shape (N, 4); brought up to date.
+        speed: commanded wheel speeds, shape (N, 4); written.
+    """
+    position_gain, gain, integral, limit, period = constants
+    for i in range(wheel_qpos.shape[0]):
+        turn, along, across = 0.0, 0.0, 0.0
+        for k in range(4):
+            step = qpos[wheel_qpos[i, k]] - angle[i, k]
+            angle[i, k] += step
+            turn += inverse[0, k] * step
+            along += inverse[1, k] * step
+            across += inverse[2, k] * step
+        # As planar.moved: the chord of the arc.
+        half = 0.5 * turn
+        chord = math.sin(half) / half if abs(half) > 1e-9 else 1.0
+        cos, sin = math.cos(odometry[i, 2] + half), math.sin(odometry[i, 2] + half)
+        odometry[i, 0] += chord * (cos * along - sin * across)
+        odometry[i, 1] += chord * (sin * along + cos * across)
+        odometry[i, 2] += turn
+
+        ahead, aside = pose[i, 0] - odometry[i, 0], pose[i, 1] - odometry[i, 1]
+        cos, sin = math.cos(odometry[i, 2]), math.sin(odometry[i, 2])
+        rest = pose[i, 2] - odometry[i, 2]
+        # The planned twist is in the planned frame, which the base has not quite reached.
+        cos_rest, sin_rest = math.cos(rest), math.sin(rest)
+        v_x = cos_rest * twist[i, 1] - sin_rest * twist[i, 2] + position_gain * (cos * ahead + sin * aside)
+        v_y = sin_rest * twist[i, 1] + cos_rest * twist[i, 2] + position_gain * (cos * aside - sin * ahead)
+        w = twist[i, 0] + position_gain * rest
+        for k in range(4):
+            command = matrix[k, 0] * w + matrix[k, 1] * v_x + matrix[k, 2] * v_y
+            error = command - qvel[wheel_dof[i, k]]
+            torque = gain * error + integral * lag[i, k]
+            # No wind-up: a drive at its limit does not add to what it owes.
+            if abs(torque) < limit or torque * error < 0.0:
+                lag[i, k] += error * period
+            ctrl[drive[i, k]] = min(max(torque, -limit), limit)
+            speed[i, k] = command
