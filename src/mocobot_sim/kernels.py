@@ -140,11 +140,7 @@ def wrist(phi, reach, proximal, rod):
     )
     # The normal points up for every phi in range. Out of reach there is no root; the trial's checks report it.
     rise = sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
-    h = (
-        c0[0] + centre[0] + rise * n[0],
-        c0[1] + centre[1] + rise * n[1],
-        c0[2] + centre[2] + rise * n[2],
-    )
+    h = (c0[0] + centre[0] + rise * n[0], c0[1] + centre[1] + rise * n[1], c0[2] + centre[2] + rise * n[2])
     s = (_minus(h, c0), _minus(h, c1), _minus(h, c2))
     lever = (
         proximal * (cos_phi[0] * s[0][2] - sin_phi[0] * (_COS[0] * s[0][0] + _SIN[0] * s[0][1])),

@@ -57,9 +57,8 @@ class WheelContacts:
         """
         data, robots = self._data, self._index.robots
         slip, load, grip = np.zeros(4 * robots), np.zeros(4 * robots), np.zeros((4 * robots, 3))
-        axle = (self._axle @ data.xmat[self._index.chassis].reshape(-1, 3, 3).transpose(0, 2, 1)).reshape(
-            -1, 3
-        )
+        R = data.xmat[self._index.chassis].reshape(-1, 3, 3)
+        axle = (self._axle @ R.transpose(0, 2, 1)).reshape(-1, 3)
         contact = data.contact
         for geoms, row, frame in zip(contact.geom, contact.efc_address, contact.frame, strict=True):
             wheel = self._index.geom_wheel[geoms].max()
@@ -131,11 +130,7 @@ class BaseDrive:
         self._gain = position_gain_per_s
 
     def start(self, stage: Stage) -> None:
-        """Begin as an actor of a trial.
-
-        Raises:
-            InputError: as ``begin``.
-        """
+        """Begin as an actor of a trial, as ``begin``."""
         self.begin(stage.model, stage.data, stage.rate_hz, stage.ticks)
 
     def begin(self, model: mujoco.MjModel, data: mujoco.MjData, rate_hz: float, ticks: int) -> None:
@@ -156,13 +151,9 @@ class BaseDrive:
         if abs(motion.rate_hz - rate_hz) > 1e-9 * rate_hz:
             raise InputError(f"the plan has {motion.rate_hz:g} ticks per second; control has {rate_hz:g}")
         self._index, self._data, self._ticks, self._rate_hz = index, data, ticks, rate_hz
-        self._constants = (
-            self._gain,
-            self._design.drive_gain_Nms_per_rad,
-            self._design.drive_integral_Nm_per_rad,
-            self._design.drive_torque_limit_Nm,
-            1.0 / rate_hz,
-        )
+        of = self._design
+        gains = of.drive_gain_Nms_per_rad, of.drive_integral_Nm_per_rad, of.drive_torque_limit_Nm
+        self._constants = (self._gain, *gains, 1.0 / rate_hz)
         self._pose, self._twist = np.ascontiguousarray(motion.pose), np.ascontiguousarray(motion.twist)
         self._odometry = self._pose[0].copy()
         self._angle = data.qpos[index.wheel_qpos].copy()
@@ -183,17 +174,9 @@ class BaseDrive:
             pose, twist, self._odometry, self._angle, self._lag, self._speed,
         )  # fmt: skip
         if tick % self._ticks == 0:
-            self._rows.append(
-                (
-                    pose.copy(),
-                    self._odometry.copy(),
-                    index.poses(data),
-                    self._speed.copy(),
-                    data.qvel[index.wheel_dof],
-                    data.ctrl[index.drive],
-                    *self._contacts.measure(),
-                )
-            )
+            moved = pose.copy(), self._odometry.copy(), index.poses(data), self._speed.copy()
+            wheels = data.qvel[index.wheel_dof], data.ctrl[index.drive], *self._contacts.measure()
+            self._rows.append((*moved, *wheels))
 
     def _planned(self, tick: int) -> tuple[Array, Array]:
         """Poses and twists of the plan, shapes (N, 3)."""
@@ -239,11 +222,7 @@ class FollowingDrive(BaseDrive):
         self._theta_zero = np.array([unit.theta_zero_rad[0] for unit in units])
 
     def start(self, stage: Stage) -> None:
-        """Begin; the wrists are where they shall stay over their bases.
-
-        Raises:
-            InputError: as ``BaseDrive.begin``.
-        """
+        """Begin; the wrists are where they shall stay over their bases."""
         super().start(stage)
         self._stage = stage
         self._goal = self._pose[0].copy()
@@ -278,7 +257,7 @@ class Snapshots:
         self.qpos: list[Array] = []
 
     def start(self, stage: Stage) -> None:
-        """Get ready."""
+        """Begin in a trial."""
         self.begin(stage.data, stage.rate_hz)
 
     def begin(self, data: mujoco.MjData, rate_hz: float) -> None:
@@ -287,10 +266,9 @@ class Snapshots:
 
     def act(self, tick: int) -> None:
         """Look, and keep what is due."""
-        while (
-            len(self.qpos) < len(self.times_s) and tick >= self.times_s[len(self.qpos)] * self._rate_hz - 1e-6
-        ):
-            self.qpos.append(self._data.qpos.copy())
+        for time_s in self.times_s[len(self.qpos) :]:
+            if tick >= time_s * self._rate_hz - 1e-6:
+                self.qpos.append(self._data.qpos.copy())
 
 
 def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:

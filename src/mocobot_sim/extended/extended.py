@@ -1,4 +1,4 @@
-"""Extended models: a team with its effects, or as calibrated, as a folder that plain MuJoCo loads and a trial can run on."""
+"""Extended models: a team with its effects, or as calibrated, as a folder for plain MuJoCo and for trials."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
@@ -19,8 +18,8 @@ from estimator.errors import InputError
 from estimator.files import holds, whole_folder
 from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
-from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
-from mocobot_sim.effects.catalogue import apply_effects
+from mocobot_sim.effects import Effect, apply_effects, effect_from_dict, effect_to_dict
+from mocobot_sim.effects.base import PLACE
 from mocobot_sim.effects.geometry import BaseTilt
 from mocobot_sim.model_check import ASSETS, check_model, owned
 from mocobot_sim.scene.as_built import AsBuilt, SensorEffects, unit_in, units_as_built
@@ -95,16 +94,13 @@ From Python: `mocobot_sim.extended.extended.load_extended(folder)`, then `mocobo
 def _table(effects: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for effect in effects:
-        place = (
-            ", ".join(f"{name} {effect[name]}" for name in ("robot", "joint") if name in effect) or "payload"
+        place = ", ".join(f"{name} {effect[name]}" for name in PLACE if name in effect) or "payload"
+        numbers = ", ".join(
+            f"`{name}` = {value if isinstance(value, str) else f'{value:.6g}'}"
+            for name, value in effect["parameters"].items()
         )
-        numbers = ", ".join(f"`{name}` = {_shown(value)}" for name, value in effect["parameters"].items())
         rows.append(f"| `{effect['cause']}` | {place} | {numbers} |")
     return "\n".join(["| cause | where | parameters |", "|---|---|---|", *rows]) if rows else "None."
-
-
-def _shown(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"
 
 
 FORMAT = "mocobot-extended-model"
@@ -149,10 +145,7 @@ def write_extended(
         "grasps": poses_to_list(scene.X_1i),
         "mounts": poses_to_list(scene.mounts),
         "initial": scene.initial
-        and {
-            key: np.asarray(part, dtype=float).tolist()
-            for key, part in zip(INITIAL, scene.initial, strict=True)
-        },
+        and {k: np.asarray(q, dtype=float).tolist() for k, q in zip(INITIAL, scene.initial, strict=True)},
         "as_built": [unit.to_dict() for unit in scene.units],
         "sensors": {name: list(scene.sensors.of(name, scene.robots)) for name in SENSORS},
         "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),
@@ -194,7 +187,23 @@ def load_extended(folder: Path) -> TeamScene:
         )
     read = _fields(values, where)
     robots = read.whole("robots")
-    effects = tuple(_effects(read.list("effects"), where))
+    listed = read.list("effects")
+    try:
+        effects = tuple(effect_from_dict(entry) for entry in listed)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+    required = [name for name in AS_BUILT if name not in MASSES]
+    entries = enumerate(read.list("as_built", robots), start=1)
+    units = [Fields(entry, required, f"{where}: as_built[{i}]", MASSES) for i, entry in entries]
+    initial = None
+    if read.values["initial"] is not None:
+        inner = read.within("initial", INITIAL)
+        initial = inner.array(INITIAL[0], (robots, 3)), inner.array(INITIAL[1], (robots, 3))
+    sensors = read.within("sensors", SENSORS)
+
+    def per_robot(part: Fields, name: str) -> tuple[float, ...]:
+        return tuple(part.array(name, (robots,)).tolist())
+
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
@@ -206,12 +215,12 @@ def load_extended(folder: Path) -> TeamScene:
         wrist_home_b=read.array("wrist_home_b_m", (robots, 3)),
         theta_home=read.array("theta_home_rad", (robots, 3)),
         X_1i=read_poses(read, "grasps", robots),
-        units=_units(read, robots),
+        units=tuple(unit_in(unit) for unit in units),
         mounts=read_poses(read, "mounts", robots),
-        initial=_initial(read, robots),
-        sensors=_sensors(read, robots),
-        grasp_slack_m=tuple(read.array("grasp_slack_m", (robots,)).tolist()),
-        grasp_slack_rad=tuple(read.array("grasp_slack_rad", (robots,)).tolist()),
+        initial=initial,
+        sensors=SensorEffects(**{name: per_robot(sensors, name) for name in SENSORS}),
+        grasp_slack_m=per_robot(read, "grasp_slack_m"),
+        grasp_slack_rad=per_robot(read, "grasp_slack_rad"),
         effects=effects,
         xml=_read(folder / SCENE),
         assets=assets,
@@ -246,35 +255,6 @@ def _read(path: Path) -> str:
     except (OSError, ValueError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({detail}); an extended model has this file") from error
-
-
-def _effects(entries: list[Any], where: str) -> list[Effect]:
-    effects = []
-    for entry in entries:
-        try:
-            effects.append(effect_from_dict(entry))
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from error
-    return effects
-
-
-def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
-    required = [name for name in AS_BUILT if name not in MASSES]
-    entries = enumerate(read.list("as_built", robots), start=1)
-    units = (Fields(entry, required, f"{read.where}: as_built[{i}]", MASSES) for i, entry in entries)
-    return tuple(unit_in(unit) for unit in units)
-
-
-def _sensors(read: Fields, robots: int) -> SensorEffects:
-    inner = read.within("sensors", SENSORS)
-    return SensorEffects(**{name: tuple(inner.array(name, (robots,)).tolist()) for name in SENSORS})
-
-
-def _initial(read: Fields, robots: int) -> tuple[NDArray[Any], NDArray[Any]] | None:
-    if read.values["initial"] is None:
-        return None
-    inner = read.within("initial", INITIAL)
-    return inner.array(INITIAL[0], (robots, 3)), inner.array(INITIAL[1], (robots, 3))
 
 
 def _check_model(scene: TeamScene, path: Path) -> None:
@@ -351,5 +331,4 @@ def write_calibrated(
     """
     scene = calibrated_team(calibration, payload, initial)
     label = calibration.payloads[payload].label
-    tilts = [effect for effect in scene.effects if isinstance(effect, BaseTilt)]
-    write_extended(scene, tilts, folder, {"calibrated": True, "payload": label})
+    write_extended(scene, scene.effects, folder, {"calibrated": True, "payload": label})

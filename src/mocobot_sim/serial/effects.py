@@ -145,8 +145,9 @@ class JointLaw:
             InputError: they are no formula.
         """
         entry = Fields(values, (*TEXTS, *NUMBERS), where)
-        given: dict[str, Any] = {key: str(entry.values[key]) for key in TEXTS}
-        return cls(**given | {key: entry.number(key) for key in NUMBERS})
+        given: dict[str, Any] = {key: entry.number(key) for key in NUMBERS}
+        given |= {key: str(entry.values[key]) for key in TEXTS}
+        return cls(**given)
 
 
 class ActingLaw:

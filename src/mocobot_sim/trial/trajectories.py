@@ -66,10 +66,7 @@ def random_vias(
         InputError: fewer than one via, so many that the motion would last over an hour, or a transit that takes
             no time.
     """
-    if vias < 1:
-        raise InputError(f"vias is {vias}; it must be at least 1")
-    if vias * (transit_s[1] + dwell_s[1]) > LONGEST_S:
-        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+    _check_vias(vias, vias * (transit_s[1] + dwell_s[1]))
     if not min(transit_s) > 0:
         raise InputError(f"transit is {transit_s} s; it must be greater than 0")
     paths = []
@@ -78,9 +75,7 @@ def random_vias(
         transit = rng.uniform(*transit_s, vias + 1)
         dwell = rng.uniform(*dwell_s, vias + 1)
         paths.append((np.vstack([home, points, home]), transit, dwell))
-    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
-    time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
-    return Trajectory("random", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
+    return Trajectory("random", _via_paths(paths))
 
 
 def free_motion(
@@ -108,11 +103,8 @@ def free_motion(
     Raises:
         InputError: fewer than one via, or so many that the motion would last over an hour.
     """
-    if vias < 1:
-        raise InputError(f"vias is {vias}; it must be at least 1")
     holds = -(-vias // 4)
-    if holds * (slow_s[1] + hold_s) + vias * fast_s[1] > LONGEST_S:
-        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+    _check_vias(vias, holds * (slow_s[1] + hold_s) + vias * fast_s[1])
     paths = []
     for home in np.asarray(wrist_home_b):
         direction = rng.standard_normal((holds + vias, 3))
@@ -121,9 +113,21 @@ def free_motion(
         transit = np.concatenate([rng.uniform(*slow_s, holds), rng.uniform(*fast_s, vias), [slow_s[1]]])
         dwell = np.where(np.arange(holds + vias + 1) < holds, hold_s, 0.0)
         paths.append((np.vstack([home, points, home]), transit, dwell))
-    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell.sum() for _, transit, dwell in paths)
+    return Trajectory("free", _via_paths(paths))
+
+
+def _check_vias(vias: int, longest_s: float) -> None:
+    if vias < 1:
+        raise InputError(f"vias is {vias}; it must be at least 1")
+    if longest_s > LONGEST_S:
+        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+
+
+def _via_paths(paths: Sequence[tuple[Array, Array, Array]]) -> Array:
+    """Robots' points, times between them and at them; all at rest at both ends, shape (Q, N, 3)."""
+    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
-    return Trajectory("free", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
+    return np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1)
 
 
 def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: float) -> Array:
@@ -131,9 +135,8 @@ def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: f
     ref = np.tile(points[0], (len(time), 1))
     for k in range(len(transit)):
         on = time >= start
-        ref[on] = points[k] + minimum_jerk((time[on] - start) / transit[k])[:, None] * (
-            points[k + 1] - points[k]
-        )
+        share = minimum_jerk((time[on] - start) / transit[k])[:, None]
+        ref[on] = points[k] + share * (points[k + 1] - points[k])
         start += transit[k] + dwell[k]
     return ref
 
