@@ -14,18 +14,12 @@ Step = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Inside:
-    """Numbers inside a function.
+    """Numbers inside a function."""
 
-    Attributes:
-        number, second: its first and its second number.
-        phase_rad: of a sine.
-        dt: time from one value to the next [s].
-    """
-
-    number: float
-    second: float
-    phase_rad: float
-    dt: float
+    number: float  # its first and its second number
+    second: float  # its first and its second number
+    phase_rad: float  # of a sine
+    dt: float  # time from one value to the next [s]
 
 
 def _plain(of: Callable[[float, Inside], float]) -> Callable[[Inside], Step]:

@@ -60,13 +60,9 @@ class Payload:
 def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Array:
     """Upward forces at the grasps that carry the payload's weight without turning it [N], shape (N,).
 
-    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique,
-    with more the smallest are taken; with one or two a moment stays that cannot be balanced.
-
-    Args:
-        payload: what is believed of it.
-        up_1: direction away from the ground in {1}, unit length, shape (3,).
-        gravity_mps2: g [m/s^2].
+    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique, with
+    more the smallest are taken; with one or two a moment stays that cannot be balanced. ``up_1`` is the direction away
+    from the ground in {1}, unit length, shape (3,).
     """
     up = np.asarray(up_1, dtype=float)
     arms = payload.p_1i - payload.p_1c
@@ -79,11 +75,9 @@ def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Arr
 
 
 def up_in_payload(theta: Array, R_1i: Array) -> Array:
-    """Up, in {1}, as a level robot sees it through its own gimbal, shapes (..., 3), (..., 3, 3) -> (..., 3).
+    """Up, in {1}, as a level robot sees it through its own gimbal, shape (..., 3).
 
-    Args:
-        theta: gimbal angles (z, y, x) [rad].
-        R_1i: orientation of its grasp in {1}.
+    ``theta`` are its gimbal angles (z, y, x) [rad], shape (..., 3), ``R_1i`` its grasp's orientation, (..., 3, 3).
     """
     up_i = gimbal.rotation(theta)[..., 2, :]  # the third row of R_bi is z of {b} in {i}
     return (R_1i @ up_i[..., None])[..., 0]

@@ -109,15 +109,11 @@ def update_team(qpos, ctrl, address, units, constants, state, commands, sensed, 
 
 @compiled
 def wrist(phi, reach, proximal, rod):
-    """Forward kinematics of one Delta.
+    """Forward kinematics of one Delta from three driven angles [rad].
 
     c_k is the knee moved inward by the platform radius, so |h - c_k| = rod for every leg, and with
-    s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot.
-
-    Args:
-        phi: driven angles [rad], three.
-        reach: base radius minus platform radius [m].
-        proximal, rod: lengths [m].
+    s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot. ``reach`` is the base radius
+    minus the platform radius [m].
 
     Returns:
         h [m], (s_1, s_2, s_3) [m], lever [m^2/rad], cos(phi): tuples of three.
@@ -189,16 +185,10 @@ def update_drives(
 ):  # fmt: skip
     """One control tick of all bases, in place.
 
-    Args:
-        qpos, qvel, ctrl: MuJoCo's.
-        wheel_qpos, wheel_dof, drive: addresses, shape (N, 4).
-        matrix, inverse: kinematics, shapes (4, 3), (3, 4).
-        constants: position gain [1/s], speed gain, integral gain, torque limit, period [s].
-        pose, twist: planned ones of this tick, shape (N, 3).
-        odometry: pose by odometry, shape (N, 3); brought up to date.
-        angle: wheel angles at the last tick, shape (N, 4); brought up to date.
-        lag: by how much the wheels lag their commanded angles [rad], shape (N, 4); brought up to date.
-        speed: commanded wheel speeds, shape (N, 4); written.
+    Addresses have shape (N, 4), the kinematics' matrices (4, 3) and (3, 4). ``constants`` are the position gain [1/s],
+    speed gain, integral gain, torque limit and period [s]; ``pose`` and ``twist`` the planned ones of this tick, (N, 3).
+    Brought up to date: ``odometry``, the pose by it, (N, 3); ``angle`` of the wheels at the last tick and ``lag``, by how
+    much they lag their commanded angles [rad], (N, 4). Written: ``ctrl``, and ``speed``, the commanded ones, (N, 4).
     """
     position_gain, gain, integral, limit, period = constants
     for i in range(wheel_qpos.shape[0]):

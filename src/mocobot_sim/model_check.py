@@ -124,11 +124,9 @@ def owned(named: Path, folder: Path, types: tuple[str, ...]) -> Path:
 
 
 def check_named(path: Path, *, assets: bool) -> None:
-    """Refuse a model into a copy of which files would go that are not its own.
+    """Refuse a readable model if files would go into a copy of it that are not its own.
 
-    Args:
-        path: of a model that can be read.
-        assets: whether to look at meshes, skins, textures and height fields, too, and not only at further models.
+    Looks at further models, and with ``assets`` at meshes, skins, textures and height fields, too.
 
     Raises:
         InputError: it names such a file, or what it names cannot be told.

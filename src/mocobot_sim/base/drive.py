@@ -134,12 +134,9 @@ class BaseDrive:
         self.begin(stage.model, stage.data, stage.rate_hz, stage.ticks)
 
     def begin(self, model: mujoco.MjModel, data: mujoco.MjData, rate_hz: float, ticks: int) -> None:
-        """Take hold of the wheels.
+        """Take hold of the wheels of released bases that stand at the plan's first poses.
 
-        Args:
-            model, data: with released bases, standing at the plan's first poses.
-            rate_hz: control rate [Hz].
-            ticks: control ticks per row of the log.
+        Control runs at ``rate_hz`` [Hz]; every ``ticks`` of it make a row of the log.
 
         Raises:
             InputError: a base is parked, or the plan is for another number of bases or another rate.
@@ -272,11 +269,7 @@ class Snapshots:
 
 
 def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
-    """One released Omnid at the world's origin, heading along x; its arm is rigid.
-
-    Args:
-        design: of its base; None for the shipped one.
-        timestep_s: integration step [s].
+    """One released Omnid at the world's origin, heading along x, its arm rigid; the shipped base if ``design`` is None.
 
     Raises:
         InputError: the base cannot be built.
@@ -311,14 +304,7 @@ def drive_solo(
     rate_hz: float = 1000.0,
     snapshots: Snapshots | None = None,
 ) -> DriveLog:
-    """Let the robot follow its plan.
-
-    Args:
-        model: of ``compile_solo``.
-        drive: its base's.
-        duration_s: how long [s].
-        rate_hz: control rate [Hz].
-        snapshots: to take on the way.
+    """Let the robot of ``compile_solo`` follow its base's plan for some seconds, with snapshots on the way.
 
     Raises:
         InputError: the plan does not fit the model.

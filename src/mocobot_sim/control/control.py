@@ -194,12 +194,7 @@ class TeamController:
         self._constants[TAKE_UP_TICKS] = 0
 
     def update(self, ref: Array, ref_dot: Array) -> None:
-        """One control tick: read ``qpos``, write ``ctrl``.
-
-        Args:
-            ref: commanded wrist positions in every robot's {b} [m], shape (N, 3).
-            ref_dot: their rates [m/s], shape (N, 3).
-        """
+        """One control tick: read ``qpos``, write ``ctrl``; commands [m] and their rates [m/s] in every {b}, shapes (N, 3)."""
         self._commands[self._tick % len(self._commands)] = ref, ref_dot
         self.tick()
 
@@ -240,17 +235,11 @@ AT_REST_PER_S = 0.05  # slower modes are none: what nothing holds in place, such
 
 @dataclass(frozen=True)
 class Stability:
-    """The least damped mode of the closed loop.
+    """The least damped mode of the closed loop."""
 
-    Attributes:
-        damping_ratio: minus growth over undamped angular frequency; below 0 the control is unstable.
-        frequency_Hz: how fast it swings.
-        growth_per_s: how fast it grows; below 0 if it decays.
-    """
-
-    damping_ratio: float
-    frequency_Hz: float
-    growth_per_s: float
+    damping_ratio: float  # minus growth over undamped angular frequency; below 0 the control is unstable
+    frequency_Hz: float  # how fast it swings
+    growth_per_s: float  # how fast it grows; below 0 if it decays
 
     @property
     def stable(self) -> bool:

@@ -35,13 +35,9 @@ EFFECTS: dict[str, type[Effect]] = {
 def make_effect(
     cause: str, parameters: Mapping[str, Any], robot: int | None = None, joint: int | None = None
 ) -> Effect:
-    """Make an effect from its name, parameters and place.
+    """Make an effect from its cause, a key of ``EFFECTS``, its parameters by name, and its place where it has one.
 
-    Args:
-        cause: a key of ``EFFECTS``.
-        parameters: values by name, units in the names.
-        robot: 1-based robot, for causes that have one.
-        joint: 1-based joint (legs 1, 2, 3; gimbal z, y, x), for causes that have one.
+    Robots and joints count from 1 (legs 1, 2, 3; gimbal z, y, x).
 
     Raises:
         InputError: no such cause, a parameter or place that is unknown, missing or out of its range.
@@ -141,21 +137,13 @@ EXAMPLE = "joint_friction:robot=2,joint=1,coulomb=0.05"
 
 @dataclass(frozen=True)
 class Allowed:
-    """One number of an effect.
+    """One number of an effect."""
 
-    Attributes:
-        name: of the field.
-        short: the same without its unit, which will do.
-        unit: of the value; empty for whole numbers and ratios.
-        range: what it may be.
-        default: where it may be left out; None where it must be given.
-    """
-
-    name: str
-    short: str
-    unit: str
-    range: str
-    default: float | str | None
+    name: str  # of the field
+    short: str  # the same without its unit, which will do
+    unit: str  # of the value; empty for whole numbers and ratios
+    range: str  # what it may be
+    default: float | str | None  # where it may be left out; None where it must be given
 
 
 def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:

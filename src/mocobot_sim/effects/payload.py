@@ -147,12 +147,9 @@ class Push(Effect):
         return self.start_s <= time + 1e-9 < self.start_s + self.duration_s
 
     def act(self, data: mujoco.MjData, body: int, R_Wb1: Array) -> None:
-        """Add the force to ``data.xfrc_applied`` of the payload's body.
+        """Add the force to ``data.xfrc_applied`` of the payload's body; ``data`` has kinematics of this instant.
 
-        Args:
-            data: the trial's, with kinematics of this instant.
-            body: the payload's body id.
-            R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
+        ``R_Wb1`` are the axes of robot 1's {b} in the world, shape (3, 3).
         """
         since, left = data.time - self.start_s, self.start_s + self.duration_s - data.time
         grown = max(0.0, min(1.0, since / self.ramp_s, left / self.ramp_s)) if self.ramp_s else 1.0

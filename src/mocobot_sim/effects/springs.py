@@ -24,13 +24,8 @@ if TYPE_CHECKING:
 class Slider:
     """Dry friction that gives way before it slips (Prandtl's element): an actor of a trial.
 
-    A slider follows a joint by a spring of its own, until that pulls with the friction's limit.
-
-    Args:
-        where: in a spring, past that of a driven joint, or in a gimbal axis.
-        robot, joint: from 1.
-        limit_Nm: of the friction.
-        yield_rad: way from no torque to the limit.
+    A slider follows a joint, counted from 1, by a spring of its own until that pulls with the friction's limit, after a
+    way of ``yield_rad``. It acts in a spring, past that of a driven joint, or in a gimbal axis.
     """
 
     def __init__(

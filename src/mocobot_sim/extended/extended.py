@@ -57,12 +57,9 @@ def read_poses(read: Fields, key: str, count: int) -> RigidTransform:
 
 
 def readme(effects: Sequence[Mapping[str, Any]], robots: int, healthy: int = 0) -> str:
-    """Markdown for a user who finds the folder.
+    """Markdown for a user who finds the folder; effects as ``effect_to_dict`` gives them.
 
-    Args:
-        effects: as ``effect_to_dict`` gives them.
-        robots: number of robots.
-        healthy: how many of the effects, the last ones, are of parts that are off by no more than others.
+    The last ``healthy`` of them are of parts that are off by no more than others.
     """
     named = len(effects) - healthy
     table = _table(effects[:named])
@@ -278,10 +275,7 @@ def calibrated_team(
 ) -> TeamScene:
     """The team as calibrated, where it stood in the first recording of a payload.
 
-    Args:
-        calibration: of robots of the simulated design.
-        payload: which of the payloads it carries.
-        initial: true (phi, theta) near which trials start [rad], two arrays (N, 3); None for home.
+    ``initial`` is the true (phi, theta) near which trials start [rad], two arrays (N, 3); None for home.
 
     Raises:
         InputError: the robots are of another design, there is no such payload, or its numbers are none of a rigid body.

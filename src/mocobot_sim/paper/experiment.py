@@ -59,13 +59,9 @@ def three_trials(recordings: Sequence[Recording]) -> list[Recording]:
 def estimate_both(
     recordings: Sequence[Recording], fitted: bool
 ) -> tuple[PayloadEstimate, PayloadEstimate | None]:
-    """The staged estimate from one payload's recordings, and what a fit of three of them starts from, or None.
+    """The staged estimate from one payload's recordings, and where ``fitted`` what a fit of three of them starts from.
 
-    Recordings are processed once for both.
-
-    Args:
-        recordings: of the payload, read through one preset.
-        fitted: whether there will be a fit.
+    Recordings, read through one preset, are processed once for both.
 
     Raises:
         InputError: nothing can be estimated from them.
@@ -85,11 +81,8 @@ def fit_trials(
 ) -> Calibration:
     """Fit what one payload's recordings, read through one preset, say of it.
 
-    Args:
-        recordings: of the payload.
-        preset: of their sensors; robots of a calibrated one are held as designed, others calibrate themselves.
-        robots: how they came out with another payload, to be held so.
-        start: what ``start_estimate`` makes of them; None to make it here.
+    Robots of a calibrated preset are held as designed, others calibrate themselves, or are held as ``robots`` came out
+    with another payload. ``start`` is what ``start_estimate`` makes of the recordings, if that is known.
 
     Raises:
         InputError: the recordings do not determine it.
@@ -107,27 +100,19 @@ Grasps = tuple[Array, Array]
 class PaperPlan:
     """What to run.
 
-    Attributes:
-        payloads: names of shipped payloads.
-        presets: names of sensor presets.
-        trials: random trials per payload; half as many (at least one) are periodic, as in the paper's 6 and 3,
-            and as many random ones serve the inertia.
-        seed: seed of everything random.
-        vias: vias of a random trial.
-        duration_s: length of a periodic trial's motion [s].
-        staged_only: whether to leave the fits beside the paper's own method out.
-
     Raises:
         InputError: an unknown payload or preset, or a number out of range.
     """
 
-    payloads: tuple[str, ...] = ("a", "b", "c", "d")
-    presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")
+    payloads: tuple[str, ...] = ("a", "b", "c", "d")  # names of shipped payloads
+    presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")  # names of sensor presets
+    # random trials per payload; half as many (at least one) are periodic, as in the paper's 6 and 3, and as many
+    # random ones serve the inertia
     trials: int = 6
-    seed: int = 0
-    vias: int = 80
-    duration_s: float = 60.0
-    staged_only: bool = False
+    seed: int = 0  # seed of everything random
+    vias: int = 80  # vias of a random trial
+    duration_s: float = 60.0  # length of a periodic trial's motion [s]
+    staged_only: bool = False  # whether to leave the fits beside the paper's own method out
 
     def __post_init__(self) -> None:
         """Check before hours are spent."""
@@ -183,22 +168,17 @@ class PaperPlan:
 
 @dataclass
 class PaperResult:
-    """What came out, by preset and payload.
+    """What came out, by preset and payload."""
 
-    Attributes:
-        scores: errors against Table I, by preset or column of fits; the content of ``paper.json``. The payload that
-            calibrated the robots has none (None) in the column of the transfer.
-        estimates: the staged estimates.
-        fits: the fits beside them, by column and payload.
-        recordings: the recordings they came from.
-        trials: a summary of every simulated trial.
-    """
-
+    # errors against Table I, by preset or column of fits; the content of ``paper.json``. The payload that calibrated
+    # the robots has none (None) in the column of the transfer
     scores: dict[str, dict[str, dict[str, Any] | None]] = field(default_factory=dict)
-    estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)
+    estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)  # the staged estimates
+    # the fits beside them, by column and payload
     fits: dict[str, dict[str, Calibration]] = field(default_factory=dict)
+    # the recordings they came from
     recordings: dict[str, dict[str, list[Recording]]] = field(default_factory=dict)
-    trials: list[TrialSummary] = field(default_factory=list)
+    trials: list[TrialSummary] = field(default_factory=list)  # a summary of every simulated trial
 
 
 def run_paper(
@@ -209,11 +189,11 @@ def run_paper(
     *,
     remote: bool = False,
 ) -> PaperResult:
-    """Run the whole experiment.
+    """Run the whole experiment; the result does not depend on the number of processes.
 
     Args:
         plan: what to run.
-        jobs: parallel processes; the result does not depend on them.
+        jobs: parallel processes.
         progress: called several times a second, from another thread, with the steps done, parts of trials counting, all
             steps, and the name of the stage that runs.
         store: where outcomes are kept as they end; those that are there already are taken from it.

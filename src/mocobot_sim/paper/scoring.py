@@ -34,25 +34,15 @@ from mocobot_sim.scene.as_built import AsBuilt, theta_x_zeros, units_of
 
 @dataclass(frozen=True)
 class PayloadTruth:
-    """What is true of a payload; frames as in ``PayloadEstimate``.
+    """What is true of a payload; frames as in ``PayloadEstimate``."""
 
-    Attributes:
-        name: label of the payload.
-        R_1i: rotations of the grasp frames in {1}, shape (N, 3, 3).
-        p_1i: their origins in {1} [m], shape (N, 3).
-        mass: mass [kg].
-        p_1c: centre of mass in {1} [m], shape (3,).
-        R_1c: principal axes in {1}, as columns, shape (3, 3).
-        principal_moments: about the axes of {c}, ascending [kg m^2], shape (3,).
-    """
-
-    name: str
-    R_1i: Array
-    p_1i: Array
-    mass: float
-    p_1c: Array
-    R_1c: Array
-    principal_moments: Array
+    name: str  # label of the payload
+    R_1i: Array  # rotations of the grasp frames in {1}, shape (N, 3, 3)
+    p_1i: Array  # their origins in {1} [m], shape (N, 3)
+    mass: float  # mass [kg]
+    p_1c: Array  # centre of mass in {1} [m], shape (3,)
+    R_1c: Array  # principal axes in {1}, as columns, shape (3, 3)
+    principal_moments: Array  # about the axes of {c}, ascending [kg m^2], shape (3,)
 
     @property
     def inertia(self) -> Array:

@@ -41,10 +41,7 @@ class Store:
     def __init__(self, out: Path, key: str, *, force: bool) -> None:
         """Open the store in a folder of results.
 
-        Args:
-            out: that folder.
-            key: of everything that outcomes depend on; a run with another one has nothing to do with this.
-            force: drop what another run left there.
+        The key is of everything that outcomes depend on; ``force`` drops what a run with another one left there.
 
         Raises:
             InputError: another run left something there, or it cannot be written.
@@ -149,14 +146,9 @@ EVERY_S = 0.2
 
 @contextmanager
 def shares(tasks: int, told: Callable[[float], object]) -> Iterator[Array]:
-    """Watch tasks while the block runs.
+    """Watch tasks while the block runs: yields the share of each that is done, for the tasks to write to in any process.
 
-    Args:
-        tasks: how many there are.
-        told: called, from a thread of its own, with how much is done, in tasks; at first with 0.
-
-    Yields:
-        The share of each task that is done, shape (tasks,), for the tasks to write to, in any process.
+    ``told`` is called, from a thread of its own, with how much is done, in tasks; at first with 0.
     """
     with scratch_folder() as folder:
         done = np.memmap(folder / "shares", dtype=float, mode="w+", shape=(tasks,))

@@ -33,40 +33,24 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of one payload.
+    """One quantity of one payload."""
 
-    Attributes:
-        payload: its name; empty in the summary, which is over all payloads.
-        quantity: such as ``R12`` or ``mass``.
-        unit: of the numbers.
-        cells: one per column of the table.
-        frames: ``BY_ENCODERS`` or, for the frames of the CAD, empty.
-    """
-
-    payload: str
-    quantity: str
-    unit: str
-    cells: tuple[Cell, ...]
-    frames: str = ""
+    payload: str  # its name; empty in the summary, which is over all payloads
+    quantity: str  # such as ``R12`` or ``mass``
+    unit: str  # of the numbers
+    cells: tuple[Cell, ...]  # one per column of the table
+    frames: str = ""  # ``BY_ENCODERS`` or, for the frames of the CAD, empty
 
 
 @dataclass(frozen=True)
 class PaperTable:
-    """A table with one column of published figures, then ours.
+    """A table with one column of published figures, then ours."""
 
-    Attributes:
-        number: of the paper's table, such as ``II``; empty for the summary.
-        title: what it shows.
-        note: what the numbers are.
-        columns: ``paper``, then the presets and the fits beside them.
-        rows: payload by payload.
-    """
-
-    number: str
-    title: str
-    note: str
-    columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    number: str  # of the paper's table, such as ``II``; empty for the summary
+    title: str  # what it shows
+    note: str  # what the numbers are
+    columns: tuple[str, ...]  # ``paper``, then the presets and the fits beside them
+    rows: tuple[Row, ...]  # payload by payload
 
     def part(self, unit: str, quantity: str | None = None, frames: str = "") -> PaperTable:
         """The rows of one unit and kind of frames only, or of one quantity in them."""

@@ -217,16 +217,13 @@ def _checked(read: Fields) -> AsBuilt:
 
 @dataclass(frozen=True)
 class SensorEffects:
-    """Timing faults, one entry per robot; empty tuples mean none.
+    """Timing faults, one entry per robot; empty tuples mean none."""
 
-    Attributes:
-        torque_delay_s: the logged torque is that much older than the angles beside it [s], N entries.
-        torque_lag_s: time constant of a first-order lag in the torque sensor, before log and controller [s].
-        clock_delay_s: everything the robot logs was sampled that much too early [s]; the controller is unaffected.
-    """
-
+    # the logged torque is that much older than the angles beside it [s], N entries
     torque_delay_s: tuple[float, ...] = ()
+    # time constant of a first-order lag in the torque sensor, before log and controller [s]
     torque_lag_s: tuple[float, ...] = ()
+    # everything the robot logs was sampled that much too early [s]; the controller is unaffected
     clock_delay_s: tuple[float, ...] = ()
 
     def of(self, name: str, robots: int) -> tuple[float, ...]:

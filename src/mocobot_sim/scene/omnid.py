@@ -35,9 +35,7 @@ FLOOR_BIT = 1 << 10
 def wheel_reach(design: BaseDesign, angle: ArrayLike) -> Array:
     """Height of the wheel's centre over a floor that one roller touches [m], shape (...).
 
-    Args:
-        design: the base.
-        angle: by which the roller's middle is away from straight down, about the wheel's axle [rad], shape (...).
+    ``angle`` is that by which the roller's middle is away from straight down, about the wheel's axle [rad], shape (...).
     """
     t = np.asarray(angle, dtype=float)
     r, half = design.roller_radius_m, design.roller_half_length_m
@@ -119,13 +117,7 @@ def load_omnid(number: int) -> mjcf.RootElement:
 
 
 def stand(root: mjcf.RootElement, omnid: mjcf.RootElement, place: ArrayLike, quat: ArrayLike) -> Any:
-    """Attach an Omnid to a scene and return its frame.
-
-    Args:
-        root: the scene.
-        omnid: the robot.
-        place, quat: of its floor mount in the world [m], shapes (3,) and (4,), w first.
-    """
+    """Attach an Omnid to a scene at a place [m], shape (3,), turned by a quaternion, w first; returns its frame."""
     name = omnid.model.replace("omnid", "mount")
     return root.worldbody.add("site", name=name, group=4, pos=place, quat=quat).attach(omnid)
 

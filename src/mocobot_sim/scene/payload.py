@@ -24,14 +24,10 @@ GRASP = re.compile(r"grasp([0-9]+)")
 
 
 def load_payload(payload: str | Path) -> mjcf.RootElement:
-    """Read a payload's MJCF.
-
-    Args:
-        payload: name of a shipped payload, or path of an ``.xml`` file.
+    """Read a payload's MJCF: a shipped one by its name, or the ``.xml`` file of a path.
 
     Raises:
-        InputError: it cannot be read, or something in it would act on the robots, too, or it names files
-            that are not its own.
+        InputError: it cannot be read, something in it would act on the robots, too, or it names files that are not its own.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
     if path.exists():
@@ -170,9 +166,7 @@ def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTrans
 def nearest_inertia(inertia: Array, least_ratio: float) -> Array:
     """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum.
 
-    Args:
-        inertia: symmetric, shape (3, 3) [kg m^2].
-        least_ratio: smallest moment over the largest.
+    ``inertia`` is symmetric, shape (3, 3) [kg m^2]; ``least_ratio`` is the smallest moment over the largest.
     """
     moments, axes = np.linalg.eigh(inertia)
     moments = np.maximum(moments, least_ratio * max(moments[-1], 1e-9))

@@ -46,27 +46,19 @@ _LEAST_RELAXATION_S = 0.005
 
 @dataclass(frozen=True)
 class SoftRow:
-    """An ``equality`` on one joint or fixed tendon that acts as a spring or as a damper.
+    """An ``equality`` on one joint or fixed tendon that acts as a spring or as a damper."""
 
-    Attributes:
-        equality: its name in the scene.
-        compliance: of the spring [m/N or rad/(N m)], or None.
-        relaxation_s: time constant in which the spring follows its load [s]; a critically damped one below 5 ms.
-        damping: of the damper [N s/m or N m s/rad], or None.
-    """
-
-    equality: str
-    compliance: float | None = None
-    damping: float | None = None
+    equality: str  # its name in the scene
+    compliance: float | None = None  # of the spring [m/N or rad/(N m)], or None
+    damping: float | None = None  # of the damper [N s/m or N m s/rad], or None
+    # time constant in which the spring follows its load [s]; a critically damped one below 5 ms
     relaxation_s: float = 0.0
 
 
 def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
     """``solref`` and ``solimp`` of a critically damped spring.
 
-    Args:
-        compliance: of the spring, greater than 0 [m/N or rad/(N m)].
-        inverse_inertia: A, as MuJoCo has it [1/kg or 1/(kg m^2)].
+    Its compliance is greater than 0 [m/N or rad/(N m)]; the inverse inertia is A as MuJoCo has it [1/kg or 1/(kg m^2)].
     """
     s = min(_STIFFNESS_PER_S2, 0.5 * inverse_inertia / compliance)
     soft = s * compliance / inverse_inertia

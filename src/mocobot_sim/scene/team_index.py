@@ -28,37 +28,28 @@ PAYLOAD_PREFIX = "omnid1/payload/"
 
 @dataclass(frozen=True)
 class TeamIndex:
-    """Where each robot's coordinates live; every joint here has one coordinate.
+    """Where each robot's coordinates live; every joint here has one coordinate."""
 
-    Attributes:
-        motor_qpos, spring_qpos, gimbal_qpos, slide_qpos: positions in ``qpos``, (N, 3); gimbal order z, y, x.
-        motor_dof, spring_dof, gimbal_dof, slide_dof, knee_dof: positions in ``qvel``; (N, 3), knees (N, 6).
-        actuator: positions in ``ctrl``, shape (N, 3).
-        grasp_site: the flange's site of every robot, shape (N,).
-        payload_site: the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held.
-        payload_body: body id of the payload; -1 where nothing is held.
-        yielding_dof: slides, and hinges on springs, that effects have added: bases and grasps that yield, are loose or
-            creep.
-        hanging_dof: other hinges that effects have added: what swings in the payload.
-        base_dof: free chassis, wheels and rollers; none in a team that is parked.
-    """
-
+    # positions in ``qpos``, (N, 3); gimbal order z, y, x
     motor_qpos: Index
     spring_qpos: Index
     gimbal_qpos: Index
     slide_qpos: Index
+    # positions in ``qvel``; (N, 3), knees (N, 6)
     motor_dof: Index
     spring_dof: Index
     gimbal_dof: Index
     slide_dof: Index
     knee_dof: Index
-    actuator: Index
-    grasp_site: Index
+    actuator: Index  # positions in ``ctrl``, shape (N, 3)
+    grasp_site: Index  # the flange's site of every robot, shape (N,)
+    # the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held
     payload_site: Index
-    payload_body: int
+    payload_body: int  # body id of the payload; -1 where nothing is held
+    # slides, and hinges on springs, that effects have added: bases and grasps that yield, are loose or creep
     yielding_dof: Index
-    hanging_dof: Index
-    base_dof: Index
+    hanging_dof: Index  # other hinges that effects have added: what swings in the payload
+    base_dof: Index  # free chassis, wheels and rollers; none in a team that is parked
 
     @property
     def robots(self) -> int:
@@ -67,11 +58,7 @@ class TeamIndex:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, carries: bool = True) -> TeamIndex:
-        """Look everything up by name.
-
-        Args:
-            model: the compiled scene.
-            carries: whether it has a payload.
+        """Look everything up by name in a compiled scene, with or without a payload.
 
         Raises:
             KeyError: the model is not a team scene (the message names what is missing).
@@ -139,21 +126,15 @@ def _base_joints(model: mujoco.MjModel) -> Index:
 
 @dataclass(frozen=True)
 class BaseIndex:
-    """Where the wheels of N released robots live; wheels in the order of ``WHEELS``.
+    """Where the wheels of N released robots live; wheels in the order of ``WHEELS``."""
 
-    Attributes:
-        wheel_qpos, wheel_dof: positions in ``qpos`` and ``qvel``, shape (N, 4).
-        drive: positions of the wheels' motors in ``ctrl``, shape (N, 4).
-        chassis: body ids, shape (N,).
-        free_qpos: where the position and quaternion of every chassis begin in ``qpos``, shape (N,).
-        geom_wheel: number of the wheel, 4 robot + wheel from 0, that each geom is a roller of, or -1; shape (ngeom,).
-    """
-
+    # positions in ``qpos`` and ``qvel``, shape (N, 4)
     wheel_qpos: Index
     wheel_dof: Index
-    drive: Index
-    chassis: Index
-    free_qpos: Index
+    drive: Index  # positions of the wheels' motors in ``ctrl``, shape (N, 4)
+    chassis: Index  # body ids, shape (N,)
+    free_qpos: Index  # where the position and quaternion of every chassis begin in ``qpos``, shape (N,)
+    # number of the wheel, 4 robot + wheel from 0, that each geom is a roller of, or -1; shape (ngeom,)
     geom_wheel: Index
 
     @property

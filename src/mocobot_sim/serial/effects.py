@@ -20,20 +20,13 @@ CREEP = 1e-3
 
 @dataclass(frozen=True)
 class RobotEffect:
-    """One effect.
+    """One effect."""
 
-    Attributes:
-        cause: such as ``stribeck``.
-        joint: which joint, from 1; None of a body that no joint moves, and of the whole robot.
-        partner: the other joint of a coupled drive, from 1.
-        parameters: numbers, by name with the unit as suffix.
-        body: name of the body that it is about, where it is about one; empty: the one that the joint moves.
-    """
-
-    cause: str
-    joint: int | None
-    partner: int | None = None
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    cause: str  # such as ``stribeck``
+    joint: int | None  # which joint, from 1; None of a body that no joint moves, and of the whole robot
+    partner: int | None = None  # the other joint of a coupled drive, from 1
+    parameters: Mapping[str, float] = field(default_factory=dict)  # numbers, by name with the unit as suffix
+    # name of the body that it is about, where it is about one; empty: the one that the joint moves
     body: str = ""
 
     def number(self, *stems: str) -> float:
@@ -49,24 +42,15 @@ class RobotEffect:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Of all joints at one step.
+    """Of all joints at one step."""
 
-    Attributes:
-        time_s: since the start.
-        period_s: of a step.
-        q, dq: positions and rates, shape (J,).
-        ddq: accelerations of the step before, shape (J,).
-        load: torques that the masses behind the joints ask for, shape (J,).
-        torque: that the drives give, shape (J,).
-    """
-
-    time_s: float
-    period_s: float
-    q: Array
-    dq: Array
-    ddq: Array
-    load: Array
-    torque: Array
+    time_s: float  # since the start
+    period_s: float  # of a step
+    q: Array  # positions and rates, shape (J,)
+    dq: Array  # positions and rates, shape (J,)
+    ddq: Array  # accelerations of the step before, shape (J,)
+    load: Array  # torques that the masses behind the joints ask for, shape (J,)
+    torque: Array  # that the drives give, shape (J,)
 
     def signal(self, name: str) -> float:
         """A signal by its name: ``time``, ``q_3``, ``direction_3`` and so on."""
@@ -90,22 +74,17 @@ SIGNALS = "time, q_3, dq_3, ddq_3, direction_3, load_3, torque_3"
 
 @dataclass(frozen=True)
 class JointLaw:
-    """``amplitude`` times a function of a signal, and times another signal where one is named, at a joint from 1.
+    """``amplitude`` times a function of a signal, and times another signal where one is named, at a joint from 1."""
 
-    Attributes:
-        target: ``torque_3``, what the torque of joint 3 holds besides, or ``position_3``, what its reading is off by,
-            which is an error of the log and not simulated.
-        function: as in ``mocobot_sim.functions.FUNCTIONS``.
-        of, times: signals, all in SI: ``time``, ``q_3``, ``dq_3``, ``ddq_3``, ``direction_3``, ``load_3`` and
-            ``torque_3``; ``times`` is empty where there is none.
-        amplitude: in the target's unit over those of the signals.
-        number, second, phase_rad: what the function has inside (docs/effects.md).
-    """
-
+    # ``torque_3``, what the torque of joint 3 holds besides, or ``position_3``, what its reading is off by, which is
+    # an error of the log and not simulated
     target: str
-    function: str
+    function: str  # as in ``mocobot_sim.functions.FUNCTIONS``
+    # signals, all in SI: ``time``, ``q_3``, ``dq_3``, ``ddq_3``, ``direction_3``, ``load_3`` and ``torque_3``;
+    # ``times`` is empty where there is none
     of: str
-    amplitude: float
+    amplitude: float  # in the target's unit over those of the signals
+    # what the function has inside (docs/effects.md)
     number: float = 0.0
     second: float = 0.0
     phase_rad: float = 0.0
@@ -172,14 +151,13 @@ class ActingLaw:
 
 
 def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Array, dry: Array) -> Array:
-    """Torques that effects take from their joints' drives beyond what the model does, shape (J,) [N m or N].
+    """Torques that ``SMOOTH`` effects take from the drives beyond what the model does, shape (J,) [N m or N].
 
     What rubs never drives: fitted friction that is a little below zero, the model's own with it, is none.
 
     Args:
-        effects: any; those of ``SMOOTH`` count.
-        q: joint positions [rad or m], shape (J,).
-        v: speeds, shape (J,).
+        effects: any.
+        q, v: joint positions and speeds, shape (J,).
         damping: the model's own [N m s/rad or N s/m], shape (J,).
         dry: dry friction, the model's own with it; what is below zero takes from the viscous friction, shape (J,).
     """
@@ -194,13 +172,9 @@ def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Arr
 
 
 def dry_levels(effects: Sequence[RobotEffect], v: Array, load: Array, time: float) -> Array:
-    """Dry friction beyond the model's at every joint, shape (J,) [N m or N]; it may be less than that.
+    """Dry friction of ``DRY`` effects beyond the model's, which may be negative, shape (J,) [N m or N].
 
-    Args:
-        effects: any; those of ``DRY`` count.
-        v: speeds, shape (J,).
-        load: torques that the gears pass on, shape (J,).
-        time: since the robot was switched on, as a log of it would have it [s].
+    ``load`` are the torques that the gears pass on, ``time`` since the robot was switched on, as a log has it [s].
     """
     out = np.zeros(len(v))
     for effect in effects:

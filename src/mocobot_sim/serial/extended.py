@@ -26,10 +26,7 @@ ASSETS = "assets"
 def take_along(spec: mujoco.MjSpec) -> dict[Path, str]:
     """Name meshes, height fields, skins and textures by their place in ``assets`` beside a model that is written anew.
 
-    What is not found stays as it is named.
-
-    Args:
-        spec: the model as it was read from its file; changed.
+    ``spec`` is the model as read from its file, and is changed; what is not found stays as it is named.
 
     Returns:
         The files, each with its name in ``assets``.
@@ -102,8 +99,7 @@ def write_extended(
         reference: whether it is what has changed since other logs, whose own errors are then in no model.
 
     Raises:
-        InputError: the folder cannot be written, an effect makes a model that MuJoCo refuses, or a mesh or texture is
-            not the model's own.
+        InputError: the folder cannot be written, MuJoCo refuses the model with the effects, or a file is not the model's.
     """
     inside = with_effects(spec, effects)[1]
     places = [
@@ -248,15 +244,11 @@ MOST_SPEED = 1e4
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a rollout begins.
+    """Where a rollout begins."""
 
-    Attributes:
-        time: [s].
-        q, dq, ddq: positions, velocities and accelerations, shape (J,) each; with the latter the integration is
-            centred, and friction by load begins.
-    """
-
-    time: float
+    time: float  # [s]
+    # positions, velocities and accelerations, shape (J,) each; with the latter the integration is centred, and
+    # friction by load begins
     q: Array
     dq: Array
     ddq: Array
@@ -265,14 +257,8 @@ class Start:
 def rollout(built: Built, start: Start, drive: Drive, samples: int, every: int) -> Array:
     """Positions after every so many steps, shape (n, J), the start's first; n < samples + 1 where a run breaks off.
 
-    It breaks off where a number is not finite or a joint is faster than ``MOST_SPEED``.
-
-    Args:
-        built: the robot.
-        start: its state.
-        drive: what its drives give.
-        samples: how many to take after the start.
-        every: steps of the integration between samples.
+    It breaks off where a number is not finite or a joint is faster than ``MOST_SPEED``. ``every`` steps of the integration
+    lie between two of the ``samples`` taken after the start.
     """
     model = built.model
     data, effects = mujoco.MjData(model), built.running()

@@ -20,13 +20,9 @@ _POSSIBLE = 1e-9
 
 
 def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Array) -> None:
-    """Give a body mass, centre and inertia in place of its own.
+    """Give a body of a model mass [kg], centre [m] and inertia about it in place of its own.
 
-    Args:
-        body: of the model, changed in place.
-        mass: [kg].
-        centre: of mass, in the body's frame [m], shape (3,).
-        inertia: about that centre, along the body's frame [kg m^2], shape (3, 3); as near as a body can have it.
+    The inertia is along the body's frame [kg m^2], shape (3, 3); the body gets the nearest that one can have.
     """
     moments = np.linalg.eigvalsh(inertia)
     if moments[0] < 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - _POSSIBLE):
@@ -42,14 +38,10 @@ def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Arra
 
 
 def keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Fix all bodies at what the model was compiled to, if its compiler would change what is put into it.
+    """Fix all bodies of ``spec`` as its ``model`` has them, if its compiler would change what is put into it.
 
     Settings that take inertias from shapes whatever is written, scale the total mass or raise small ones would undo a
     cause, or pass it on to every other body.
-
-    Args:
-        spec: the model, changed in place.
-        model: what it compiles to.
     """
     of = spec.compiler
     from_shapes = of.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -71,14 +63,11 @@ def inertial_of(model: mujoco.MjModel, body: int) -> tuple[float, Array, Array]:
 
 
 def real_inertia(inertia: Array) -> Array:
-    """The inertia nearest to a fitted one that a body can have, which MuJoCo asks for.
+    """The inertia nearest to a fitted, symmetric one about the centre of mass [kg m^2] that a body can have.
 
     A density is nowhere below zero, so second moments of mass are positive semidefinite (P. M. Wensing, S. Kim and
     J.-J. E. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", RA-L
     2018); those that are not are set to a thousandth of the largest.
-
-    Args:
-        inertia: about the centre of mass [kg m^2], shape (3, 3), symmetric.
     """
     size, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
     second = (axes * np.maximum(size, LEAST_MOMENT * max(size[-1], 0.0))) @ axes.T
@@ -92,12 +81,7 @@ SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
-    """Put an effect into a model; False if MJCF has no word for it, or not for its sign.
-
-    Args:
-        spec: the model, changed in place.
-        effect: with its joint counted in the order of qpos.
-    """
+    """Put an effect, its joint counted in the order of qpos, into a model; False if MJCF has no word for it or its sign."""
     model = spec.compile()
     if effect.cause == "gravity_direction":
         spec.option.gravity = [effect.number(axis) for axis in "xyz"]
@@ -221,18 +205,13 @@ Effect = RobotEffect | JointLaw
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A robot that a reference stepper can step.
+    """A robot that a reference stepper can step."""
 
-    Attributes:
-        model: compiled, with what MJCF can say; contacts, limits and actuators off, MuJoCo's ``implicitfast``, and
-            dry friction that hardly depends on the speed.
-        stepped: effects that the stepper adds.
-        left_out: which of the given effects are in neither, numbers from 0.
-    """
-
+    # compiled, with what MJCF can say; contacts, limits and actuators off, MuJoCo's ``implicitfast``, and dry
+    # friction that hardly depends on the speed
     model: mujoco.MjModel
-    stepped: tuple[Effect, ...]
-    left_out: tuple[int, ...]
+    stepped: tuple[Effect, ...]  # effects that the stepper adds
+    left_out: tuple[int, ...]  # which of the given effects are in neither, numbers from 0
 
     def running(self) -> list[RobotEffect | ActingLaw]:
         """The stepper's effects for one run: laws may remember."""
@@ -254,12 +233,7 @@ def with_effects(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[mujoco
 
 
 def build(spec: mujoco.MjSpec, effects: Sequence[Effect], step_s: float) -> Built:
-    """Put effects into a model.
-
-    Args:
-        spec: the nominal model; changed.
-        effects: what is off.
-        step_s: of the integration [s].
+    """Put effects into a nominal model, which is changed, to be integrated in steps of ``step_s`` [s].
 
     Raises:
         InputError: MuJoCo refuses the model with the effects in it.

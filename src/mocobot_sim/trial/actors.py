@@ -18,26 +18,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stage:
-    """A trial that is about to begin, at rest.
+    """A trial that is about to begin, at rest."""
 
-    Attributes:
-        model, data: the trial's.
-        index: addresses in the model.
-        controller: of the arms.
-        rate_hz: control rate [Hz].
-        ticks: control ticks per logged sample.
-        duration: control ticks of the whole trial.
-        shared: by name, what several actors keep of the trial together.
-    """
-
-    model: mujoco.MjModel
-    data: mujoco.MjData
-    index: TeamIndex
-    controller: TeamController
-    rate_hz: float
-    ticks: int
-    duration: int
-    shared: dict[str, object] = field(default_factory=dict)
+    model: mujoco.MjModel  # the trial's
+    data: mujoco.MjData  # the trial's
+    index: TeamIndex  # addresses in the model
+    controller: TeamController  # of the arms
+    rate_hz: float  # control rate [Hz]
+    ticks: int  # control ticks per logged sample
+    duration: int  # control ticks of the whole trial
+    shared: dict[str, object] = field(
+        default_factory=dict
+    )  # by name, what several actors keep of the trial together
 
 
 class Actor(Protocol):

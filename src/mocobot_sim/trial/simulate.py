@@ -36,26 +36,16 @@ LEFT_RAD = 0.3
 
 @dataclass(frozen=True)
 class TrialRequest:
-    """One trial to simulate; equal requests give equal bits.
+    """One trial to simulate; equal requests give equal bits."""
 
-    Attributes:
-        payload: name of a shipped payload, or path of a payload MJCF; in a free trial the one that the robots have put
-            down.
-        trial: ``random``, ``periodic``, ``static`` or ``free``.
-        seed: seed of everything random, at least 0.
-        number: which of several trials of that kind, at least 0.
-        vias: number of vias of a random trial, and of a free one's fast part.
-        duration_s: length of a periodic trial's motion [s].
-        robots: number of robots of a free trial; None for as many as the payload has grasps.
-    """
-
+    # name of a shipped payload, or path of a payload MJCF; in a free trial the one that the robots have put down
     payload: str
-    trial: str
-    seed: int = 0
-    number: int = 0
-    vias: int = 80
-    duration_s: float = 60.0
-    robots: int | None = None
+    trial: str  # ``random``, ``periodic``, ``static`` or ``free``
+    seed: int = 0  # seed of everything random, at least 0
+    number: int = 0  # which of several trials of that kind, at least 0
+    vias: int = 80  # number of vias of a random trial, and of a free one's fast part
+    duration_s: float = 60.0  # length of a periodic trial's motion [s]
+    robots: int | None = None  # number of robots of a free trial; None for as many as the payload has grasps
 
     @property
     def label(self) -> str:
@@ -70,17 +60,11 @@ class TrialRequest:
 
 @dataclass(frozen=True)
 class Simulated:
-    """A finished trial.
+    """A finished trial."""
 
-    Attributes:
-        recordings: one per sensor preset.
-        log: what truly happened.
-        scene: the team.
-    """
-
-    recordings: dict[str, Recording]
-    log: TrialLog
-    scene: TeamScene
+    recordings: dict[str, Recording]  # one per sensor preset
+    log: TrialLog  # what truly happened
+    scene: TeamScene  # the team
 
     @cached_property
     def truth(self) -> GroundTruth:

@@ -266,11 +266,9 @@ def wrapped(angle: ArrayLike) -> Array:
 
 
 def moved(pose: ArrayLike, step: ArrayLike) -> Array:
-    """Pose after a constant body twist has acted for a while: odometry (Modern Robotics, section 13.4).
+    """Pose (..., 3) after a constant body twist has acted for a while: odometry (Modern Robotics, section 13.4).
 
-    Args:
-        pose: before, shape (..., 3).
-        step: body twist times time (turn [rad], along x, along y [m]), shape (..., 3).
+    ``step`` is the twist times the time (turn [rad], along x, along y [m]), shape (..., 3).
     """
     pose, step = np.broadcast_arrays(np.asarray(pose, dtype=float), np.asarray(step, dtype=float))
     turn, x, y = step[..., 0], step[..., 1], step[..., 2]
@@ -364,9 +362,7 @@ def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 
 def carried(motion: PlanarMotion, places: ArrayLike) -> PlanarMotion:
     """Motion of N frames that are fixed to a moving one: what bases do that stay put under a moving payload.
 
-    Args:
-        motion: of one frame.
-        places: where the N frames are in the world at the beginning: x, y [m], yaw [rad], shape (N, 3).
+    ``places`` is where they are in the world at the beginning: x, y [m], yaw [rad], shape (N, 3).
     """
     lead, twist = motion.pose[:, 0], motion.twist[:, 0]
     held = relative(lead[0], np.asarray(places, dtype=float))  # poses in the moving frame, (N, 3)

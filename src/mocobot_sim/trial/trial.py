@@ -24,19 +24,13 @@ from mocobot_sim.trial.trial_log import Rows, SensedLog, TrialLog
 
 @dataclass(frozen=True)
 class _Others:
-    """Actors, sensors that misread, and pushes of one trial.
+    """Actors, sensors that misread, and pushes of one trial."""
 
-    Attributes:
-        actors, readers, pushes: each in the order in which it acts.
-        carries: whether there is a payload to act on.
-        R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
-    """
-
-    actors: tuple[Actor, ...]
-    readers: tuple[Reader, ...]
-    pushes: tuple[Push, ...]
-    carries: bool
-    R_Wb1: Array
+    actors: tuple[Actor, ...]  # each in the order in which it acts
+    readers: tuple[Reader, ...]  # each in the order in which it acts
+    pushes: tuple[Push, ...]  # each in the order in which it acts
+    carries: bool  # whether there is a payload to act on
+    R_Wb1: Array  # axes of robot 1's {b} in the world, shape (3, 3)
 
     @classmethod
     def of(cls, scene: TeamScene, trial_number: int | None, actors: Sequence[Actor]) -> _Others:
@@ -182,12 +176,8 @@ def between_commands(ref_b: Array, ticks: int) -> tuple[Array, Array]:
     Straight lines between commands would jump in velocity at every sample; the ripple this causes is locked to
     the sampling, so it does not average out but aliases into the torques (up to 0.12 % on inertia).
 
-    Args:
-        ref_b: commands at ``RATE_HZ`` [m], shape (Q, N, 3).
-        ticks: control ticks per command.
-
     Returns:
-        Positions [m] and rates [m/s], shape (Q * ticks, N, 3); the last command is held.
+        Positions [m] and rates [m/s] at ``ticks`` per command, shape (Q * ticks, N, 3); the last command is held.
     """
     times = np.arange(len(ref_b)) / RATE_HZ
     spline = CubicSpline(times, ref_b, bc_type="clamped")

@@ -22,34 +22,19 @@ from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 
 @dataclass(frozen=True)
 class SensedLog:
-    """Joint angles and torque readings at the control rate, before zeros, noise and rounding.
+    """Joint angles and torque readings at the control rate, before zeros, noise and rounding."""
 
-    Attributes:
-        rate_hz: control rate [Hz]; the first row is at t = 0.
-        ticks: rows per sample of the recording.
-        phi: driven angles [rad], shape (T, N, 3).
-        theta: gimbal angles (z, y, x) [rad], shape (T, N, 3).
-        tau: torque readings, minus design stiffness times deflection, through the sensor's lag [N m], (T, N, 3).
-    """
-
-    rate_hz: float
-    ticks: int
-    phi: Array
-    theta: Array
-    tau: Array
+    rate_hz: float  # control rate [Hz]; the first row is at t = 0
+    ticks: int  # rows per sample of the recording
+    phi: Array  # driven angles [rad], shape (T, N, 3)
+    theta: Array  # gimbal angles (z, y, x) [rad], shape (T, N, 3)
+    tau: Array  # torque readings, minus design stiffness times deflection, through the sensor's lag [N m], (T, N, 3)
 
     def sampled(self, channel: str, delay_s: Array) -> Array:
-        """A channel at the recording's instants, each robot's later by its delay.
+        """``phi``, ``theta`` or ``tau`` at the recording's instants, each robot's later by its delay [s]; shape (Q, N, 3).
 
-        Delays need not be whole ticks: a cubic spline runs through the rows. Before the first and after the last
+        Delays, shape (N,), need not be whole ticks: a cubic spline runs through the rows. Before the first and after the last
         row the end values hold.
-
-        Args:
-            channel: ``phi``, ``theta`` or ``tau``.
-            delay_s: sample at t - delay [s], shape (N,).
-
-        Returns:
-            Values, shape (Q, N, 3).
         """
         values = getattr(self, channel)
         rows = values[:: self.ticks].copy()
