@@ -60,9 +60,9 @@ class Payload:
 def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Array:
     """Upward forces at the grasps that carry the payload's weight without turning it [N], shape (N,).
 
-    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique, with
-    more the smallest are taken; with one or two a moment stays that cannot be balanced. ``up_1`` is the direction away
-    from the ground in {1}, unit length, shape (3,).
+    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique,
+    with more the smallest are taken; with one or two a moment stays that cannot be balanced. ``up_1`` is the direction
+    away from the ground in {1}, unit length, shape (3,).
     """
     up = np.asarray(up_1, dtype=float)
     arms = payload.p_1i - payload.p_1c

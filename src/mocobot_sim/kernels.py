@@ -186,9 +186,9 @@ def update_drives(
     """One control tick of all bases, in place.
 
     Addresses have shape (N, 4), the kinematics' matrices (4, 3) and (3, 4). ``constants`` are the position gain [1/s],
-    speed gain, integral gain, torque limit and period [s]; ``pose`` and ``twist`` the planned ones of this tick, (N, 3).
-    Brought up to date: ``odometry``, the pose by it, (N, 3); ``angle`` of the wheels at the last tick and ``lag``, by how
-    much they lag their commanded angles [rad], (N, 4). Written: ``ctrl``, and ``speed``, the commanded ones, (N, 4).
+    speed gain, integral gain, torque limit and period [s]; ``pose`` and ``twist`` are planned for this tick, (N, 3).
+    Brought up to date: ``odometry``, the pose by it, (N, 3); ``angle`` of the wheels at the last tick and ``lag``, by
+    how much they lag their commanded angles [rad], (N, 4). Written: ``ctrl`` and the commanded ``speed``, (N, 4).
     """
     position_gain, gain, integral, limit, period = constants
     for i in range(wheel_qpos.shape[0]):

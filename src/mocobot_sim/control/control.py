@@ -194,7 +194,7 @@ class TeamController:
         self._constants[TAKE_UP_TICKS] = 0
 
     def update(self, ref: Array, ref_dot: Array) -> None:
-        """One control tick: read ``qpos``, write ``ctrl``; commands [m] and their rates [m/s] in every {b}, shapes (N, 3)."""
+        """One control tick by commands [m] and their rates [m/s] in every robot's {b}, shapes (N, 3)."""
         self._commands[self._tick % len(self._commands)] = ref, ref_dot
         self.tick()
 

@@ -146,7 +146,7 @@ EVERY_S = 0.2
 
 @contextmanager
 def shares(tasks: int, told: Callable[[float], object]) -> Iterator[Array]:
-    """Watch tasks while the block runs: yields the share of each that is done, for the tasks to write to in any process.
+    """Watch tasks while the block runs; yields the share of each that is done, which they write to in any process.
 
     ``told`` is called, from a thread of its own, with how much is done, in tasks; at first with 0.
     """

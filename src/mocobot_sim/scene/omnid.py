@@ -35,7 +35,7 @@ FLOOR_BIT = 1 << 10
 def wheel_reach(design: BaseDesign, angle: ArrayLike) -> Array:
     """Height of the wheel's centre over a floor that one roller touches [m], shape (...).
 
-    ``angle`` is that by which the roller's middle is away from straight down, about the wheel's axle [rad], shape (...).
+    The roller's middle is away from straight down by ``angle`` about the wheel's axle [rad], shape (...).
     """
     t = np.asarray(angle, dtype=float)
     r, half = design.roller_radius_m, design.roller_half_length_m

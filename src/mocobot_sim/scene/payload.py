@@ -27,7 +27,7 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
     """Read a payload's MJCF: a shipped one by its name, or the ``.xml`` file of a path.
 
     Raises:
-        InputError: it cannot be read, something in it would act on the robots, too, or it names files that are not its own.
+        InputError: it cannot be read, something in it would act on the robots, or it names files of others.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
     if path.exists():

@@ -99,7 +99,7 @@ def write_extended(
         reference: whether it is what has changed since other logs, whose own errors are then in no model.
 
     Raises:
-        InputError: the folder cannot be written, MuJoCo refuses the model with the effects, or a file is not the model's.
+        InputError: the folder cannot be written, MuJoCo refuses the effects, or a file is not the model's.
     """
     inside = with_effects(spec, effects)[1]
     places = [
@@ -257,8 +257,8 @@ class Start:
 def rollout(built: Built, start: Start, drive: Drive, samples: int, every: int) -> Array:
     """Positions after every so many steps, shape (n, J), the start's first; n < samples + 1 where a run breaks off.
 
-    It breaks off where a number is not finite or a joint is faster than ``MOST_SPEED``. ``every`` steps of the integration
-    lie between two of the ``samples`` taken after the start.
+    It breaks off where a number is not finite or a joint is faster than ``MOST_SPEED``. ``every`` steps of the
+    integration lie between two of the ``samples`` taken after the start.
     """
     model = built.model
     data, effects = mujoco.MjData(model), built.running()

@@ -81,7 +81,7 @@ SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
-    """Put an effect, its joint counted in the order of qpos, into a model; False if MJCF has no word for it or its sign."""
+    """Put an effect, its joint counted as in qpos, into a model; False if MJCF has no word for it or its sign."""
     model = spec.compile()
     if effect.cause == "gravity_direction":
         spec.option.gravity = [effect.number(axis) for axis in "xyz"]

@@ -31,10 +31,10 @@ class SensedLog:
     tau: Array  # torque readings, minus design stiffness times deflection, through the sensor's lag [N m], (T, N, 3)
 
     def sampled(self, channel: str, delay_s: Array) -> Array:
-        """``phi``, ``theta`` or ``tau`` at the recording's instants, each robot's later by its delay [s]; shape (Q, N, 3).
+        """A channel at the recording's instants, each robot's later by its delay [s], shape (Q, N, 3).
 
-        Delays, shape (N,), need not be whole ticks: a cubic spline runs through the rows. Before the first and after the last
-        row the end values hold.
+        Delays, shape (N,), need not be whole ticks: a cubic spline runs through the rows. Before the first and after
+        the last row the end values hold.
         """
         values = getattr(self, channel)
         rows = values[:: self.ticks].copy()
