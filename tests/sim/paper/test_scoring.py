@@ -244,19 +244,6 @@ def test_fit_is_one_number_whose_share_of_the_spring_scale_is_told():
     assert scale["Ixx_percent"] == pytest.approx(0, abs=1e-9)
 
 
-def test_keys_are_those_of_the_results_file():
-    result = score(estimate([]), TRUTH)
-    pairs = ("12", "23", "31")
-    grasps = {
-        f"{kind}{p}_{unit}" for p in pairs for kind, unit in (("R", "deg"), ("p", "m"), ("p", "percent"))
-    }
-    assert set(result) == grasps | {"m_kg", "m_percent", "p1c_m", "p1c_percent", "all", "random", "periodic"}
-    assert set(published_errors("a")) <= set(result)
-    for group in ("all", "random", "periodic"):
-        assert list(result[group]) == ["Ixx", "Iyy", "Izz"]
-        assert set(result[group]["Ixx"]) == {"mean", "std", "percent", "std_percent"}
-
-
 @pytest.mark.parametrize("angle", [0.0, 1e-7, 1.0, 179.999])
 def test_rotation_error_is_the_angle_between(angle):
     R = Rotation.from_rotvec([0.4, -1.0, 0.3]).as_matrix()
