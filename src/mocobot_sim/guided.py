@@ -66,7 +66,7 @@ def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Arr
     """
     up = np.asarray(up_1, dtype=float)
     arms = payload.p_1i - payload.p_1c
-    # Of the moment, only what is across ``up`` can be balanced by forces along it: two directions.
+    # Forces along ``up`` balance only the moment across it: two directions.
     across = np.linalg.svd(up[None])[2][1:]
     scale = max(np.linalg.norm(arms, axis=1).max(), 1e-9)
     rows = np.vstack([np.ones(len(arms)), across @ np.cross(arms, up).T / scale])

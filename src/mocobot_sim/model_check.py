@@ -13,7 +13,7 @@ from estimator.errors import InputError
 from estimator.inputs import JSON_BYTES, open_input, printable, read_input
 
 MOST_ELEMENTS, MOST_POINTS = 100_000, 1 << 24
-"""Of a model, copies included; and of one height field or texture."""
+"""Most elements of a model, copies included; most points of one height field or texture."""
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _PNG = b"\x89PNG\r\n\x1a\n"
 

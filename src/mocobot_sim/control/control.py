@@ -43,7 +43,7 @@ RANGES = {
     "torque_gain": (0.0, 1e3), "torque_rate_gain_s": (0.0, 10.0), "rate_filter_s": (0.0, 10.0),
     "take_up_s": (0.0, 3600.0), "take_up_time_constant_s": (1e-6, 3600.0), "motor_torque_limit_Nm": (1e-3, 1e5),
 }  # fmt: skip
-"""Of gains; whether a team is stable with them is for ``control_stability`` to say."""
+"""Ranges of gains; ``control_stability`` says whether a team is stable with them."""
 
 
 @dataclass(frozen=True)

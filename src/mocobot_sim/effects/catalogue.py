@@ -66,7 +66,7 @@ def make_effect(
 
 
 def _default(entry: Any) -> float | str | None:
-    """Of a field of an effect; None where it must be given."""
+    """What a field of an effect is if it is left out; None where it must be given."""
     return entry.default if isinstance(entry.default, int | float | str) else None
 
 

@@ -22,7 +22,7 @@ from mocobot_sim.effects.geometry import (
     level_slides,
     widened,
 )
-from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_name, check_numbers
+from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_law
 from mocobot_sim.scene.models import base_height_m, omnid_design
 from mocobot_sim.trial.actors import RobotReadings, Stage
 
@@ -33,6 +33,7 @@ READING = re.compile(r"(phi|theta|tau)_([1-9][0-9]*)_([123])")
 TORQUE = re.compile(r"(driven|gimbal)_torque_([1-9][0-9]*)_([123])")
 SLIDE = re.compile(r"(base|grasp)_position_([1-9][0-9]*)_([xyz])")
 ON_PAYLOAD = re.compile(r"payload_(?:mass|(?:force|moment|first_moment|spin)_[xyz])")
+TARGET = re.compile("|".join(kind.pattern for kind in (READING, TORQUE, SLIDE, ON_PAYLOAD)))
 TARGETS = (
     "tau_2_1, phi_2_1, theta_2_1 (readings of robot, joint), driven_torque_2_1, gimbal_torque_2_1, base_position_2_x, "
     "grasp_position_2_x, payload_force_x, payload_moment_x, payload_mass, payload_first_moment_x, payload_spin_x"
@@ -86,12 +87,7 @@ class Law(Effect):
             InputError: a name is not known, or a number is not allowed with this function.
         """
         super().__post_init__()
-        target = any(kind.fullmatch(self.target) for kind in (READING, TORQUE, SLIDE, ON_PAYLOAD))
-        check_name("target", self.target, target, TARGETS)
-        check_name("function", self.function, self.function in FUNCTIONS, ", ".join(FUNCTIONS))
-        check_name("of", self.of, bool(parts_of(self.of)), SIGNALS)
-        check_name("times", self.times, not self.times or bool(parts_of(self.times)), SIGNALS)
-        check_numbers(self.function, self.number, self.second)
+        check_law(self, TARGET.fullmatch, TARGETS, parts_of, SIGNALS)
 
     def step(self, dt: float) -> Step:
         """The function, one value after the other at steps of ``dt`` [s]."""
@@ -161,7 +157,7 @@ def _slide_name(match: re.Match[str]) -> str:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of two vectors of three; numpy's takes ten times as long for so few numbers."""
+    """Cross product of two vectors; numpy's takes ten times as long for so few numbers."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
@@ -196,7 +192,7 @@ class PayloadMotion:
 
     @classmethod
     def of(cls, stage: Stage) -> PayloadMotion:
-        """Of a trial; all that ask for it have the same one."""
+        """The motion in a trial; all that ask for it have the same one."""
         if "payload motion" not in stage.shared:
             stage.shared["payload motion"] = cls(stage)
         return cast("PayloadMotion", stage.shared["payload motion"])

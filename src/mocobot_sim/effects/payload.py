@@ -386,7 +386,7 @@ class _Carried:
 
 
 _ENTRIES = ("xx", "xy", "xz", "yy", "yz", "zz")
-"""Of an inertia, as ``inertia_matrix`` takes them."""
+"""Entries of an inertia, as ``inertia_matrix`` takes them."""
 
 
 def _about(r: Array) -> Array:

@@ -267,7 +267,7 @@ def _check_model(scene: TeamScene, path: Path) -> None:
 NOISE = 4.0
 """Standard errors by which a principal moment may be moved to be that of a body."""
 LEAST_MOMENT_RATIO = 1e-3
-"""Of a principal moment to the largest."""
+"""Least principal moment over the largest."""
 
 
 def calibrated_team(

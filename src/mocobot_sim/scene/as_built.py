@@ -177,7 +177,7 @@ WRIST_MASS = "wrist_mass_ratio"
 PAYLOAD = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2", "effects", "control")
 """What the truth beside a recording says besides; payload, effects and control are chosen anew."""
 RANGES = {"_m": (-0.05, 0.05), "_ratio": (-0.9, 10.0)}
-"""Of lengths and of ratios, as the effects of that kind have them; zeros may be any number."""
+"""Ranges of lengths and ratios, as the effects of that kind have them; zeros may be any number."""
 
 
 def read_units(path: Path) -> tuple[AsBuilt, ...]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from estimator.arrays import Array
 
 GIMBAL_AXES = ("z", "y", "x")
-"""Of gimbal joints 1, 2, 3."""
+"""Axes of gimbal joints 1, 2, 3."""
 
 
 @cache

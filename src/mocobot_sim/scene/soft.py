@@ -33,7 +33,7 @@ Under its limit, a friction row lets its coordinate creep at -R f / B: with the 
 coordinate within a millisecond, a coordinate of inertia I creeps at 1e-7 f / I [1/s].
 """
 
-# Of d and of 1 - d: MuJoCo clips d to this range.
+# Least d and 1 - d: MuJoCo clips d to this range.
 _LEAST = 1e-4
 # As stiff as the welds: (4 ms)^-2; a third of it with a small (1 - d) would still be.
 _STIFFNESS_PER_S2 = 62500.0

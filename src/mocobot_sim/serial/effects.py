@@ -12,7 +12,7 @@ import numpy as np
 
 from estimator.arrays import Array
 from estimator.strict import Fields
-from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_name, check_numbers
+from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_law
 
 CREEP = 1e-3
 """Speed over which dry friction changes its direction here [rad/s or m/s]: slow beside what joints do."""
@@ -42,7 +42,7 @@ class RobotEffect:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Of all joints at one step."""
+    """State of all joints at one step."""
 
     time_s: float  # since the start
     period_s: float  # of a step
@@ -96,11 +96,7 @@ class JointLaw:
         Raises:
             InputError: a name is not known, or a number is not allowed with this function.
         """
-        check_name("target", self.target, bool(TARGET.fullmatch(self.target)), TARGETS)
-        check_name("function", self.function, self.function in FUNCTIONS, ", ".join(FUNCTIONS))
-        check_name("of", self.of, bool(SIGNAL.fullmatch(self.of)), SIGNALS)
-        check_name("times", self.times, not self.times or bool(SIGNAL.fullmatch(self.times)), SIGNALS)
-        check_numbers(self.function, self.number, self.second)
+        check_law(self, TARGET.fullmatch, TARGETS, SIGNAL.fullmatch, SIGNALS)
 
     @property
     def joint(self) -> int:

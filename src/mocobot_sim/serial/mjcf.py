@@ -14,7 +14,7 @@ from estimator.errors import InputError
 from mocobot_sim.serial.effects import DRY, LAWS, ActingLaw, JointLaw, RobotEffect
 
 LEAST_MOMENT = 1e-3
-"""Of a body's largest second moment of mass, the least that it has in any direction. Chosen: a thin sheet's."""
+"""Least second moment of mass of a body in any direction, over the largest. Chosen: a thin sheet's."""
 _POSSIBLE = 1e-9
 """Relative; by so much may an inertia be off one that a body can have: rounding of the model's own numbers."""
 
@@ -76,7 +76,7 @@ def real_inertia(inertia: Array) -> Array:
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
-"""Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
+"""Rows of dry friction. By default it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
 20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
 
 

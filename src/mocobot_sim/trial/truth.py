@@ -79,7 +79,7 @@ class GroundTruth:
     def to_dict(self) -> dict[str, Any]:
         """JSON-able form, units in the keys; orientations as rotation vectors in degrees.
 
-        Of robots that hold nothing it has ``as_built``, ``effects`` and ``control`` only.
+        Robots that hold nothing have ``as_built``, ``effects`` and ``control`` only.
         """
         payload = {
             "grasps": [
