@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from mocobot_sim.effects.base import precise
 from mocobot_sim.effects.geometry import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE, base_slides
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import precise
 from mocobot_sim.trial.actors import Actor, Stage
 from sealed.forms.base import Form, Place
 from sealed.ground import Ground

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from mocobot_sim.effects.base import precise
 from mocobot_sim.effects.geometry import (
     LOOSE_ARMATURE_KG,
     SPRUNG_ARMATURE_KG,
@@ -18,7 +19,7 @@ from mocobot_sim.effects.geometry import (
     widened,
 )
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import precise, spring_parameters
+from mocobot_sim.scene.soft import spring_parameters
 from mocobot_sim.trial.actors import Actor, Stage
 from sealed.forms.base import Form, Place
 from sealed.ground import Ground

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mocobot.campaign.draw import REACH_M
+from mocobot_sim.effects.base import precise
 from mocobot_sim.effects.geometry import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE, add_slides
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import precise
 from mocobot_sim.trial.actors import Actor, Stage
 from sealed.forms.base import Form, Place, direction, near, vector
 from sealed.forms.parts import PayloadWrench, PointForce
