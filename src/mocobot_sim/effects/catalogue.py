@@ -9,27 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 from estimator.errors import InputError
 from estimator.strict import Fields
-from mocobot_sim.effect_names import check_effect_name
+from mocobot_sim.effect_names import NAMES, check_effect_name
 from mocobot_sim.effects import geometry, law, payload, readings, springs
 from mocobot_sim.effects.base import JOINTS, PLACE, WHOLE, Effect
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
 
-EFFECTS: dict[str, type[Effect]] = {
+SUBJECTS = (readings, springs, geometry, payload, law)
+_KINDS: dict[str, type[Effect]] = {
     kind.cause: kind
-    for kind in (
-        readings.PhiZero, readings.ThetaZero,
-        geometry.LinkLength, geometry.BaseTilt, geometry.BaseCreep, geometry.BaseCompliance,
-        geometry.GraspFlex, geometry.GraspPlay,
-        readings.SeaBias, springs.SeaScale, springs.SeaHardening, springs.SeaHysteresis,
-        springs.JointFriction, springs.GimbalFriction,
-        readings.TorqueSkew, readings.TorqueLag, readings.SensorLag, readings.ClockDelay,
-        payload.Tether, payload.PayloadTether, payload.Push, payload.Drag, payload.Slosh, payload.PayloadMass,
-        law.Law,
-    )
-}  # fmt: skip
-"""Every effect's class by the name of its cause, in the order of ``mocobot_sim.effect_names.NAMES``."""
+    for subject in SUBJECTS
+    for kind in vars(subject).values()
+    if isinstance(kind, type) and issubclass(kind, Effect) and kind is not Effect
+}
+EFFECTS: dict[str, type[Effect]] = {name: _KINDS[name] for name in NAMES}
+"""Every effect's class by the name of its cause, which the class gives: ``SeaBias`` is ``sea_bias``."""
 
 
 def make_effect(
