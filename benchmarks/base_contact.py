@@ -15,11 +15,10 @@ import mujoco
 import numpy as np
 
 from mocobot_sim.base.design import BaseDesign, base_design
-from mocobot_sim.base.drive import BaseDrive
-from mocobot_sim.base.index import BaseIndex
-from mocobot_sim.base.motion import Leg, plan
-from mocobot_sim.base.rollers import FRICTION_RATIO
-from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
+from mocobot_sim.base.drive import BaseDrive, build_solo, compile_solo, drive_solo
+from mocobot_sim.scene.omnid import FRICTION_RATIO
+from mocobot_sim.scene.team_index import BaseIndex
+from mocobot_sim.trial.trajectories import Leg, plan
 
 LEGS = {"forward": (0.5, 0.0, 0.0), "sideways": (0.0, 0.5, 0.0), "turn": (0.0, 0.0, 1.0)}
 

@@ -22,11 +22,10 @@ from mocobot_logs.one_clock import ClockReport, to_recording
 from mocobot_logs.resample.log import resample
 from mocobot_sim.paper.scoring import rotation_error_deg
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_sim.trial.trial_log import SensedLog, TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 
 SKEWED = 1  # robot 2

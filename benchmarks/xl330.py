@@ -29,7 +29,7 @@ from discrepancy.joints.servo.loop import LoopLaw, loop_laws
 from discrepancy.joints.verdict import judged
 from mocobot.serial import read_logs
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_sim.serial.rollout import Start, rollout
+from mocobot_sim.serial.extended import Start, rollout
 
 VARIABLE = "MOCOBOT_XL330_DATA"
 TOP = Path(__file__).resolve().parents[1]

@@ -12,7 +12,7 @@ import numpy as np
 from calibration.payloads import write_plate
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
-from mocobot_sim.effects.base_tilt import BaseTilt
+from mocobot_sim.effects.geometry import BaseTilt
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 

@@ -16,8 +16,8 @@ from mocobot.cli import COMMANDS
 from mocobot.comparison.compare import compare
 from mocobot.parsing import with_config
 from mocobot_logs.joints.parse import read_joint_map
-from mocobot_sim.effects.spec import EXAMPLE, parse_effect
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.effects.catalogue import EXAMPLE, parse_effect
+from mocobot_sim.scene.as_built import read_units
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 
 MODELS = Path(__file__).parents[2] / "models"

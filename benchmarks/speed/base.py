@@ -10,14 +10,13 @@ import time
 import mujoco
 import numpy as np
 
-from mocobot_sim.base.drive import BaseDrive
-from mocobot_sim.base.motion import Leg, carried, plan, yaw_of
-from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.base.drive import BaseDrive, build_solo, compile_solo
 from mocobot_sim.control.control import ControlGains, TeamController
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home
+from mocobot_sim.trial.trajectories import Leg, carried, plan, yaw_of
 
 STEPS = 3000
 

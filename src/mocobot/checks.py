@@ -29,8 +29,7 @@ from mocobot.options import Kind
 from mocobot_logs.formats import output_kind
 from mocobot_report import sought
 from mocobot_sim.effect_names import check_effect_name
-from mocobot_sim.scene.model_files import payload_path
-from mocobot_sim.trial.sidecar import truth_path
+from mocobot_sim.scene.models import payload_path, truth_path
 
 
 def check_fits(name: str, value: float | None, needed: tuple[str, ...], trajectories: Sequence[str]) -> None:
@@ -370,7 +369,7 @@ def check_simulate(options: opt.Simulate) -> None:
     for text in options.effect:
         check_effect_name(text.partition(":")[0])
     if options.effect:
-        from mocobot_sim.effects.spec import parse_effect  # numpy, and a file for each effect
+        from mocobot_sim.effects.catalogue import parse_effect  # numpy, and a file for each effect
 
         for text in options.effect:
             parse_effect(text)

@@ -1,7 +1,5 @@
 """A person guides the payload: hands that move it, arms that float under it."""
 
-from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
-from mocobot_sim.guided.hand import Grip, GuidingHand, HandLog, Move
-from mocobot_sim.guided.weight import Payload
+from mocobot_sim.guided import FLOAT_GAINS, FloatArms, Grip, GuidingHand, HandLog, Move, Payload
 
 __all__ = ["FLOAT_GAINS", "FloatArms", "Grip", "GuidingHand", "HandLog", "Move", "Payload"]

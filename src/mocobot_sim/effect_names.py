@@ -31,7 +31,7 @@ NAMES = (
     "payload_mass",
     "law",
 )
-"""One file of ``mocobot_sim.effects`` each, in the order in which they are listed."""
+"""A class of ``mocobot_sim.effects`` each, in the order in which they are listed."""
 
 
 def check_effect_name(name: str) -> None:

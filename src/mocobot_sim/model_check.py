@@ -1,16 +1,19 @@
-"""What a model's file, with all that it includes, would make MuJoCo read and hold: told before MuJoCo reads it."""
+"""Files of a model: what they would make MuJoCo read and hold, and which of them leave with a copy of the model."""
+
+from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import prod
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 from estimator.errors import InputError
 from estimator.inputs import JSON_BYTES, open_input, printable, read_input
 
 MOST_ELEMENTS, MOST_POINTS = 100_000, 1 << 24
-"""Of a model, copies included; and of one height field or texture."""
+"""Most elements of a model, copies included; most points of one height field or texture."""
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -94,3 +97,63 @@ class _Check:
 def _whole(text: str) -> int:
     found = re.match(r"\s*\+?(\d+)", text)
     return max(int(found[1][:18]), 1) if found else 1
+
+
+MODELS = (".xml", ".mjcf", ".urdf")
+ASSETS = (".stl", ".obj", ".msh", ".skn", ".png", ".ktx")
+"""Meshes, skins, textures and height fields."""
+_DIRECTORIES = ("assetdir", "meshdir", "texturedir")
+
+
+def owned(named: Path, folder: Path, types: tuple[str, ...]) -> Path:
+    """The file that a model names, links resolved.
+
+    Raises:
+        InputError: it is not at or below the model's folder, or of another type.
+    """
+    source = named.resolve()
+    if not source.is_relative_to(folder.resolve()):
+        raise InputError(
+            f"{str(named)!r:.200} lies outside the model's folder {folder}; a copy of the model takes nothing else"
+        )
+    if source.suffix.lower() not in types:
+        raise InputError(
+            f"{str(named)!r:.200}: a copy of the model takes only files of the types {', '.join(types)}"
+        )
+    return source
+
+
+def check_named(path: Path, *, assets: bool) -> None:
+    """Refuse a readable model if files would go into a copy of it that are not its own.
+
+    Looks at further models, and with ``assets`` at meshes, skins, textures and height fields, too.
+
+    Raises:
+        InputError: it names such a file, or what it names cannot be told.
+    """
+    folder, models, places = path.parent, [path], {""}
+    named: list[str] = []
+    for model in models:  # grows
+        for element in _elements(model):
+            places |= {element.get(kind, "") for kind in _DIRECTORIES}
+            files = [value for key, value in element.items() if key.startswith("file")]
+            if element.tag not in ("include", "model"):
+                named += files
+                continue
+            for inner in (above / file for above in (folder, model.parent) for file in files):
+                if inner.is_file() and owned(inner, folder, MODELS) not in models:
+                    models.append(inner.resolve())
+    for file in named if assets else ():
+        for above in (folder / place for place in places):
+            if (above / file).is_file():
+                owned(above / file, folder, ASSETS)
+
+
+def _elements(model: Path) -> Iterator[ElementTree.Element]:
+    try:
+        content = model.read_bytes()
+        if b"<!ENTITY" in content:
+            raise ValueError("it defines entities")
+        return ElementTree.fromstring(content).iter()
+    except (OSError, ValueError, ElementTree.ParseError) as error:
+        raise InputError(f"{model}: what it includes cannot be told ({error})") from error

@@ -82,8 +82,8 @@ def test_a_trial_has_the_same_bits_without_numba() -> None:
 
 
 def test_drives_have_the_same_bits_without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
-    from mocobot_sim import compiled
-    from mocobot_sim.base.drive_kernel import update_drives
+    from mocobot_sim import kernels
+    from mocobot_sim.kernels import update_drives
 
     rng = np.random.default_rng(4)
     addresses = [rng.permutation(20)[:8].reshape(2, 4) for _ in range(3)]
@@ -98,8 +98,8 @@ def test_drives_have_the_same_bits_without_numba(monkeypatch: pytest.MonkeyPatch
         return [ctrl, *others]
 
     machine = after(update_drives)
-    monkeypatch.setattr(compiled, "njit", None)
-    plain = after(compiled.entry(update_drives.py_func))
+    monkeypatch.setattr(kernels, "njit", None)
+    plain = after(kernels.entry(update_drives.py_func))
     for one, other, before in zip(machine, plain, changed, strict=True):
         assert not np.array_equal(one, before)
         np.testing.assert_array_equal(one, other)

@@ -11,8 +11,7 @@ import pytest
 import mocobot
 from command import refused, run
 from estimator.files import LIST
-from mocobot_sim.effects.catalogue import EFFECTS
-from mocobot_sim.effects.spec import allowed
+from mocobot_sim.effects.catalogue import EFFECTS, allowed
 
 SHORT = ("--payload", "b", "--vias", 1, "--duration", 4)
 PUSH = "push:trial=2,start=3,duration=1,force_z=-5"

@@ -106,7 +106,7 @@ def test_an_effects_numbers_are_refused_without_the_simulator(text: str, tmp_pat
 
 def test_effects_are_known_without_the_simulator() -> None:
     code = (
-        "import sys, mocobot_sim.effects.spec as spec\n"
+        "import sys, mocobot_sim.effects.catalogue as spec\n"
         "assert len(spec.EFFECTS) == 25 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
         f"slow = {SLOW - {'numpy'}!r} & set(sys.modules)\n"
         "assert not slow, slow\n"
@@ -156,7 +156,7 @@ def test_simulating_needs_numba_only_when_it_runs() -> None:
 
 
 CODE = (
-    "from mocobot_sim.base.drive_kernel import update_drives\n"
+    "from mocobot_sim.kernels import update_drives\n"
     "kept = getattr(update_drives._cache, '_impl', None)\n"
     "print(kept.locator.get_cache_path() if kept else 'nowhere')\n"
 )
@@ -168,7 +168,7 @@ def test_machine_code_goes_to_the_users_cache(tmp_path: Path, home: bool) -> Non
     site, cache = tmp_path / "site", tmp_path / "cache"
     for package in ("mocobot_sim", "estimator"):
         shutil.copytree(ROOT / "src" / package, site / package, ignore=shutil.ignore_patterns("__pycache__"))
-    for place in (site / "mocobot_sim" / "base" / "__pycache__", *([] if home else [cache])):
+    for place in (site / "mocobot_sim" / "__pycache__", *([] if home else [cache])):
         place.touch()  # a file is in the way, whoever runs the test
     done = subprocess.run(
         [sys.executable, "-B", "-c", CODE],

@@ -69,7 +69,7 @@ def test_wheel_simulates_on_its_own(wheel: Path, tmp_path: Path) -> None:
         assert (site / package.parent.name / "py.typed").is_file()
     code = (
         "import mocobot.cli, mocobot.commands.diagnose, mocobot_sim.scene.models as m;"
-        "import mocobot_sim.paper.published as t;"
+        "import mocobot_sim.paper.scoring as t;"
         "print(m.models_dir());"
         "import mocobot_report.page as r; r.page_assets();"
         "import mocobot_logs.map.files as l; [l.builtin_map(name) for name in l.MAPS];"

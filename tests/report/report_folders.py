@@ -18,9 +18,8 @@ from estimator.recording.parquet import write_recording
 from invented_calibration import invented_calibration
 from mocobot.files.calibrations import write_calibration
 from mocobot.files.provenance import provenance
-from mocobot_sim.paper.fits import SELF_CALIBRATED, TRANSFER
-from mocobot_sim.paper.published import published_errors
-from mocobot_sim.paper.scoring import ENCODER_FRAMES, MOMENTS, SPRING_SCALE
+from mocobot_sim.paper.experiment import SELF_CALIBRATED, TRANSFER
+from mocobot_sim.paper.scoring import ENCODER_FRAMES, MOMENTS, SPRING_SCALE, published_errors
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry
 
 NASTY = '</script><script>alert("x")</script><!-- & \u2028'

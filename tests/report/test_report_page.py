@@ -23,7 +23,7 @@ from mocobot_report.folder import read_folder
 from mocobot_report.glossary import link_terms
 from mocobot_report.page import write_report
 from mocobot_report.sources import sources
-from mocobot_sim.paper.published import published_errors
+from mocobot_sim.paper.scoring import published_errors
 from report_folders import (
     NASTY,
     calibration_folder,

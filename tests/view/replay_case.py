@@ -16,11 +16,10 @@ from estimator.recording.model import Recording
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import PAYLOAD_PREFIX
 from mocobot_sim.trial import trial as trial_module
-from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_sim.trial.trial_log import Rows, TrialLog
 
 BODIES = {
     **{f"proximal{k}": f"base/leg{k}/proximal" for k in (1, 2, 3)},

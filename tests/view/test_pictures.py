@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.base.drive import build_solo, compile_solo
 from mocobot_view.pictures.camera import Camera
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.render import render

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocobot.campaign.draw import REACH_M
-from mocobot_sim.effects.spring import add_site, tie
+from mocobot_sim.effects.payload import add_site, tie
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from sealed.forms.base import Form, Place, direction, near, vector

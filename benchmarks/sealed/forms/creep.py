@@ -8,9 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocobot_sim.effects.base_creep import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE
-from mocobot_sim.effects.slides import base_slides
-from mocobot_sim.effects.solver import precise
+from mocobot_sim.effects.base import precise
+from mocobot_sim.effects.geometry import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE, base_slides
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Actor, Stage
 from sealed.forms.base import Form, Place

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocobot_sim.effects.slides import (
+from mocobot_sim.effects.base import precise
+from mocobot_sim.effects.geometry import (
     LOOSE_ARMATURE_KG,
     SPRUNG_ARMATURE_KG,
     add_slides,
@@ -17,7 +18,6 @@ from mocobot_sim.effects.slides import (
     grasp_body,
     widened,
 )
-from mocobot_sim.effects.solver import precise
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.soft import spring_parameters
 from mocobot_sim.trial.actors import Actor, Stage

@@ -8,8 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocobot_sim.trial.actors import Reader
-from mocobot_sim.trial.readings import Misreading, RobotReadings
+from mocobot_sim.trial.actors import Misreading, Reader, RobotReadings
 from sealed.forms.base import Form, Place
 from sealed.ground import Ground
 from sealed.laws.lag import SecondOrderLag

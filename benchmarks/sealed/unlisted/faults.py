@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mocobot_sim.trial.readings import RobotReadings
+from mocobot_sim.trial.actors import RobotReadings
 from sealed.forms.base import Form, Place
 from sealed.ground import Ground
 from sealed.unlisted.misread import Error, Misread, MisreadNow

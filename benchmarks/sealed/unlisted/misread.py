@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from mocobot_sim.trial.actors import Reader
-from mocobot_sim.trial.readings import Misreading, RobotReadings
+from mocobot_sim.trial.actors import Misreading, Reader, RobotReadings
 from sealed.forms.base import Form
 from sealed.laws.hysteresis import Play
 

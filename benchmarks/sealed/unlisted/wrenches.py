@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mocobot.campaign.draw import REACH_M
-from mocobot_sim.effects.base_creep import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE
-from mocobot_sim.effects.slides import add_slides
-from mocobot_sim.effects.solver import precise
+from mocobot_sim.effects.base import precise
+from mocobot_sim.effects.geometry import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE, add_slides
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Actor, Stage
 from sealed.forms.base import Form, Place, direction, near, vector

@@ -218,7 +218,7 @@ class Formula:
         return " + ".join(out)
 
     def pieces(self) -> Iterator[Piece]:
-        """Functions of one amplitude each, as ``mocobot_sim.laws.functions`` has them."""
+        """Functions of one amplitude each, as ``mocobot_sim.functions`` has them."""
         for _, shape, numbers, at, _ in self._each:
             a, n = self.values[at], [*numbers, 0.0]
             if len(a) == 2:

@@ -23,7 +23,7 @@ class Shape:
     """A term: amplitudes times a function of the signal.
 
     Attributes:
-        name: as in the JSON and in ``mocobot_sim.laws.functions``, but for ``spline`` and ``step``.
+        name: as in the JSON and in ``mocobot_sim.functions``, but for ``spline`` and ``step``.
         of: signal (Q,) and numbers inside -> (Q, k), one amplitude each.
         text: ``a`` is the amplitude, ``x`` the signal, ``n`` the number inside, ``p`` a phase.
         power: of the signal in the amplitude's unit.

@@ -16,7 +16,7 @@ from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import SerialModel, load_spec
 from discrepancy.joints.said import titled
 from discrepancy.joints.values import axes_of_tilt
-from mocobot_sim.scene.named_files import check_named
+from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended as write
 

@@ -22,7 +22,7 @@ from mocobot_sim.effects.catalogue import apply_effects, make_effect
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.as_built import units_as_built
 from mocobot_sim.scene.models import base_height_m, omnid_design
-from mocobot_sim.scene.payload_mjcf import nearest_inertia, payload_mjcf
+from mocobot_sim.scene.payload import nearest_inertia, payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 

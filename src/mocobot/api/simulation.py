@@ -14,8 +14,7 @@ from mocobot.checks import check_fits
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import load_extended
-from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.scene.as_built import AsBuilt, read_units
 from mocobot_sim.trial.sensors import SensorPreset, sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest
 from mocobot_sim.trial.simulate import simulate as simulate_request

@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy.team.tolerances import default_tolerances
 from mocobot.campaign.draw import signed
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
-from mocobot_sim.effects import gimbal_friction as listed
+from mocobot_sim.effects import springs as listed
 
 SPREAD_IN_UNCALIBRATED = ("phi_zero", "theta_zero", "link_length", "sea_scale", "sea_bias")
 """Causes of which an uncalibrated team has so much everywhere that no single one stands out."""

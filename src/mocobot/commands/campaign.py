@@ -25,7 +25,7 @@ from mocobot.files.resume import run_key
 from mocobot.options import Campaign
 from mocobot.progress import bar
 from mocobot_sim.effects import EFFECTS
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.scene.as_built import read_units
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
 

@@ -4,8 +4,7 @@ import shutil
 import textwrap
 
 from mocobot.options import Effects
-from mocobot_sim.effects.catalogue import EFFECTS
-from mocobot_sim.effects.spec import EXAMPLE, Allowed, allowed, paragraphs
+from mocobot_sim.effects.catalogue import EFFECTS, EXAMPLE, Allowed, allowed, paragraphs
 
 WIDEST, INDENT = 100, "    "
 

@@ -8,7 +8,7 @@ from mocobot.api.simulation import SimulatedRecording, simulate_trials
 from mocobot.checks import simulate_kinds
 from mocobot.options import Simulate
 from mocobot.progress import share_bar
-from mocobot_sim.effects.spec import parse_effect
+from mocobot_sim.effects.catalogue import parse_effect
 from mocobot_sim.trial.trajectories import RATE_HZ
 
 

@@ -67,7 +67,7 @@ def write_into(
         InputError: something cannot be written.
     """
     # MuJoCo, which reading does not need
-    from mocobot_sim.extended.calibrated import write_calibrated
+    from mocobot_sim.extended.extended import write_calibrated
 
     notes = []
     for k in range(len(calibration.payloads)):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mocobot.files.provenance import PACKAGES, version_of
-from mocobot_sim.scene.model_files import models_dir
+from mocobot_sim.scene.models import models_dir
 
 SOURCES = ("discrepancy", "estimator", "mocobot", "mocobot_logs", "mocobot_sim")
 

@@ -1,27 +1,37 @@
-"""Bases that drive: from planned motion to wheel torques, each base on its own odometry.
+"""Bases that drive: by a plan, under their own wrists, or one alone on a floor; each on its own odometry.
 
 Per base, at the control rate:
 
     V = (planned twist) + k (planned pose - pose by odometry)
-    u = H V                                                       wheel speeds, ``mecanum``
+    u = H V                                                       wheel speeds, ``MecanumKinematics``
     torque = k_u (u - wheel speed) + k_i (integral of the same)    within the drive's limit
 
 Odometry integrates the twist that fits the wheels' angles best. It is all that a base knows: where wheels slip, it is
 off, and the base with it.
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import RigidTransform
 
+from estimator.arm.delta import forward_kinematics
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_sim.base.design import HAND, BaseDesign, base_design
-from mocobot_sim.base.index import BaseIndex
-from mocobot_sim.base.mecanum import MecanumKinematics
-from mocobot_sim.base.motion import PlanarMotion
+from mocobot_sim.base.design import HAND, WHEELS, BaseDesign, MecanumKinematics, base_design
+from mocobot_sim.control.control import home_phi
+from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.models import models_dir, omnid_design
+from mocobot_sim.scene.omnid import load_omnid, release, rough_floor, stand
+from mocobot_sim.scene.pymjcf import compiled, mjcf
+from mocobot_sim.scene.scene import TIMESTEP_S
+from mocobot_sim.scene.team_index import BaseIndex
 from mocobot_sim.trial.actors import Stage
+from mocobot_sim.trial.trajectories import RATE_HZ, PlanarMotion, moved, wrapped, yaw_of
 
 
 class WheelContacts:
@@ -47,9 +57,8 @@ class WheelContacts:
         """
         data, robots = self._data, self._index.robots
         slip, load, grip = np.zeros(4 * robots), np.zeros(4 * robots), np.zeros((4 * robots, 3))
-        axle = (self._axle @ data.xmat[self._index.chassis].reshape(-1, 3, 3).transpose(0, 2, 1)).reshape(
-            -1, 3
-        )
+        R = data.xmat[self._index.chassis].reshape(-1, 3, 3)
+        axle = (self._axle @ R.transpose(0, 2, 1)).reshape(-1, 3)
         contact = data.contact
         for geoms, row, frame in zip(contact.geom, contact.efc_address, contact.frame, strict=True):
             wheel = self._index.geom_wheel[geoms].max()
@@ -121,20 +130,13 @@ class BaseDrive:
         self._gain = position_gain_per_s
 
     def start(self, stage: Stage) -> None:
-        """Begin as an actor of a trial.
-
-        Raises:
-            InputError: as ``begin``.
-        """
+        """Begin as an actor of a trial, as ``begin``."""
         self.begin(stage.model, stage.data, stage.rate_hz, stage.ticks)
 
     def begin(self, model: mujoco.MjModel, data: mujoco.MjData, rate_hz: float, ticks: int) -> None:
-        """Take hold of the wheels.
+        """Take hold of the wheels of released bases that stand at the plan's first poses.
 
-        Args:
-            model, data: with released bases, standing at the plan's first poses.
-            rate_hz: control rate [Hz].
-            ticks: control ticks per row of the log.
+        Control runs at ``rate_hz`` [Hz]; every ``ticks`` of it make a row of the log.
 
         Raises:
             InputError: a base is parked, or the plan is for another number of bases or another rate.
@@ -146,20 +148,16 @@ class BaseDrive:
         if abs(motion.rate_hz - rate_hz) > 1e-9 * rate_hz:
             raise InputError(f"the plan has {motion.rate_hz:g} ticks per second; control has {rate_hz:g}")
         self._index, self._data, self._ticks, self._rate_hz = index, data, ticks, rate_hz
-        self._constants = (
-            self._gain,
-            self._design.drive_gain_Nms_per_rad,
-            self._design.drive_integral_Nm_per_rad,
-            self._design.drive_torque_limit_Nm,
-            1.0 / rate_hz,
-        )
+        of = self._design
+        gains = of.drive_gain_Nms_per_rad, of.drive_integral_Nm_per_rad, of.drive_torque_limit_Nm
+        self._constants = (self._gain, *gains, 1.0 / rate_hz)
         self._pose, self._twist = np.ascontiguousarray(motion.pose), np.ascontiguousarray(motion.twist)
         self._odometry = self._pose[0].copy()
         self._angle = data.qpos[index.wheel_qpos].copy()
         self._lag, self._speed = np.zeros((index.robots, 4)), np.zeros((index.robots, 4))
         self._contacts = WheelContacts(model, data, index, self._design)
         self._rows: list[tuple[Array, ...]] = []
-        from mocobot_sim.base.drive_kernel import update_drives  # numba takes half a second to load
+        from mocobot_sim.kernels import update_drives  # numba takes half a second to load
 
         self._update = update_drives
 
@@ -173,17 +171,9 @@ class BaseDrive:
             pose, twist, self._odometry, self._angle, self._lag, self._speed,
         )  # fmt: skip
         if tick % self._ticks == 0:
-            self._rows.append(
-                (
-                    pose.copy(),
-                    self._odometry.copy(),
-                    index.poses(data),
-                    self._speed.copy(),
-                    data.qvel[index.wheel_dof],
-                    data.ctrl[index.drive],
-                    *self._contacts.measure(),
-                )
-            )
+            moved = pose.copy(), self._odometry.copy(), index.poses(data), self._speed.copy()
+            wheels = data.qvel[index.wheel_dof], data.ctrl[index.drive], *self._contacts.measure()
+            self._rows.append((*moved, *wheels))
 
     def _planned(self, tick: int) -> tuple[Array, Array]:
         """Poses and twists of the plan, shapes (N, 3)."""
@@ -197,3 +187,136 @@ class BaseDrive:
         columns[2][..., 2] = np.unwrap(columns[2][..., 2], axis=0)
         time = np.arange(len(self._rows)) * self._ticks / self._rate_hz
         return DriveLog(time, *columns)
+
+
+class FollowingDrive(BaseDrive):
+    """Drives of bases whose plan is made as they go: an actor of a trial.
+
+    Every base reads its own arm: by how far the wrist has left the place over the base, and by how far the gimbal has
+    turned about z. It drives at a speed that would undo that in 1 / gain, within limits.
+
+    Args:
+        mounts: where the robots stand at the beginning, N transforms.
+        as_built: sensor zeros of every unit; empty for robots as designed.
+        gain_per_s: g [1/s].
+        fastest: limits of turning [rad/s] and of each component of velocity [m/s].
+        rate_hz: control rate [Hz].
+    """
+
+    def __init__(
+        self,
+        mounts: RigidTransform,
+        as_built: Sequence[AsBuilt] = (),
+        gain_per_s: float = 3.0,
+        fastest: tuple[float, float] = (0.6, 0.4),
+        rate_hz: float = 1000.0,
+    ) -> None:
+        place = np.column_stack([mounts.translation[:, :2], yaw_of(mounts.rotation.as_matrix())])
+        super().__init__(PlanarMotion(rate_hz, place[None], np.zeros((1, len(mounts), 3))))
+        self._follow, self._limit = gain_per_s, np.array([fastest[0], fastest[1], fastest[1]])
+        units = units_of(as_built, len(mounts))
+        self._phi_zero = np.array([unit.phi_zero_rad for unit in units])
+        self._theta_zero = np.array([unit.theta_zero_rad[0] for unit in units])
+
+    def start(self, stage: Stage) -> None:
+        """Begin; the wrists are where they shall stay over their bases."""
+        super().start(stage)
+        self._stage = stage
+        self._goal = self._pose[0].copy()
+        self._wanted = np.zeros_like(self._goal)
+        self._home = self._offsets()
+
+    def _offsets(self) -> Array:
+        """Gimbal's turn about z [rad] and wrist's x, y [m] in every {b}, as the sensors have them, shape (N, 3)."""
+        design, index, qpos = omnid_design(), self._stage.index, self._stage.data.qpos
+        phi = home_phi(design) + qpos[index.motor_qpos] + qpos[index.spring_qpos] + self._phi_zero
+        turn = qpos[index.gimbal_qpos[:, 0]] + self._theta_zero
+        return np.column_stack([turn, forward_kinematics(phi, design)[:, :2]])
+
+    def _planned(self, tick: int) -> tuple[Array, Array]:
+        if tick % self._ticks == 0:
+            offset = self._offsets() - self._home
+            offset[:, 0] = wrapped(offset[:, 0])
+            self._wanted = np.clip(self._follow * offset, -self._limit, self._limit)
+        self._goal = moved(self._goal, self._wanted / self._rate_hz)
+        return self._goal, self._wanted
+
+
+class Snapshots:
+    """Keeps ``qpos`` at given times: an actor of a trial that does nothing.
+
+    Args:
+        times_s: when [s]; each is kept at the first control tick from then on.
+    """
+
+    def __init__(self, times_s: Sequence[float]) -> None:
+        self.times_s = tuple(sorted(times_s))
+        self.qpos: list[Array] = []
+
+    def start(self, stage: Stage) -> None:
+        """Begin in a trial."""
+        self.begin(stage.data, stage.rate_hz)
+
+    def begin(self, data: mujoco.MjData, rate_hz: float) -> None:
+        """The same without a trial."""
+        self._data, self._rate_hz, self.qpos = data, rate_hz, []
+
+    def act(self, tick: int) -> None:
+        """Look, and keep what is due."""
+        for time_s in self.times_s[len(self.qpos) :]:
+            if tick >= time_s * self._rate_hz - 1e-6:
+                self.qpos.append(self._data.qpos.copy())
+
+
+def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
+    """One released Omnid at the world's origin, heading along x, its arm rigid; the shipped base if ``design`` is None.
+
+    Raises:
+        InputError: the base cannot be built.
+    """
+    design = design or base_design()
+    root = mjcf.from_path(str(models_dir() / "team.xml"))
+    root.model = "solo"
+    root.option.timestep = timestep_s
+    omnid = load_omnid(1)
+    release(omnid, design)
+    wheels = {f"wheel_{wheel}" for wheel in WHEELS}
+    for element in [*omnid.equality.all_children(), *omnid.actuator.all_children()]:
+        if element.name.startswith(("rod", "motor")):
+            element.remove()
+    for joint in omnid.find_all("joint"):
+        if not any(joint.name.startswith(wheel) for wheel in wheels):
+            joint.remove()
+    stand(root, omnid, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]).add("freejoint")
+    rough_floor(root, design)
+    return root
+
+
+def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
+    """Compile what ``build_solo`` returned."""
+    return compiled(root)
+
+
+def drive_solo(
+    model: mujoco.MjModel,
+    drive: BaseDrive,
+    duration_s: float,
+    rate_hz: float = 1000.0,
+    snapshots: Snapshots | None = None,
+) -> DriveLog:
+    """Let the robot of ``compile_solo`` follow its base's plan for some seconds, with snapshots on the way.
+
+    Raises:
+        InputError: the plan does not fit the model.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ticks, substeps = round(rate_hz / RATE_HZ), round(1.0 / (rate_hz * model.opt.timestep))
+    drive.begin(model, data, rate_hz, ticks)
+    snapshots = snapshots or Snapshots(())
+    snapshots.begin(data, rate_hz)
+    for tick in range(round(duration_s * rate_hz) + 1):
+        drive.act(tick)
+        snapshots.act(tick)
+        mujoco.mj_step(model, data, nstep=substeps)
+    return drive.log()

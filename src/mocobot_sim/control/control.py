@@ -1,4 +1,4 @@
-"""Wrist impedance control of one Omnid team, with the SEA torque loop inside.
+"""Wrist impedance control of one Omnid team, with the SEA torque loop inside, and whether it is stable.
 
 Each robot sees only its own joints, as read by its own sensors (calibration errors included), and the design
 geometry. Per robot, at the control rate:
@@ -13,6 +13,7 @@ controller never knows the payload.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
@@ -23,13 +24,15 @@ from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import is_number
-from mocobot_sim.scene.as_built import AsBuilt, units_of
-from mocobot_sim.scene.sensor_effects import SensorEffects
+from mocobot_sim.scene.as_built import AsBuilt, SensorEffects, units_of
+from mocobot_sim.scene.models import omnid_design
 
 if TYPE_CHECKING:
     import mujoco
 
-    from mocobot_sim.scene.team_index import TeamIndex
+    from mocobot_sim.scene.scene import TeamScene
+    from mocobot_sim.scene.team_index import Index, TeamIndex
+
 
 TAKE_UP_TICKS = 15
 """Place among the controller's constants that is set when a load is given."""
@@ -40,7 +43,7 @@ RANGES = {
     "torque_gain": (0.0, 1e3), "torque_rate_gain_s": (0.0, 10.0), "rate_filter_s": (0.0, 10.0),
     "take_up_s": (0.0, 3600.0), "take_up_time_constant_s": (1e-6, 3600.0), "motor_torque_limit_Nm": (1e-3, 1e5),
 }  # fmt: skip
-"""Of gains; whether a team is stable with them is for ``control_stability`` to say."""
+"""Ranges of gains; ``control_stability`` says whether a team is stable with them."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,9 @@ class TeamController:
         sensed: filled with what the sensors see, (phi, theta, torque) of one tick per row, shape (T, N, 3, 3).
         qpos: what the sensors see in place of ``data.qpos``, kept up to date by whoever gives it; shape (nq,).
 
+    Attributes:
+        state: what the controllers remember, shape (N, 7, 3), to be changed in place.
+
     Raises:
         InputError: ``as_built`` or ``feed_forward`` does not match the number of robots.
     """
@@ -161,44 +167,34 @@ class TeamController:
         )
         self._constants = np.array(constants)
         # phi, tau, their filtered rates, F_ff, torque before and after the sensor's lag
-        self._state = np.zeros((index.robots, 7, 3))
+        self.state = np.zeros((index.robots, 7, 3))
         if feed_forward is not None:
             if np.shape(feed_forward) != (index.robots, 3) or not np.isfinite(feed_forward).all():
                 raise InputError(f"feed-forward is not {index.robots} x 3 finite forces; it must be, in N")
-            self._state[:, 4] = feed_forward
+            self.state[:, 4] = feed_forward
         self._commands = np.zeros((1, 2, index.robots, 3)) if commands is None else commands
         self._arrays = (
-            data.qpos if qpos is None else qpos, data.ctrl, address, own, self._constants, self._state,
+            data.qpos if qpos is None else qpos, data.ctrl, address, own, self._constants, self.state,
             self._commands, np.empty((1, index.robots, 3, 3)) if sensed is None else sensed,
         )  # fmt: skip
         self._tick = 0
-        from mocobot_sim.control.kernel import update_team  # numba takes half a second to load
+        from mocobot_sim.kernels import update_team  # numba takes half a second to load
 
         self._update = update_team
 
     @property
-    def state(self) -> Array:
-        """What the controllers remember, shape (N, 7, 3), to be changed in place."""
-        return self._state
-
-    @property
     def feed_forward(self) -> Array:
         """F_ff of every robot in its {b} [N], shape (N, 3)."""
-        return self._state[:, 4].copy()
+        return self.state[:, 4].copy()
 
     @feed_forward.setter
     def feed_forward(self, force: Array) -> None:
         """Set F_ff, and take up no load from now on."""
-        self._state[:, 4] = force
+        self.state[:, 4] = force
         self._constants[TAKE_UP_TICKS] = 0
 
     def update(self, ref: Array, ref_dot: Array) -> None:
-        """One control tick: read ``qpos``, write ``ctrl``.
-
-        Args:
-            ref: commanded wrist positions in every robot's {b} [m], shape (N, 3).
-            ref_dot: their rates [m/s], shape (N, 3).
-        """
+        """One control tick by commands [m] and their rates [m/s] in every robot's {b}, shapes (N, 3)."""
         self._commands[self._tick % len(self._commands)] = ref, ref_dot
         self.tick()
 
@@ -230,3 +226,96 @@ def lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, f
     a = float(np.exp(-period_s / time_constant_s))
     held = time_constant_s / period_s * (1.0 - a)
     return a, held - a, 1.0 - held
+
+
+STEP = 1e-6  # of all differences, in SI units
+HARDLY_DAMPED = 0.02  # damping ratio: a swing is amplified 25 times in resonance
+AT_REST_PER_S = 0.05  # slower modes are none: what nothing holds in place, such as a gimbal without load
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The least damped mode of the closed loop."""
+
+    damping_ratio: float  # minus growth over undamped angular frequency; below 0 the control is unstable
+    frequency_Hz: float  # how fast it swings
+    growth_per_s: float  # how fast it grows; below 0 if it decays
+
+    @property
+    def stable(self) -> bool:
+        """Whether every swing decays."""
+        return self.growth_per_s < 0
+
+    @property
+    def warning(self) -> str | None:
+        """What is wrong with it in a sentence, if anything."""
+        swing = f"a swing of {self.frequency_Hz:.2g} Hz"
+        if not self.stable:
+            return (
+                f"The control is unstable: {swing} grows by a factor of e every {1 / self.growth_per_s:.2g} s, "
+                "so torques and angles oscillate whatever is commanded."
+            )
+        hardly = f"The control is stable, but {swing} is hardly damped (ratio {self.damping_ratio:.2g})."
+        return hardly if self.damping_ratio < HARDLY_DAMPED else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able form."""
+        return {"stable": self.stable, **asdict(self)}
+
+
+def control_stability(
+    scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, gains: ControlGains, ref_b: Array
+) -> Stability:
+    """Judge the control of a team with parked bases, at rest as ``data`` is, wrists commanded to ``ref_b`` (N, 3).
+
+    MuJoCo linearises the physics, central differences linearise the controllers; the load is taken up. Left out are dry
+    friction, which stops small swings but no large ones, and actors and sensors that misread.
+    """
+    import mujoco
+
+    from mocobot_sim.scene.team_index import TeamIndex
+
+    index, model = TeamIndex.of(model, scene.carries), copy.copy(model)
+    model.dof_frictionloss[:] = 0.0
+    rest = mujoco.MjData(model)
+    rest.qpos[:], rest.ctrl[:] = data.qpos, data.ctrl
+    size = 2 * model.nv + model.na
+    step, push = np.zeros((size, size)), np.zeros((size, model.nu))
+    mujoco.mjd_transitionFD(model, rest, STEP, True, step, push, None, None)
+    free, pushed = np.eye(size), np.zeros_like(push)
+    for _ in range(round(1.0 / (gains.rate_hz * model.opt.timestep))):
+        free, pushed = step @ free, step @ pushed + push
+    still = np.stack([ref_b, np.zeros_like(ref_b)])[None]
+    controller = TeamController(
+        index, omnid_design(), gains, rest, scene.units, scene.sensors, commands=still
+    )
+    answer = _linear(controller, rest, np.concatenate([index.motor_qpos.ravel(), index.spring_qpos.ravel()]))
+    # The whole state: physics, then controllers, which read driven angles and springs.
+    read = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
+    read = np.concatenate([read, size + np.arange(controller.state.size)])
+    loop = np.zeros((size + controller.state.size,) * 2)
+    loop[:size, :size] = free
+    loop[:, read] += np.concatenate([pushed @ answer[: model.nu], answer[model.nu :]])
+    values = np.linalg.eigvals(loop).astype(complex)
+    rates = np.log(values[np.abs(values) > 1e-12]) * gains.rate_hz
+    rates = rates[np.abs(rates) > AT_REST_PER_S]
+    worst = rates[np.argmin(-rates.real / np.abs(rates))]
+    return Stability(
+        float(-worst.real / abs(worst)), float(abs(worst.imag) / (2.0 * np.pi)), float(worst.real)
+    )
+
+
+def _linear(controller: TeamController, rest: mujoco.MjData, read: Index) -> Array:
+    """Slopes of (``ctrl``, next state) by (positions ``read``, state) of controllers at rest, the load taken up."""
+    controller.tick()
+    controller.feed_forward = controller.feed_forward
+    controller.tick()
+    state = controller.state
+
+    def answer(x: Array) -> Array:
+        rest.qpos[read], state[:] = x[: len(read)], x[len(read) :].reshape(state.shape)
+        controller.tick()
+        return np.concatenate([rest.ctrl, state.ravel()])
+
+    at = np.concatenate([rest.qpos[read], state.ravel()])
+    return np.array([(answer(at + e) - answer(at - e)) / (2.0 * STEP) for e in STEP * np.eye(len(at))]).T

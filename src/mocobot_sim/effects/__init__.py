@@ -1,8 +1,4 @@
-"""Physical effects that can be hidden in a simulated team, one file per cause; ``catalogue`` lists them.
-
-What they are, take and allow is known without MuJoCo: an effect edits the scene that it is given, and loads nothing
-of what made it. So a wrong number is refused at once.
-"""
+"""Physical effects that can be hidden in a simulated team, by subject; ``catalogue`` lists them."""
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import (

@@ -1,18 +1,23 @@
-"""What all effects have in common: checked numbers, a place, and how they are put into a scene."""
+"""What all effects have in common: checked numbers, a place, and how they enter a scene.
+
+What an effect is, takes and allows is known without MuJoCo: it edits the scene that it is given, and loads nothing of
+what made it. So a wrong number is refused at once.
+"""
 
 from __future__ import annotations
 
 import math
 import re
 import sys
-from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from estimator.arrays import Array
 from estimator.errors import InputError
+from mocobot_sim.trial.actors import Actor, Reader
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
@@ -22,9 +27,21 @@ JOINTS = 3
 WHOLE = {"robot": 1, "joint": 1, "trial": 1, "last_trial": 0}
 """Whole numbers, and the least that each may be."""
 
+_DEFAULT_TOLERANCE, _WITH_KINKS = 1e-8, 1e-12
+
+
+def precise(scene: TeamScene, tolerance: float = _WITH_KINKS) -> None:
+    """Let the constraint solver of a scene stop later.
+
+    By default it stops at 1e-8 of a cost that scales with the mean inertia. Sliding and sticking, limits and soft rows
+    then end steps early now and then, and rods open by tens of micrometres; with 1e-12 by less than one.
+    """
+    option = scene.root.option
+    option.tolerance = min(_DEFAULT_TOLERANCE if option.tolerance is None else option.tolerance, tolerance)
+
 
 @dataclass(frozen=True)
-class Effect(ABC):
+class Effect:
     """One cause at one place; the fields besides ``robot`` and ``joint`` are its parameters.
 
     Attributes:
@@ -34,6 +51,8 @@ class Effect(ABC):
         texts: parameters that are names, not numbers.
         repeats: whether one place takes several.
         on_payload: whether it needs a payload, or a grasp of one.
+        as_built: parameters that add to an attribute of the joint's ``AsBuilt``.
+        sensors: parameters that add to an attribute of the robot's ``SensorEffects``.
     """
 
     cause: ClassVar[str]
@@ -42,6 +61,8 @@ class Effect(ABC):
     texts: ClassVar[tuple[str, ...]] = ()
     repeats: ClassVar[bool] = False
     on_payload: ClassVar[bool] = False
+    as_built: ClassVar[dict[str, str]] = {}
+    sensors: ClassVar[dict[str, str]] = {}
 
     def __init_subclass__(cls) -> None:
         cls.cause = re.sub(r"\B(?=[A-Z])", "_", cls.__name__).lower()
@@ -97,7 +118,31 @@ class Effect(ABC):
         robot = getattr(self, "robot", 1)
         if robot > scene.robots:
             raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")
-        return self._edit(scene)
+        return self._edit(self._recorded(scene, robot))
+
+    def _recorded(self, scene: TeamScene, robot: int) -> TeamScene:
+        """The scene with what ``as_built`` and ``sensors`` name; the MJCF does not change."""
+        sensors, unit = scene.sensors, scene.units[robot - 1]
+        for parameter, name in self.sensors.items():
+            sensors = sensors.added(name, robot, getattr(self, parameter), scene.robots)
+        for parameter, name in self.as_built.items():
+            values = np.array(getattr(unit, name), dtype=float)
+            values[getattr(self, "joint", 1) - 1] += getattr(self, parameter)
+            unit = replace(unit, **{name: values})
+        units = (*scene.units[: robot - 1], unit, *scene.units[robot:])
+        return replace(scene, sensors=sensors, units=units)
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        """Edit the MJCF."""
+        return scene
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        """Who acts in a trial, new ones for each: what MJCF cannot express. Trials count from 1; None is any."""
+        return ()
+
+    def readers(self, trial_number: int | None) -> Sequence[Reader]:
+        """Sensors that misread in a trial, new ones for each."""
+        return ()
 
     def carried(self) -> Array:
         """Inertial parameters (m, m c, J about {1}) that it adds to the payload's in an estimate, shape (10,)."""
@@ -106,7 +151,3 @@ class Effect(ABC):
     def base_shift(self) -> Array:
         """By how much it moves the origin of its robot's {b}, in the axes of {b} without it [m], shape (3,)."""
         return np.zeros(3)
-
-    @abstractmethod
-    def _edit(self, scene: TeamScene) -> TeamScene:
-        """The edit itself."""

@@ -1,38 +1,38 @@
-"""All causes by name, and effects as plain data."""
+"""All effects by name; effects as plain data, and as one word of a command line."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
-from importlib import import_module
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from estimator.errors import InputError
 from estimator.strict import Fields
-from mocobot_sim.effect_names import NAMES
-from mocobot_sim.effects.base import PLACE, WHOLE, Effect
-from mocobot_sim.scene.applied import Applied
+from mocobot_sim.effect_names import NAMES, check_effect_name
+from mocobot_sim.effects import geometry, law, payload, readings, springs
+from mocobot_sim.effects.base import JOINTS, PLACE, WHOLE, Effect
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
 
-EFFECTS: dict[str, type[Effect]] = {
-    name: getattr(import_module(f"mocobot_sim.effects.{name}"), name.title().replace("_", ""))
-    for name in NAMES
+SUBJECTS = (readings, springs, geometry, payload, law)
+_KINDS: dict[str, type[Effect]] = {
+    kind.cause: kind
+    for subject in SUBJECTS
+    for kind in vars(subject).values()
+    if isinstance(kind, type) and issubclass(kind, Effect) and kind is not Effect
 }
-"""Every effect's class by the name of its cause; that in ``sea_bias.py`` is ``SeaBias``."""
+EFFECTS: dict[str, type[Effect]] = {name: _KINDS[name] for name in NAMES}
+"""Every effect's class by the name of its cause, which the class gives: ``SeaBias`` is ``sea_bias``."""
 
 
 def make_effect(
     cause: str, parameters: Mapping[str, Any], robot: int | None = None, joint: int | None = None
 ) -> Effect:
-    """Make an effect from its name, parameters and place.
+    """Make an effect from its cause, a key of ``EFFECTS``, its parameters by name, and its place where it has one.
 
-    Args:
-        cause: a key of ``EFFECTS``.
-        parameters: values by name, units in the names.
-        robot: 1-based robot, for causes that have one.
-        joint: 1-based joint (legs 1, 2, 3; gimbal z, y, x), for causes that have one.
+    Robots and joints count from 1 (legs 1, 2, 3; gimbal z, y, x).
 
     Raises:
         InputError: no such cause, a parameter or place that is unknown, missing or out of its range.
@@ -46,7 +46,13 @@ def make_effect(
             problem = "is missing" if name not in place else "does not belong here"
             rule = ", ".join(kind.place_names()) or "none"
             raise InputError(f"{cause}: {name} {problem}; the places are {rule}")
-    _check_keys(cause, parameters, kind)
+    names = kind.parameter_names()
+    required = [entry.name for entry in fields(kind) if entry.name in names and _default(entry) is None]
+    unknown = [name for name in parameters if name not in names]
+    missing = [name for name in required if name not in parameters]
+    if unknown or missing:
+        problem = f"unknown parameter {unknown[0]!r}" if unknown else f"missing parameter {missing[0]!r}"
+        raise InputError(f"{cause}: {problem}; the parameters are {', '.join(names)}")
     values = dict(parameters)
     for name in WHOLE:
         if isinstance(values.get(name), float) and float(values[name]).is_integer():
@@ -54,27 +60,18 @@ def make_effect(
     return kind(**place, **values)
 
 
-def _check_keys(cause: str, parameters: Mapping[str, Any], kind: type[Effect]) -> None:
-    names = kind.parameter_names()
-    required = [entry.name for entry in fields(kind) if entry.name in names and not _has_default(entry)]
-    unknown = [name for name in parameters if name not in names]
-    missing = [name for name in required if name not in parameters]
-    if unknown or missing:
-        problem = f"unknown parameter {unknown[0]!r}" if unknown else f"missing parameter {missing[0]!r}"
-        raise InputError(f"{cause}: {problem}; the parameters are {', '.join(names)}")
+def _default(entry: Any) -> float | str | None:
+    """What a field of an effect is if it is left out; None where it must be given."""
+    return entry.default if isinstance(entry.default, int | float | str) else None
 
 
-def _has_default(entry: Any) -> bool:
-    return isinstance(entry.default, int | float | str)
-
-
-def effect_to_dict(effect: Applied) -> dict[str, Any]:
+def effect_to_dict(effect: Effect) -> dict[str, Any]:
     """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
     parameters = {name: getattr(effect, name) for name in effect.parameter_names()}
     return {"cause": effect.cause, **_place(effect), "parameters": parameters}
 
 
-def _place(effect: Applied) -> dict[str, int]:
+def _place(effect: Effect) -> dict[str, int]:
     return {name: getattr(effect, name) for name in effect.place_names()}
 
 
@@ -108,3 +105,113 @@ def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
         scene = effect.apply(scene)
     # Once for all of them: it compiles the model.
     return replace(scene, effects=(*scene.effects, *effects)).tuned()
+
+
+UNITS = {
+    "Nm": "N m",
+    "rad_per_N": "rad/N",
+    "Nms_per_rad": "N m s/rad",
+    "Nm_per_rad3": "N m/rad^3",
+    "rad": "rad",
+    "m": "m",
+    "mps": "m/s",
+    "m_per_N": "m/N",
+    "N_per_m": "N/m",
+    "Ns_per_m": "N s/m",
+    "Ns2_per_m2": "N s^2/m^2",
+    "Nms2_per_rad2": "N m s^2/rad^2",
+    "N": "N",
+    "kgps": "kg/s",
+    "kg": "kg",
+    "m2": "m^2",
+    "s": "s",
+}
+"""Units as they end the names of parameters, and as people write them."""
+EXAMPLE = "joint_friction:robot=2,joint=1,coulomb=0.05"
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """One number of an effect."""
+
+    name: str  # of the field
+    short: str  # the same without its unit, which will do
+    unit: str  # of the value; empty for whole numbers and ratios
+    range: str  # what it may be
+    default: float | str | None  # where it may be left out; None where it must be given
+
+
+def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:
+    """The numbers of an effect, its place first."""
+    return tuple(
+        Allowed(entry.name, *_without_unit(entry.name), _range(kind, entry.name), _default(entry))
+        for entry in fields(kind)
+    )
+
+
+def paragraphs(kind: type[Effect]) -> list[str]:
+    """What an effect is and how it acts: its own documentation, the first paragraph in a nutshell."""
+    return [" ".join(part.replace("``", "").split()) for part in (kind.__doc__ or "").split("\n\n")]
+
+
+def parse_effect(text: str) -> Effect:
+    """An effect of its name and numbers: ``joint_friction:robot=2,joint=1,coulomb=0.05``.
+
+    Parameters may be named with their unit or without; values are in it.
+
+    Raises:
+        InputError: no such effect, or a number that is unknown, missing, no number, or out of its range.
+    """
+    cause, colon, rest = text.partition(":")
+    check_effect_name(cause)
+    known = allowed(EFFECTS[cause])
+    names = {short: each for each in known for short in (each.short, each.name)}
+    values: dict[str, float | str] = {}
+    for part in rest.split(",") if colon else ():
+        name, _, word = part.partition("=")
+        if name not in names:
+            listed = ", ".join(each.short for each in known)
+            raise InputError(f"effect {text!r}: there is no {name!r}; {cause} takes {listed}")
+        number = names[name]
+        if number.name in values:
+            raise InputError(f"effect {text!r}: {name} is given twice")
+        values[number.name] = word if number.name in EFFECTS[cause].texts else _value(text, number, word)
+    missing = [each.short for each in known if each.default is None and each.name not in values]
+    if missing or not set(values) - set(PLACE):
+        rule = f"{' and '.join(missing)} must be given" if missing else "at least one parameter must be given"
+        raise InputError(f"effect {text!r}: {rule}; write it as {EXAMPLE}, and see mocobot effects {cause}")
+    place = {name: int(values.pop(name)) for name in PLACE if name in values}
+    return make_effect(cause, values, **place)
+
+
+def _value(text: str, number: Allowed, word: str) -> float:
+    whole = number.name in WHOLE
+    try:
+        value = int(word) if whole else float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        rule = f"{number.range} {number.unit}".rstrip()
+        raise InputError(f"effect {text!r}: {number.short} is {word!r}; it must be {rule}")
+    return value
+
+
+def _range(kind: type[Effect], name: str) -> str:
+    if name == "joint":
+        return f"1 to {JOINTS}"
+    if name in WHOLE:
+        return f"{WHOLE[name]}, {WHOLE[name] + 1}, ..."
+    if name in kind.texts:
+        return "a name"
+    if name not in kind.ranges:
+        return "any number"
+    low, high = kind.ranges[name]
+    return f"{low:g} to {high:g}"
+
+
+def _without_unit(name: str) -> tuple[str, str]:
+    """Name and unit of a parameter; the longest unit that ends the name is meant."""
+    for suffix in sorted(UNITS, key=len, reverse=True):
+        if name.endswith(f"_{suffix}"):
+            return name.removesuffix(f"_{suffix}"), UNITS[suffix]
+    return name, ""

@@ -1,20 +1,56 @@
-"""A formula at a place: what nobody has listed."""
+"""A formula at a place of a team: an effect that the catalogue does not list."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
 
 from estimator.errors import InputError
-from mocobot_sim.effects.base import Effect
-from mocobot_sim.laws import signals, targets
-from mocobot_sim.laws.functions import FUNCTIONS, Inside, Step, check_numbers
-from mocobot_sim.trial.actors import Actor, Reader
+from mocobot_sim.control.control import home_phi
+from mocobot_sim.effects.base import Effect, precise
+from mocobot_sim.effects.geometry import (
+    ARMATURE_KG,
+    DAMPING_NS_PER_M,
+    TOLERANCE,
+    add_slides,
+    grasp_body,
+    level_slides,
+    widened,
+)
+from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_law
+from mocobot_sim.scene.models import base_height_m, omnid_design
+from mocobot_sim.trial.actors import RobotReadings, Stage
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
+
+READING = re.compile(r"(phi|theta|tau)_([1-9][0-9]*)_([123])")
+TORQUE = re.compile(r"(driven|gimbal)_torque_([1-9][0-9]*)_([123])")
+SLIDE = re.compile(r"(base|grasp)_position_([1-9][0-9]*)_([xyz])")
+ON_PAYLOAD = re.compile(r"payload_(?:mass|(?:force|moment|first_moment|spin)_[xyz])")
+TARGET = re.compile("|".join(kind.pattern for kind in (READING, TORQUE, SLIDE, ON_PAYLOAD)))
+TARGETS = (
+    "tau_2_1, phi_2_1, theta_2_1 (readings of robot, joint), driven_torque_2_1, gimbal_torque_2_1, base_position_2_x, "
+    "grasp_position_2_x, payload_force_x, payload_moment_x, payload_mass, payload_first_moment_x, payload_spin_x"
+)
+JOINT = re.compile(
+    r"(phi|phi_rate|phi_acceleration|theta|theta_rate|theta_acceleration|tau)_([1-9][0-9]*)_([123])"
+)
+OF_PAYLOAD = re.compile(r"payload_(position|velocity|acceleration|felt|rate|turn|up)_([xyz])")
+PART = re.compile(r"(?:(-?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?)\*)?([a-z][a-z0-9_]*)")
+SIGNALS = (
+    "time, phi_2_1 (robot, joint), phi_rate_2_1, phi_acceleration_2_1, same of theta, tau_2_1, payload_position_x, or "
+    "a sum of such as 0.6*payload_felt_x + -0.8*payload_felt_y"
+)
+SLACK_M = 0.05
+"""By which a grasp may seem open that is displaced."""
+GRAVITY_MPS2 = 9.81
+Value = Callable[[], float]
 
 
 @dataclass(frozen=True)
@@ -51,39 +87,267 @@ class Law(Effect):
             InputError: a name is not known, or a number is not allowed with this function.
         """
         super().__post_init__()
-        self._named("target", self.target, targets.is_target(self.target), targets.WORDS)
-        self._named("function", self.function, self.function in FUNCTIONS, ", ".join(FUNCTIONS))
-        self._named("of", self.of, signals.is_signal(self.of), signals.WORDS)
-        self._named("times", self.times, not self.times or signals.is_signal(self.times), signals.WORDS)
-        check_numbers(self.function, self.number, self.second)
-
-    def _named(self, field: str, value: str, known: bool, words: str) -> None:
-        if not known:
-            raise InputError(f"law: {field} is {value!r:.60}; it must be one of {words}")
+        check_law(self, TARGET.fullmatch, TARGETS, parts_of, SIGNALS)
 
     def step(self, dt: float) -> Step:
         """The function, one value after the other at steps of ``dt`` [s]."""
         return FUNCTIONS[self.function](Inside(self.number, self.second, self.phase_rad, dt))
 
-    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+    def actors(self, trial_number: int | None) -> Sequence[_Acts]:
         """Who acts in a trial."""
-        return () if self._reads else (self._acts(),)
+        return () if READING.fullmatch(self.target) else (_Acts(self),)
 
-    def readers(self, trial_number: int | None) -> Sequence[Reader]:
+    def readers(self, trial_number: int | None) -> Sequence[_Acts]:
         """Which sensor misreads in it."""
-        return (self._acts(),) if self._reads else ()
+        return (_Acts(self),) if READING.fullmatch(self.target) else ()
 
     @property
-    def _reads(self) -> bool:
-        return bool(targets.READING.fullmatch(self.target))
+    def about_payload(self) -> bool:
+        """Whether target or signals are the payload's."""
+        return any(name.startswith("payload") for name in self._names())
 
-    def _acts(self) -> targets.Acts:
-        return targets.Acts(self.target, self.of, self.times, self.amplitude, partial(Law.step, self))
+    def _names(self) -> Iterator[str]:
+        yield self.target
+        for name in (self.of, self.times):
+            yield from (one for _, one in parts_of(name))
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        for robot in targets.robots_in(self.target, self.of, self.times):
-            if robot > scene.robots:
-                raise InputError(f"law: there is no robot {robot}; the team has robots 1 .. {scene.robots}")
-        if not scene.carries and targets.is_about_payload(self.target, self.of, self.times):
+        for name in self._names():
+            match = next((m for kind in (TORQUE, SLIDE, JOINT) if (m := kind.fullmatch(name))), None)
+            if match and int(match[2]) > scene.robots:
+                raise InputError(
+                    f"law: there is no robot {match[2]}; the team has robots 1 .. {scene.robots}"
+                )
+        if not scene.carries and self.about_payload:
             raise InputError("law: it is about a payload; robots of a free trial hold nothing")
-        return targets.with_slide(scene, self.target)
+        return self._with_slide(scene)
+
+    def _with_slide(self, scene: TeamScene) -> TeamScene:
+        """The scene with the slide that the target needs, if it needs one and has none yet."""
+        match = SLIDE.fullmatch(self.target)
+        if match is None or scene.root.find("joint", _slide_name(match)) is not None:
+            return scene
+        where, robot, axis = match[1], int(match[2]), match[3]
+        precise(scene, TOLERANCE)
+        base = where == "base"
+        body = scene.root.find("body", f"omnid{robot}/chassis") if base else grasp_body(scene, robot)
+        add_slides(body, f"law_{where}", axis, armature=ARMATURE_KG, damping=DAMPING_NS_PER_M)
+        if base:
+            level_slides(body)
+            return scene
+        return widened(scene, robot, SLACK_M)
+
+
+def parts_of(name: str) -> list[tuple[float, str]]:
+    """Factors and names of the signals that a name adds up; empty if it is none."""
+    matches = [PART.fullmatch(part) for part in name.split(" + ")]
+    parts = [(float(match[1] or 1.0), match[2]) for match in matches if match is not None]
+    known = all(
+        math.isfinite(factor) and (one == "time" or JOINT.fullmatch(one) or OF_PAYLOAD.fullmatch(one))
+        for factor, one in parts
+    )
+    return parts if known and len(parts) == len(matches) else []
+
+
+def _slide_name(match: re.Match[str]) -> str:
+    """Name of the slide that a displaced base or grasp has."""
+    where, robot, axis = match.groups()
+    part = f"omnid{robot}/" if where == "base" or robot != "1" else "omnid1/payload/"
+    return f"{part}law_{where}_{axis}"
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of two vectors; numpy's takes ten times as long for so few numbers."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+class PayloadMotion:
+    """Motion of the payload, brought up to date once a tick.
+
+    Attributes:
+        position, velocity: of the origin of {1}, in robot 1's {b} without any tilt [m], [m/s].
+        acceleration: of the same, in {1} [m/s^2].
+        felt: that less gravity: what a scale would feel, in {1} [m/s^2].
+        omega, alpha: angular velocity and acceleration in {1} [rad/s], [rad/s^2].
+        up: unit vector against gravity in {1}.
+        R: axes of {1} in the world, shape (3, 3).
+        com: centre of mass in {1} [m].
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        import mujoco  # only where a trial runs: what a law may name is known without
+
+        self._model, self._data, self._body = stage.model, stage.data, stage.index.payload_body
+        mount = stage.model.body_parentid[stage.model.body("omnid1/chassis").id]
+        mujoco.mj_kinematics(stage.model, stage.data)
+        mujoco.mj_comPos(stage.model, stage.data)
+        mujoco.mj_comVel(stage.model, stage.data)
+        self.R_Wb1 = stage.data.xmat[mount].reshape(3, 3).copy()
+        self._p_Wb1 = stage.data.xpos[mount] + self.R_Wb1 @ [0.0, 0.0, base_height_m()]
+        self._dt, self._tick, self._last = 1.0 / stage.rate_hz, -1, (np.zeros(3), np.zeros(3))
+        R = stage.data.xmat[self._body].reshape(3, 3)
+        self.com = R.T @ (stage.data.xipos[self._body] - stage.data.xpos[self._body])
+        self._update(first=True)
+
+    @classmethod
+    def of(cls, stage: Stage) -> PayloadMotion:
+        """The motion in a trial; all that ask for it have the same one."""
+        if "payload motion" not in stage.shared:
+            stage.shared["payload motion"] = cls(stage)
+        return cast("PayloadMotion", stage.shared["payload motion"])
+
+    def at(self, tick: int) -> PayloadMotion:
+        """The motion at a tick."""
+        if tick != self._tick:
+            self._tick = tick
+            self._update(first=tick == 0)
+        return self
+
+    def _update(self, *, first: bool) -> None:
+        data, body = self._data, self._body
+        self.R = data.xmat[body].reshape(3, 3).copy()
+        spin = data.cvel[body, :3]
+        # Velocities of MuJoCo's bodies are given at the centre of mass of the whole tree.
+        away = data.xpos[body] - data.subtree_com[self._model.body_rootid[body]]
+        velocity = data.cvel[body, 3:] + _cross(spin, away)
+        self.position = self.R_Wb1.T @ (data.xpos[body] - self._p_Wb1)
+        self.velocity, self.omega, self.up = self.R_Wb1.T @ velocity, self.R.T @ spin, self.R[2].copy()
+        before, turn_before = (velocity, spin) if first else self._last
+        self.acceleration = self.R.T @ (velocity - before) / self._dt
+        self.alpha = self.R.T @ (spin - turn_before) / self._dt
+        self.felt = self.acceleration + GRAVITY_MPS2 * self.up
+        self._last = velocity.copy(), spin.copy()
+
+
+class _Signals:
+    """Signals of one trial by the names that laws give them."""
+
+    def __init__(self, stage: Stage, *, carries: bool) -> None:
+        self._stage, self._tick = stage, 0
+        self._seen = stage.data.qpos
+        self._motion = PayloadMotion.of(stage) if carries else None
+
+    @property
+    def motion(self) -> PayloadMotion:
+        """The payload's."""
+        assert self._motion is not None
+        return self._motion.at(self._tick)
+
+    def now(self, tick: int, seen: np.ndarray | None = None) -> None:
+        """Go on to a tick; ``seen`` are the positions that the sensors see, else the true ones."""
+        self._tick, self._seen = tick, self._stage.data.qpos if seen is None else seen
+
+    def of(self, name: str) -> Value:
+        """What a signal is at the tick that is now."""
+        each = [(factor, self._one(part)) for factor, part in parts_of(name)]
+        if len(each) == 1 and each[0][0] == 1.0:
+            return each[0][1]
+        return lambda: sum(factor * value() for factor, value in each)
+
+    def _one(self, name: str) -> Value:
+        if name == "time":
+            return lambda: self._tick / self._stage.rate_hz
+        match = JOINT.fullmatch(name)
+        if match:
+            return self._of_joint(match[1], int(match[2]) - 1, int(match[3]) - 1)
+        kind, axis = name.removeprefix("payload_").rsplit("_", 1)
+        k, attribute = "xyz".index(axis), {"rate": "omega", "turn": "alpha"}.get(kind, kind)
+        return lambda: float(getattr(self.motion, attribute)[k])
+
+    def _of_joint(self, kind: str, robot: int, joint: int) -> Value:
+        index, data, at = self._stage.index, self._stage.data, (robot, joint)
+        if kind == "tau":
+            spring, stiffness = int(index.spring_qpos[at]), omnid_design().sea_stiffness_Nm_per_rad
+            return lambda: -stiffness * float(self._seen[spring])
+        angle, _, derivative = kind.partition("_")
+        parts = ("motor", "spring") if angle == "phi" else ("gimbal",)
+        if derivative:
+            dofs = [int(getattr(index, f"{part}_dof")[at]) for part in parts]
+            array = data.qvel if derivative == "rate" else data.qacc
+            return lambda: sum(float(array[k]) for k in dofs)
+        positions = [int(getattr(index, f"{part}_qpos")[at]) for part in parts]
+        home = home_phi(omnid_design()) if angle == "phi" else 0.0
+        return lambda: home + sum(float(self._seen[k]) for k in positions)
+
+
+class _Acts:
+    """One law in one trial: an actor, or a reader where it is about a reading."""
+
+    def __init__(self, law: Law) -> None:
+        self._law = law
+
+    def start(self, stage: Stage) -> None:
+        law, self._stage, self._dt = self._law, stage, 1.0 / stage.rate_hz
+        self._signals = _Signals(stage, carries=law.about_payload)
+        self._x = self._signals.of(law.of)
+        self._y = self._signals.of(law.times) if law.times else None
+        self._function = Law.step(law, self._dt)
+        self._dofs: list[int] = []
+        self._slide = bool(match := SLIDE.fullmatch(law.target))
+        if match:
+            self._dofs = [int(stage.model.joint(_slide_name(match)).dofadr[0])]
+        elif match := READING.fullmatch(law.target):
+            self._readings, self._kind = RobotReadings(stage, int(match[2])), match[1]
+            self._joint = int(match[3])
+        elif match := TORQUE.fullmatch(law.target):
+            # Past the spring of a driven joint, or in a gimbal axis.
+            parts, at = ("motor", "spring") if match[1] == "driven" else ("gimbal",), match.groups()
+            place = int(at[1]) - 1, int(at[2]) - 1
+            self._dofs = [int(getattr(stage.index, f"{part}_dof")[place]) for part in parts]
+        self._last: list[float] = []
+
+    def _value(self) -> float:
+        out = self._law.amplitude * self._function(self._x())
+        return out if self._y is None else out * self._y()
+
+    def read(self, tick: int, seen: np.ndarray) -> None:
+        """Change a reading."""
+        self._signals.now(tick, seen)
+        error = self._value()
+        if self._kind == "tau":
+            self._readings.set_tau(seen, self._joint, self._readings.tau(seen, self._joint) + error)
+        elif self._kind == "phi":
+            self._readings.add_phi(seen, self._joint, error)
+        else:
+            self._readings.add_theta(seen, self._joint, error)
+
+    def act(self, tick: int) -> None:
+        """Add a torque, a force or a wrench."""
+        self._signals.now(tick)
+        value, data = self._value(), self._stage.data
+        if self._slide:
+            rate = (value - self._last[0]) / self._dt if self._last else 0.0
+            self._last, value = [value], DAMPING_NS_PER_M * rate
+        if self._dofs:
+            for dof in self._dofs:
+                data.qfrc_applied[dof] += value
+            return
+        force, moment = self._on_payload(value)
+        R, com, body = self._signals.motion.R, self._signals.motion.com, self._stage.index.payload_body
+        # MuJoCo takes them at the centre of mass.
+        data.xfrc_applied[body, :3] += R @ force
+        data.xfrc_applied[body, 3:] += R @ (moment - _cross(com, force))
+
+    def _on_payload(self, value: float) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment at the origin of {1}, in {1}."""
+        motion, kind, none = self._signals.motion, self._law.target.removeprefix("payload_"), np.zeros(3)
+        felt = motion.felt
+        if kind == "mass":
+            lever = _cross(motion.alpha, motion.com) + _cross(motion.omega, _cross(motion.omega, motion.com))
+            return -value * (felt + lever), -value * _cross(motion.com, felt + lever)
+        kind, axis = kind.rsplit("_", 1)
+        axis_unit = np.eye(3)["xyz".index(axis)]
+        unit = value * axis_unit
+        if kind in ("force", "moment"):
+            along = motion.R.T @ (motion.R_Wb1 @ unit)
+            return (along, _cross(motion.com, along)) if kind == "force" else (none, along)
+        if kind == "spin":
+            return none, -_cross(motion.omega, unit)
+        self._last = [*self._last[-2:], value]
+        rates = np.diff(self._last) / self._dt
+        rate = axis_unit * (rates[-1] if len(rates) else 0.0)
+        change = axis_unit * ((rates[-1] - rates[-2]) / self._dt if len(rates) > 1 else 0.0)
+        inner = _cross(motion.alpha, unit) + _cross(motion.omega, _cross(motion.omega, unit))
+        force = -(inner + 2.0 * _cross(motion.omega, rate) + change)
+        return force, -_cross(unit, felt) - _cross(motion.com, change)

@@ -1,4 +1,6 @@
-"""Extended models: a team with its effects as a folder that plain MuJoCo loads and a trial can run on."""
+"""Extended models: a team with its effects, or as calibrated, as a folder for plain MuJoCo and for trials."""
+
+from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,20 +9,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from estimator.arrays import Array
+from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.outcome.carried import Carried, carried
 from estimator.errors import InputError
 from estimator.files import holds, whole_folder
 from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
-from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
-from mocobot_sim.model_check import check_model
-from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.as_built_file import unit_in
-from mocobot_sim.scene.named_files import ASSETS, owned
-from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.sensor_effects import SensorEffects
+from mocobot_sim.effects import Effect, apply_effects, effect_from_dict, effect_to_dict
+from mocobot_sim.effects.base import PLACE
+from mocobot_sim.effects.geometry import BaseTilt
+from mocobot_sim.model_check import ASSETS, check_model, owned
+from mocobot_sim.scene.as_built import AsBuilt, SensorEffects, unit_in, units_as_built
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.payload import nearest_inertia, payload_mjcf
+from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.scene.team_index import TeamIndex
 
 POSE = ("position_m", "quaternion_wxyz")
@@ -52,12 +57,9 @@ def read_poses(read: Fields, key: str, count: int) -> RigidTransform:
 
 
 def readme(effects: Sequence[Mapping[str, Any]], robots: int, healthy: int = 0) -> str:
-    """Markdown for a user who finds the folder.
+    """Markdown for a user who finds the folder; effects as ``effect_to_dict`` gives them.
 
-    Args:
-        effects: as ``effect_to_dict`` gives them.
-        robots: number of robots.
-        healthy: how many of the effects, the last ones, are of parts that are off by no more than others.
+    The last ``healthy`` of them are of parts that are off by no more than others.
     """
     named = len(effects) - healthy
     table = _table(effects[:named])
@@ -89,16 +91,13 @@ From Python: `mocobot_sim.extended.extended.load_extended(folder)`, then `mocobo
 def _table(effects: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for effect in effects:
-        place = (
-            ", ".join(f"{name} {effect[name]}" for name in ("robot", "joint") if name in effect) or "payload"
+        place = ", ".join(f"{name} {effect[name]}" for name in PLACE if name in effect) or "payload"
+        numbers = ", ".join(
+            f"`{name}` = {value if isinstance(value, str) else f'{value:.6g}'}"
+            for name, value in effect["parameters"].items()
         )
-        numbers = ", ".join(f"`{name}` = {_shown(value)}" for name, value in effect["parameters"].items())
         rows.append(f"| `{effect['cause']}` | {place} | {numbers} |")
     return "\n".join(["| cause | where | parameters |", "|---|---|---|", *rows]) if rows else "None."
-
-
-def _shown(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"
 
 
 FORMAT = "mocobot-extended-model"
@@ -143,10 +142,7 @@ def write_extended(
         "grasps": poses_to_list(scene.X_1i),
         "mounts": poses_to_list(scene.mounts),
         "initial": scene.initial
-        and {
-            key: np.asarray(part, dtype=float).tolist()
-            for key, part in zip(INITIAL, scene.initial, strict=True)
-        },
+        and {k: np.asarray(q, dtype=float).tolist() for k, q in zip(INITIAL, scene.initial, strict=True)},
         "as_built": [unit.to_dict() for unit in scene.units],
         "sensors": {name: list(scene.sensors.of(name, scene.robots)) for name in SENSORS},
         "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),
@@ -188,7 +184,23 @@ def load_extended(folder: Path) -> TeamScene:
         )
     read = _fields(values, where)
     robots = read.whole("robots")
-    effects = tuple(_effects(read.list("effects"), where))
+    listed = read.list("effects")
+    try:
+        effects = tuple(effect_from_dict(entry) for entry in listed)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+    required = [name for name in AS_BUILT if name not in MASSES]
+    entries = enumerate(read.list("as_built", robots), start=1)
+    units = [Fields(entry, required, f"{where}: as_built[{i}]", MASSES) for i, entry in entries]
+    initial = None
+    if read.values["initial"] is not None:
+        inner = read.within("initial", INITIAL)
+        initial = inner.array(INITIAL[0], (robots, 3)), inner.array(INITIAL[1], (robots, 3))
+    sensors = read.within("sensors", SENSORS)
+
+    def per_robot(part: Fields, name: str) -> tuple[float, ...]:
+        return tuple(part.array(name, (robots,)).tolist())
+
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
@@ -200,12 +212,12 @@ def load_extended(folder: Path) -> TeamScene:
         wrist_home_b=read.array("wrist_home_b_m", (robots, 3)),
         theta_home=read.array("theta_home_rad", (robots, 3)),
         X_1i=read_poses(read, "grasps", robots),
-        units=_units(read, robots),
+        units=tuple(unit_in(unit) for unit in units),
         mounts=read_poses(read, "mounts", robots),
-        initial=_initial(read, robots),
-        sensors=_sensors(read, robots),
-        grasp_slack_m=tuple(read.array("grasp_slack_m", (robots,)).tolist()),
-        grasp_slack_rad=tuple(read.array("grasp_slack_rad", (robots,)).tolist()),
+        initial=initial,
+        sensors=SensorEffects(**{name: per_robot(sensors, name) for name in SENSORS}),
+        grasp_slack_m=per_robot(read, "grasp_slack_m"),
+        grasp_slack_rad=per_robot(read, "grasp_slack_rad"),
         effects=effects,
         xml=_read(folder / SCENE),
         assets=assets,
@@ -242,35 +254,6 @@ def _read(path: Path) -> str:
         raise InputError(f"{path}: cannot be read ({detail}); an extended model has this file") from error
 
 
-def _effects(entries: list[Any], where: str) -> list[Effect]:
-    effects = []
-    for entry in entries:
-        try:
-            effects.append(effect_from_dict(entry))
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from error
-    return effects
-
-
-def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
-    required = [name for name in AS_BUILT if name not in MASSES]
-    entries = enumerate(read.list("as_built", robots), start=1)
-    units = (Fields(entry, required, f"{read.where}: as_built[{i}]", MASSES) for i, entry in entries)
-    return tuple(unit_in(unit) for unit in units)
-
-
-def _sensors(read: Fields, robots: int) -> SensorEffects:
-    inner = read.within("sensors", SENSORS)
-    return SensorEffects(**{name: tuple(inner.array(name, (robots,)).tolist()) for name in SENSORS})
-
-
-def _initial(read: Fields, robots: int) -> tuple[NDArray[Any], NDArray[Any]] | None:
-    if read.values["initial"] is None:
-        return None
-    inner = read.within("initial", INITIAL)
-    return inner.array(INITIAL[0], (robots, 3)), inner.array(INITIAL[1], (robots, 3))
-
-
 def _check_model(scene: TeamScene, path: Path) -> None:
     try:
         index = TeamIndex.of(scene.compile())
@@ -279,3 +262,67 @@ def _check_model(scene: TeamScene, path: Path) -> None:
         raise InputError(f"{path}: not the MJCF of a team ({text})") from error
     if index.robots != scene.robots:
         raise InputError(f"{path}: has {index.robots} robots; {NUMBERS} says {scene.robots}")
+
+
+NOISE = 4.0
+"""Standard errors by which a principal moment may be moved to be that of a body."""
+LEAST_MOMENT_RATIO = 1e-3
+"""Least principal moment over the largest."""
+
+
+def calibrated_team(
+    calibration: Calibration, payload: int = 0, initial: tuple[Array, Array] | None = None
+) -> TeamScene:
+    """The team as calibrated, where it stood in the first recording of a payload.
+
+    ``initial`` is the true (phi, theta) near which trials start [rad], two arrays (N, 3); None for home.
+
+    Raises:
+        InputError: the robots are of another design, there is no such payload, or its numbers are none of a rigid body.
+    """
+    if calibration.design != omnid_design():
+        raise InputError("the calibrated robots are of another design than the simulated Omnid")
+    trial = next((t for t in calibration.trials if t.payload == payload and t.bases is not None), None)
+    if trial is None or trial.bases is None:
+        raise InputError(f"the calibration has no recording of a payload number {payload + 1}")
+    held = calibration.payloads[payload]
+    found, grasps = carried(held, calibration.scale_sd), held.grasps
+    X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
+    tilts = [
+        BaseTilt(robot, *map(float, tilt))
+        for robot, tilt in enumerate(calibration.units.of("tilt"), start=1)
+        if tilt.any()
+    ]
+    p = trial.bases.p.copy()
+    for tilt in tilts:  # they turn about the mount, below {b}
+        p[tilt.robot - 1] -= trial.bases.R[tilt.robot - 1] @ tilt.base_shift()
+    scene = build_team(
+        payload_mjcf(found.mass_kg, found.p_1c, _of_a_body(found), X_1i),
+        units_as_built(calibration.units),
+        mounts=RigidTransform.from_components(
+            p - [0.0, 0.0, float(np.min(p[:, 2]))], Rotation.from_matrix(trial.bases.R)
+        ),
+        initial=initial,
+    )
+    return apply_effects(scene, tilts)
+
+
+def _of_a_body(found: Carried) -> Array:
+    """The inertia that a body can have where noise made it none, as it does of a flat one; else what was found."""
+    inertia = 0.5 * (found.inertia + found.inertia.T)
+    nearest = nearest_inertia(inertia, LEAST_MOMENT_RATIO)
+    moved = np.abs(np.linalg.eigvalsh(nearest) - found.principal.moments)
+    return nearest if np.all(moved <= NOISE * found.principal.moments_se) else inertia
+
+
+def write_calibrated(
+    calibration: Calibration, folder: Path, payload: int = 0, initial: tuple[Array, Array] | None = None
+) -> None:
+    """Write the calibrated team as an extended model, which ``mocobot simulate --model`` takes.
+
+    Raises:
+        InputError: as ``calibrated_team``, or the folder cannot be written.
+    """
+    scene = calibrated_team(calibration, payload, initial)
+    label = calibration.payloads[payload].label
+    write_extended(scene, scene.effects, folder, {"calibrated": True, "payload": label})

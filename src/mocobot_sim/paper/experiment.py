@@ -2,7 +2,13 @@
 
 Order as in the paper (section IV.C): random trials first; the grasps estimated from them construct the periodic
 motion and the static orientations; then everything is estimated, staged as in the paper and in one fit beside it.
+
+The fit is one least squares per payload, of closed loops and balance of wrenches of three trials. Robots that are as
+designed are held so. Robots that are not calibrate themselves on the same recordings, or are held as another payload's
+recordings have calibrated them.
 """
+
+from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -14,21 +20,77 @@ from joblib import Parallel
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
+from estimator.calibrate.calibrate import calibrate, start_estimate
 from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
+from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic
 from estimator.estimate.result import PayloadEstimate
-from estimator.files import ends_with_this
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
-from estimator.signals import process_recording
-from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
-from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.scoring import TrialSummary, score, score_fit
-from mocobot_sim.paper.store import Store
-from mocobot_sim.paper.work import Progress, Work
+from estimator.signals.process import process_recording
+from mocobot_sim.paper.scoring import TrialSummary, payload_truth, score, score_fit
+from mocobot_sim.paper.store import Progress, Store, Work
 from mocobot_sim.scene.models import payload_path
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
+
+ONE_FIT = "nominal, one fit"
+SELF_CALIBRATED = "uncalibrated, self-calibrated"
+TRANSFER = "uncalibrated, transfer"
+COLUMNS = {"nominal": (ONE_FIT,), "uncalibrated": (SELF_CALIBRATED, TRANSFER)}
+"""What stands beside the column of a preset."""
+NO_SPREAD = Prior().scaled(0.0)
+"""Robots exactly as designed."""
+
+
+def three_trials(recordings: Sequence[Recording]) -> list[Recording]:
+    """The first recording of every kind of trial: a random, a static and a periodic one.
+
+    More of them would cost minutes, and noise is no longer what limits a fit of three.
+    """
+    first: dict[str, Recording] = {}
+    for recording in recordings:
+        first.setdefault(recording.metadata.trial, recording)
+    return list(first.values())
+
+
+def estimate_both(
+    recordings: Sequence[Recording], fitted: bool
+) -> tuple[PayloadEstimate, PayloadEstimate | None]:
+    """The staged estimate from one payload's recordings, and where ``fitted`` what a fit of three of them starts from.
+
+    Recordings, read through one preset, are processed once for both.
+
+    Raises:
+        InputError: nothing can be estimated from them.
+    """
+    with within_arithmetic([recording.name for recording in recordings]):
+        trials = [trial_of(recording) for recording in recordings]
+        first = [recordings.index(one) for one in three_trials(recordings)]
+        start = start_estimate([trials[k] for k in first]) if fitted else None
+        return estimate_from_trials(trials, "staged"), start
+
+
+def fit_trials(
+    recordings: Sequence[Recording],
+    preset: str,
+    robots: Calibration | None = None,
+    start: PayloadEstimate | None = None,
+) -> Calibration:
+    """Fit what one payload's recordings, read through one preset, say of it.
+
+    Robots of a calibrated preset are held as designed, others calibrate themselves, or are held as ``robots`` came out
+    with another payload. ``start`` is what ``start_estimate`` makes of the recordings, if that is known.
+
+    Raises:
+        InputError: the recordings do not determine it.
+    """
+    as_designed = robots is None and sensor_preset(preset).calibrated
+    starts = None if start is None else {recordings[0].metadata.payload: start}
+    return calibrate(recordings, prior=NO_SPREAD if as_designed else None, robots=robots, starts=starts)
+
 
 # Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
 Grasps = tuple[Array, Array]
@@ -38,27 +100,19 @@ Grasps = tuple[Array, Array]
 class PaperPlan:
     """What to run.
 
-    Attributes:
-        payloads: names of shipped payloads.
-        presets: names of sensor presets.
-        trials: random trials per payload; half as many (at least one) are periodic, as in the paper's 6 and 3,
-            and as many random ones serve the inertia.
-        seed: seed of everything random.
-        vias: vias of a random trial.
-        duration_s: length of a periodic trial's motion [s].
-        staged_only: whether to leave the fits beside the paper's own method out.
-
     Raises:
         InputError: an unknown payload or preset, or a number out of range.
     """
 
-    payloads: tuple[str, ...] = ("a", "b", "c", "d")
-    presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")
+    payloads: tuple[str, ...] = ("a", "b", "c", "d")  # names of shipped payloads
+    presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")  # names of sensor presets
+    # random trials per payload; half as many (at least one) are periodic, as in the paper's 6 and 3, and as many
+    # random ones serve the inertia
     trials: int = 6
-    seed: int = 0
-    vias: int = 80
-    duration_s: float = 60.0
-    staged_only: bool = False
+    seed: int = 0  # seed of everything random
+    vias: int = 80  # vias of a random trial
+    duration_s: float = 60.0  # length of a periodic trial's motion [s]
+    staged_only: bool = False  # whether to leave the fits beside the paper's own method out
 
     def __post_init__(self) -> None:
         """Check before hours are spent."""
@@ -114,22 +168,17 @@ class PaperPlan:
 
 @dataclass
 class PaperResult:
-    """What came out, by preset and payload.
+    """What came out, by preset and payload."""
 
-    Attributes:
-        scores: errors against Table I, by preset or column of fits; the content of ``paper.json``. The payload that
-            calibrated the robots has none (None) in the column of the transfer.
-        estimates: the staged estimates.
-        fits: the fits beside them, by column and payload.
-        recordings: the recordings they came from.
-        trials: a summary of every simulated trial.
-    """
-
+    # errors against Table I, by preset or column of fits; the content of ``paper.json``. The payload that calibrated
+    # the robots has none (None) in the column of the transfer
     scores: dict[str, dict[str, dict[str, Any] | None]] = field(default_factory=dict)
-    estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)
+    estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)  # the staged estimates
+    # the fits beside them, by column and payload
     fits: dict[str, dict[str, Calibration]] = field(default_factory=dict)
+    # the recordings they came from
     recordings: dict[str, dict[str, list[Recording]]] = field(default_factory=dict)
-    trials: list[TrialSummary] = field(default_factory=list)
+    trials: list[TrialSummary] = field(default_factory=list)  # a summary of every simulated trial
 
 
 def run_paper(
@@ -140,11 +189,11 @@ def run_paper(
     *,
     remote: bool = False,
 ) -> PaperResult:
-    """Run the whole experiment.
+    """Run the whole experiment; the result does not depend on the number of processes.
 
     Args:
         plan: what to run.
-        jobs: parallel processes; the result does not depend on them.
+        jobs: parallel processes.
         progress: called several times a second, from another thread, with the steps done, parts of trials counting, all
             steps, and the name of the stage that runs.
         store: where outcomes are kept as they end; those that are there already are taken from it.

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
-from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER
+from mocobot_sim.paper.experiment import ONE_FIT, SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.tables import BY_ENCODERS, MOMENTS, AllScores, Row, paper_tables, spring_share
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 

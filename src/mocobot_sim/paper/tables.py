@@ -1,20 +1,19 @@
-"""Tables II-V: the paper's columns, then those of every sensor preset, as rows of numbers.
+"""Tables II-V: the paper's columns, then those of every sensor preset, as rows of numbers and as text.
 
-Beside the staged estimate of a preset stands what one fit gives (``mocobot_sim.paper.fits``). Where the frames that the
-encoders define are known, grasps and centres of mass have rows in these, too.
+Beside the staged estimate of a preset stands what one fit gives (``mocobot_sim.paper.experiment``). Where the frames
+that the encoders define are known, grasps and centres of mass have rows in these, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from typing import Any
 
-from mocobot_sim.paper.published import published_errors
-from mocobot_sim.paper.scoring import ENCODER_FRAMES, SPRING_SCALE
+from mocobot_sim.paper.scoring import ENCODER_FRAMES, MOMENTS, SPRING_SCALE, published_errors
 
 PAIRS = ("12", "23", "31")
-MOMENTS = ("Ixx", "Iyy", "Izz")
 PAPER = "paper"
 """Name of the column of published figures."""
 Scores = Mapping[str, Any]
@@ -34,40 +33,24 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of one payload.
+    """One quantity of one payload."""
 
-    Attributes:
-        payload: its name; empty in the summary, which is over all payloads.
-        quantity: such as ``R12`` or ``mass``.
-        unit: of the numbers.
-        cells: one per column of the table.
-        frames: ``BY_ENCODERS`` or, for the frames of the CAD, empty.
-    """
-
-    payload: str
-    quantity: str
-    unit: str
-    cells: tuple[Cell, ...]
-    frames: str = ""
+    payload: str  # its name; empty in the summary, which is over all payloads
+    quantity: str  # such as ``R12`` or ``mass``
+    unit: str  # of the numbers
+    cells: tuple[Cell, ...]  # one per column of the table
+    frames: str = ""  # ``BY_ENCODERS`` or, for the frames of the CAD, empty
 
 
 @dataclass(frozen=True)
 class PaperTable:
-    """A table with one column of published figures, then ours.
+    """A table with one column of published figures, then ours."""
 
-    Attributes:
-        number: of the paper's table, such as ``II``; empty for the summary.
-        title: what it shows.
-        note: what the numbers are.
-        columns: ``paper``, then the presets and the fits beside them.
-        rows: payload by payload.
-    """
-
-    number: str
-    title: str
-    note: str
-    columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    number: str  # of the paper's table, such as ``II``; empty for the summary
+    title: str  # what it shows
+    note: str  # what the numbers are
+    columns: tuple[str, ...]  # ``paper``, then the presets and the fits beside them
+    rows: tuple[Row, ...]  # payload by payload
 
     def part(self, unit: str, quantity: str | None = None, frames: str = "") -> PaperTable:
         """The rows of one unit and kind of frames only, or of one quantity in them."""
@@ -86,129 +69,93 @@ def paper_tables(scores: AllScores) -> list[PaperTable]:
         scores: by preset, then payload, as in ``paper.json``.
     """
     columns, payloads = _columns(scores)
-    frames = ("", BY_ENCODERS) if _knows_frames(scores) else ("",)
+    frames = ("", BY_ENCODERS) if _entries(scores, ENCODER_FRAMES) else ("",)
+    fits, over_trials = _fits_note(scores), "mean +- standard deviation over the random trials"
 
-    def table(number: str, title: str, note: str, kinds: Sequence[tuple[str, str, _Pick, str]]) -> PaperTable:
+    def table(number: str, title: str, note: str, kinds: Sequence[_Kind]) -> PaperTable:
         rows = tuple(
-            Row(payload, quantity, unit, tuple(_cell(pick, c[payload], seen) for c in columns.values()), seen)
+            Row(
+                payload, quantity, unit,
+                tuple(_cell(column[payload], seen, value, spread) for column in columns.values()), seen,
+            )
             for payload in payloads
-            for quantity, unit, pick, seen in kinds
-        )
+            for quantity, unit, value, spread, seen in kinds
+        )  # fmt: skip
         return PaperTable(number, title, note, tuple(columns), rows)
 
-    fits = _fits_note(scores)
     return [
         table(
-            "II",
-            "Relative grasp orientation: error angle [deg]",
-            "mean +- standard deviation over the random trials" + fits,
-            [
-                (f"R{pair}", "deg", lambda s, key=f"R{pair}_deg": _mean(s[key]), seen)
-                for seen in frames
-                for pair in PAIRS
-            ],
+            "II", "Relative grasp orientation: error angle [deg]", over_trials + fits,
+            [(f"R{p}", "deg", f"R{p}_deg.mean", f"R{p}_deg.std", seen) for seen in frames for p in PAIRS],
         ),
         table(
-            "III",
-            "Relative grasp position: error [m] and error relative to |p| [%]",
-            "mean +- standard deviation over the random trials" + fits,
+            "III", "Relative grasp position: error [m] and error relative to |p| [%]", over_trials + fits,
             [
-                (f"p{pair}", unit, lambda s, key=f"p{pair}_{key}": _mean(s[key]), seen)
+                (f"p{pair}", unit, f"p{pair}_{key}.mean", f"p{pair}_{key}.std", seen)
                 for seen in frames
                 for pair in PAIRS
                 for unit, key in (("m", "m"), ("%", "percent"))
             ],
         ),
         table(
-            "IV",
-            "Mass and centre of mass: error, and error relative to the truth [%]",
+            "IV", "Mass and centre of mass: error, and error relative to the truth [%]",
             "one set of six static holds" + fits + _scale_note(scores, ("m",)),
             [
-                ("m", "kg", lambda s: Cell(s["m_kg"]), ""),
-                ("m", "%", lambda s: Cell(s["m_percent"]), ""),
+                ("m", "kg", "m_kg", "", ""), ("m", "%", "m_percent", "", ""),
                 *(
-                    ("p1c", unit, lambda s, key=f"p1c_{key}": Cell(s[key]), seen)
+                    ("p1c", unit, f"p1c_{key}", "", seen)
                     for seen in frames
                     for unit, key in (("m", "m"), ("%", "percent"))
                 ),
             ],
         ),
         table(
-            "V",
-            "Principal moments of inertia: error [kg m^2] and relative error [%]",
+            "V", "Principal moments of inertia: error [kg m^2] and relative error [%]",
             "|mean error| +- standard deviation of the estimates over random and periodic trials"
-            + fits
-            + _scale_note(scores, MOMENTS),
-            [(name, "kg m^2", lambda s, n=name: _mean(s["all"][n]), "") for name in MOMENTS]
-            + [
-                (name, "%", lambda s, n=name: Cell(s["all"][n]["percent"], s["all"][n]["std_percent"]), "")
-                for name in MOMENTS
-            ],
+            + fits + _scale_note(scores, MOMENTS),
+            [(name, "kg m^2", f"all.{name}.mean", f"all.{name}.std", "") for name in MOMENTS]
+            + [(name, "%", f"all.{name}.percent", f"all.{name}.std_percent", "") for name in MOMENTS],
         ),
-    ]
+    ]  # fmt: skip
 
 
 def summary_table(scores: AllScores) -> PaperTable:
     """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
     columns, payloads = _columns(scores)
-    frames = ("", BY_ENCODERS) if _knows_frames(scores) else ("",)
-
-    def moments(kind: str) -> Callable[[Scores], list[float | None]]:
-        return lambda s: [s[kind][name]["percent"] for name in MOMENTS] if kind in s else []
-
-    kinds: list[tuple[str, str, float, Callable[[Scores], list[float | None]], str]] = [
-        *(
-            kind
-            for seen in frames
-            for kind in (
-                ("grasp rotation", "deg", 1.0, lambda s: [s[f"R{pair}_deg"]["mean"] for pair in PAIRS], seen),
-                ("grasp position", "mm", 1e3, lambda s: [s[f"p{pair}_m"]["mean"] for pair in PAIRS], seen),
-                (
-                    "grasp position",
-                    "%",
-                    1.0,
-                    lambda s: [s[f"p{pair}_percent"]["mean"] for pair in PAIRS],
-                    seen,
-                ),
-            )
-        ),
-        ("mass", "%", 1.0, lambda s: [s["m_percent"]], ""),
-        *(
-            kind
-            for seen in frames
-            for kind in (
-                ("centre of mass", "mm", 1e3, lambda s: [s["p1c_m"]], seen),
-                ("centre of mass", "%", 1.0, lambda s: [s["p1c_percent"]], seen),
-            )
-        ),
-        ("inertia, all trials", "%", 1.0, moments("all"), ""),
-        ("inertia, periodic trials", "%", 1.0, moments("periodic"), ""),
-        ("inertia, random trials", "%", 1.0, moments("random"), ""),
+    frames = ("", BY_ENCODERS) if _entries(scores, ENCODER_FRAMES) else ("",)
+    grasps = [
+        ("grasp rotation", "deg", 1.0, [f"R{pair}_deg.mean" for pair in PAIRS]),
+        ("grasp position", "mm", 1e3, [f"p{pair}_m.mean" for pair in PAIRS]),
+        ("grasp position", "%", 1.0, [f"p{pair}_percent.mean" for pair in PAIRS]),
+    ]
+    centres = [
+        ("centre of mass", "mm", 1e3, ["p1c_m"]), ("centre of mass", "%", 1.0, ["p1c_percent"])
+    ]  # fmt: skip
+    moments = [
+        (f"inertia, {kind} trials", "%", 1.0, [f"{kind}.{name}.percent" for name in MOMENTS])
+        for kind in ("all", "periodic", "random")
+    ]
+    kinds = [
+        *((*kind, seen) for seen in frames for kind in grasps),
+        ("mass", "%", 1.0, ["m_percent"], ""),
+        *((*kind, seen) for seen in frames for kind in centres),
+        *((*kind, "") for kind in moments),
     ]
 
-    def largest(
-        column: Mapping[str, Scores | None],
-        scale: float,
-        values: Callable[[Scores], list[float | None]],
-        seen: str,
-    ) -> Cell:
-        found = [
-            value
-            for payload in payloads
-            if (entry := _in_frames(column[payload], seen)) is not None
-            for value in values(entry)
-        ]
+    def largest(column: Mapping[str, Scores | None], scale: float, paths: Sequence[str], seen: str) -> Cell:
+        entries = (_in_frames(column[payload], seen) for payload in payloads)
+        found = (
+            _at(entry, path)
+            for entry in entries
+            if entry is not None
+            for path in paths
+            if path.partition(".")[0] in entry
+        )
         return Cell(max((scale * value for value in found if value is not None), default=None))
 
     rows = tuple(
-        Row(
-            "",
-            quantity,
-            unit,
-            tuple(largest(column, scale, values, seen) for column in columns.values()),
-            seen,
-        )
-        for quantity, unit, scale, values, seen in kinds
+        Row("", quantity, unit, tuple(largest(c, scale, paths, seen) for c in columns.values()), seen)
+        for quantity, unit, scale, paths, seen in kinds
     )
     note = (_fits_note(scores) + _scale_note(scores, ("m", *MOMENTS))).removeprefix("; ")
     return PaperTable("", "largest error over the payloads", note, tuple(columns), rows)
@@ -220,7 +167,8 @@ def spring_share(scores: AllScores) -> float | None:
     return max(found, default=None)
 
 
-_Pick = Callable[[Scores], Cell]
+_Kind = tuple[str, str, str, str, str]
+"""Quantity, unit, where in the scores its value and its spread are, frames."""
 
 
 def _columns(scores: AllScores) -> tuple[dict[str, Mapping[str, Scores | None]], list[str]]:
@@ -239,17 +187,21 @@ def _entries(scores: AllScores, key: str) -> list[Scores]:
     ]
 
 
-def _knows_frames(scores: AllScores) -> bool:
-    return bool(_entries(scores, ENCODER_FRAMES))
-
-
 def _in_frames(entry: Scores | None, frames: str) -> Scores | None:
     return entry if entry is None or not frames else entry.get(ENCODER_FRAMES)
 
 
-def _cell(pick: _Pick, entry: Scores | None, frames: str) -> Cell:
+def _at(entry: Scores, path: str) -> float | None:
+    """The number under keys that dots join."""
+    value: Any = entry
+    for key in path.split("."):
+        value = value[key]
+    return value
+
+
+def _cell(entry: Scores | None, frames: str, value: str, spread: str) -> Cell:
     found = _in_frames(entry, frames)
-    return Cell(None) if found is None else pick(found)
+    return Cell(None) if found is None else Cell(_at(found, value), _at(found, spread) if spread else None)
 
 
 def _fits_note(scores: AllScores) -> str:
@@ -274,12 +226,70 @@ def _scale_note(scores: AllScores, names: Sequence[str]) -> str:
     )
 
 
-def _mean(entry: Mapping[str, float | None]) -> Cell:
-    return Cell(entry["mean"], entry["std"])
-
-
 def number(value: float | None) -> str:
     """Two significant digits; ``none`` where there is no number."""
     if value is None:
         return "none"
     return f"{value:.2g}" if value >= 1e-4 or value == 0 else f"{value:.1e}"
+
+
+def format_tables(scores: AllScores) -> str:
+    """All four tables.
+
+    Args:
+        scores: by preset, then payload, as in ``paper.json``.
+    """
+    blocks = []
+    for table in paper_tables(scores):
+        rows, last = [], ""
+        for row in table.rows:
+            head = f"({row.payload})" if row.payload != last else ""
+            label = row.quantity if row.unit == "deg" else f"{row.quantity} [{row.unit}]"
+            rows.append([head, _framed(label, row), *map(format_cell, row.cells)])
+            last = row.payload
+        shown = _align(_heads(["", "", *table.columns]), rows)
+        blocks.append(f"Table {table.number}. {table.title}\n{_wrapped(table.note)}\n\n{shown}")
+    return "\n\n".join(blocks)
+
+
+def format_summary(scores: AllScores) -> str:
+    """The summary as text."""
+    table = summary_table(scores)
+    rows = [
+        [_framed(f"{row.quantity} [{row.unit}]", row), *map(format_cell, row.cells)] for row in table.rows
+    ]
+    shown = _align(_heads([table.title, *table.columns]), rows)
+    return f"{shown}\n\n{_wrapped(table.note)}" if table.note else shown
+
+
+def format_cell(cell: Cell) -> str:
+    """``0.94 +- 0.21``, two significant digits; ``none`` where there is no number."""
+    value = number(cell.value)
+    return value if cell.spread is None else f"{value} +- {number(cell.spread)}"
+
+
+def _framed(label: str, row: Row) -> str:
+    return f"{label}, {row.frames}" if row.frames else label
+
+
+def _heads(columns: Sequence[str]) -> list[list[str]]:
+    """Heads in two lines where one has a comma."""
+    if not any(", " in column for column in columns):
+        return [list(columns)]
+    parts = [column.partition(", ") for column in columns]
+    return [[first + comma.strip() for first, comma, _ in parts], [second for _, _, second in parts]]
+
+
+def _wrapped(note: str) -> str:
+    held = note.replace(" %", "\0%")  # a number and its unit stay together
+    return "\n".join(wrap(held, 120)).replace("\0", " ")
+
+
+def _align(heads: Sequence[Sequence[str]], rows: Sequence[Sequence[str]]) -> str:
+    cells = [*heads, *rows]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in cells
+    ]
+    return "\n".join([*lines[: len(heads)], "-" * max(map(len, lines)), *lines[len(heads) :]])

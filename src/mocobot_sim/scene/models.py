@@ -1,20 +1,81 @@
-"""Numbers of the hand-written models."""
+"""Shipped models and their numbers, known without MuJoCo; where the truth beside a recording is."""
 
-import mujoco
-import numpy as np
-from numpy.typing import NDArray
+from __future__ import annotations
 
-from mocobot_sim.scene.design import base_height_m as base_height_m
-from mocobot_sim.scene.design import omnid_design as omnid_design
-from mocobot_sim.scene.model_files import models_dir as models_dir
-from mocobot_sim.scene.model_files import payload_names as payload_names
-from mocobot_sim.scene.model_files import payload_path as payload_path
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from estimator.errors import InputError
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from estimator.arm.design import OmnidDesign
+    from estimator.arrays import Array
+
+GIMBAL_AXES = ("z", "y", "x")
+"""Axes of gimbal joints 1, 2, 3."""
 
 
-def posed(model: mujoco.MjModel, qpos: NDArray[np.float64] | None = None) -> mujoco.MjData:
+@cache
+def models_dir() -> Path:
+    """Folder that holds ``omnid`` and ``payload_*``: in the repository, or inside an installed wheel.
+
+    Raises:
+        FileNotFoundError: the installation carries no models.
+    """
+    here = Path(__file__).resolve()
+    for folder in (here.parents[1] / "mjcf", here.parents[3] / "models"):
+        if (folder / "omnid" / "omnid.xml").is_file():
+            return folder
+    raise FileNotFoundError("the mocobot models are missing from this installation")
+
+
+def payload_names() -> list[str]:
+    """Names of the shipped payloads, such as ``a``."""
+    return sorted(path.name.removeprefix("payload_") for path in models_dir().glob("payload_*"))
+
+
+def payload_path(name: str) -> Path:
+    """MJCF file of a shipped payload.
+
+    Raises:
+        InputError: there is no payload of that name.
+    """
+    if name not in payload_names():
+        raise InputError(f"payload {name!r} does not exist; the payloads are {', '.join(payload_names())}")
+    return models_dir() / f"payload_{name}" / "payload.xml"
+
+
+@cache
+def omnid_design() -> OmnidDesign:
+    """Design numbers of the shipped Omnid model."""
+    from estimator.arm.design import load_design
+
+    return load_design(models_dir() / "omnid" / "design.toml")
+
+
+@cache
+def base_height_m() -> float:
+    """Height of {b} over the floor mount of an Omnid, whose axes it shares [m]."""
+    import mujoco  # the only number that its model has to be asked for
+
+    model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
+    return float(posed(model).body("base").xpos[2])
+
+
+def posed(model: mujoco.MjModel, qpos: Array | None = None) -> mujoco.MjData:
     """Data with the poses of everything at ``qpos``, shape (nq,); None for ``qpos0``."""
+    import mujoco
+
     data = mujoco.MjData(model)
     if qpos is not None:
         data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     return data
+
+
+def truth_path(recording: Path) -> Path:
+    """Sidecar of a recording: ``rec.parquet`` has ``rec.truth.json``."""
+    return recording.with_suffix(".truth.json")

@@ -1,28 +1,26 @@
-"""Compose a team scene: one Omnid, parked or on its wheels, under every grasp of a payload (PyMJCF)."""
+"""Compose a team scene: Omnids under the grasps of a payload, or in a row with nothing to hold (PyMJCF)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.base.design import base_design
-from mocobot_sim.base.rollers import release, rough_floor
-from mocobot_sim.scene.applied import Applied, Pushing
-from mocobot_sim.scene.as_built import AsBuilt, deviate, units_of
+from mocobot_sim.scene.as_built import AsBuilt, SensorEffects, deviate, units_of
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design
-from mocobot_sim.scene.omnid import load_omnid, park, stand
+from mocobot_sim.scene.omnid import load_omnid, park, release, rough_floor, stand
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.pymjcf import mjcf
-from mocobot_sim.scene.sensor_effects import SensorEffects
-from mocobot_sim.scene.soft import SoftRow, tune
-from mocobot_sim.solver_settings import STIFF
+from mocobot_sim.scene.soft import STIFF, SoftRow, tune
 
 TIMESTEP_S = 0.001
 
@@ -47,10 +45,10 @@ class TeamScene:
         grasp_slack_rad: by how much each grasp may turn in it, beyond a weld's softness [rad], N entries; empty for
             none.
         soft: springs and dampers that are soft constraints.
-        effects: what was applied to the team.
+        effects: what was applied to the team (``mocobot_sim.effects.Effect``).
         xml: the scene's MJCF if ``root`` is None.
         assets: files that ``xml`` refers to, by name.
-        carries: whether there is a payload; see ``free`` for teams without.
+        carries: whether there is a payload; ``build_free_team`` makes teams without.
     """
 
     root: mjcf.RootElement | None
@@ -65,7 +63,7 @@ class TeamScene:
     grasp_slack_m: tuple[float, ...] = ()
     grasp_slack_rad: tuple[float, ...] = ()
     soft: tuple[SoftRow, ...] = ()
-    effects: tuple[Applied, ...] = ()
+    effects: tuple[Any, ...] = ()
     xml: str | None = None
     assets: Mapping[str, bytes] = field(default_factory=dict)
     carries: bool = True
@@ -74,11 +72,6 @@ class TeamScene:
     def X_Wb(self) -> RigidTransform:
         """Every robot's {b} in the world as its floor mount has it, without any tilt; N transforms."""
         return self.mounts * RigidTransform.from_translation([0.0, 0.0, base_height_m()])
-
-    @property
-    def pushes(self) -> tuple[Pushing, ...]:
-        """Forces from outside that a trial applies to the payload."""
-        return tuple(effect for effect in self.effects if isinstance(effect, Pushing))
 
     def to_xml(self) -> str:
         """The scene as one MJCF document that loads in plain MuJoCo."""
@@ -98,14 +91,12 @@ class TeamScene:
 
     def sprung(self, equality: str, compliance: float, relaxation_s: float) -> TeamScene:
         """The scene with an ``equality`` of its tree as a spring; arguments as of ``SoftRow``."""
-        return self._with(SoftRow(equality, compliance=compliance, relaxation_s=relaxation_s))
+        row = SoftRow(equality, compliance=compliance, relaxation_s=relaxation_s)
+        return replace(self, soft=(*self.soft, row))
 
     def damped(self, equality: str, damping: float) -> TeamScene:
         """The scene with an ``equality`` of its tree as a damper; arguments as of ``SoftRow``."""
-        return self._with(SoftRow(equality, damping=damping))
-
-    def _with(self, row: SoftRow) -> TeamScene:
-        return replace(self, soft=(*self.soft, row))
+        return replace(self, soft=(*self.soft, SoftRow(equality, damping=damping)))
 
     def tuned(self) -> TeamScene:
         """The scene with every soft row set for the inertias that it has now, in place."""
@@ -227,3 +218,61 @@ def _check_tilts(tilts: Array, limit_rad: float, where: str) -> None:
             f"{where}: grasp{over[0] + 1} asks for gimbal angles (y, x) of ({degrees}) deg at home; "
             f"the gimbal ends at {np.rad2deg(limit_rad):.1f} deg"
         )
+
+
+SPACING_M = 1.2
+"""Distance of neighbours in the row: no two arms can touch."""
+MOST_ROBOTS = 100
+
+
+def build_free_team(
+    robots: int,
+    as_built: Sequence[AsBuilt] = (),
+    theta: ArrayLike | None = None,
+    timestep_s: float = TIMESTEP_S,
+) -> TeamScene:
+    """Park Omnids in a row along x, with nothing on their flanges.
+
+    The gimbals are as in every team: passive, without friction or springs, each of their bodies balanced about the
+    wrist. A platform only translates, so neither gravity nor the arm's motion turns them: they stay as they are left,
+    and what they weigh is carried by the wrist.
+
+    Args:
+        robots: how many.
+        as_built: deviations from the design, one per robot; empty for robots as designed.
+        theta: gimbal angles (z, y, x) as they are left [rad], shape (N, 3); None for zero.
+        timestep_s: integration step [s].
+
+    Raises:
+        InputError: a number of robots out of range, or ``as_built`` or ``theta`` does not match it.
+    """
+    check_robots(robots)
+    units = units_of(as_built, robots)
+    design = omnid_design()
+    angles = np.zeros((robots, 3)) if theta is None else np.array(theta, dtype=float)
+    if angles.shape != (robots, 3) or not (np.abs(angles) <= design.gimbal_limit_rad).all():
+        raise InputError(
+            f"theta is not {robots} x 3 angles of at most {design.gimbal_limit_rad:g} rad; it must be"
+        )
+    root = mjcf.from_path(str(models_dir() / "team.xml"))
+    root.option.timestep = timestep_s
+    places = np.zeros((robots, 3))
+    places[:, 0] = SPACING_M * np.arange(robots)
+    for i, unit in enumerate(units):
+        omnid = load_omnid(i + 1)
+        deviate(omnid, unit)
+        park(omnid)
+        stand(root, omnid, places[i], [1.0, 0.0, 0.0, 0.0])
+    mounts = RigidTransform.from_translation(places)
+    home = np.tile([0.0, 0.0, design.home_height_m], (robots, 1))
+    return TeamScene(root, robots, home, angles, mounts, units, mounts, carries=False)
+
+
+def check_robots(robots: int) -> None:
+    """Refuse a number of robots before anything of that size is made.
+
+    Raises:
+        InputError: it is out of range.
+    """
+    if not 1 <= robots <= MOST_ROBOTS:
+        raise InputError(f"robots is {robots}; it must be at least 1 and at most {MOST_ROBOTS}")

@@ -1,4 +1,4 @@
-"""Exact linear springs and dampers made of soft equality constraints, solved together with the stiff ones.
+"""MuJoCo's constraint rows: stiff parts, stiction, and exact linear springs and dampers.
 
 A passive spring or damper on a light body is unstable at 1 ms, or is integrated implicitly where the constraint
 solver cannot see it and pulls the welds open. A soft ``equality`` row is part of the solver's own problem. MuJoCo
@@ -10,15 +10,30 @@ for ``solref = (-s, -b)``, a constant impedance d = ``solimp[0] = solimp[1]`` an
 coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, with s = 0, damping b / ((1 - d) A).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
-from mocobot_sim.scene.pymjcf import mjcf
+if TYPE_CHECKING:
+    import mujoco
 
-# Of d and of 1 - d: MuJoCo clips d to this range.
+    from mocobot_sim.scene.pymjcf import mjcf
+
+_RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+STIFF: dict[str, Any] = {"solref": [0.004, 1.0], "solimp": _RIGID}
+"""What holds as a rigid part would: welds, and limits that nothing goes through."""
+STICK: dict[str, Any] = {"solreffriction": [-1.0, -1000.0], "solimpfriction": _RIGID}
+"""Coulomb friction that sticks, for ``frictionloss``.
+
+Under its limit, a friction row lets its coordinate creep at -R f / B: with the smallest R and a rate B that stops a
+coordinate within a millisecond, a coordinate of inertia I creeps at 1e-7 f / I [1/s].
+"""
+
+# Least d and 1 - d: MuJoCo clips d to this range.
 _LEAST = 1e-4
 # As stiff as the welds: (4 ms)^-2; a third of it with a small (1 - d) would still be.
 _STIFFNESS_PER_S2 = 62500.0
@@ -31,27 +46,19 @@ _LEAST_RELAXATION_S = 0.005
 
 @dataclass(frozen=True)
 class SoftRow:
-    """An ``equality`` on one joint or fixed tendon that acts as a spring or as a damper.
+    """An ``equality`` on one joint or fixed tendon that acts as a spring or as a damper."""
 
-    Attributes:
-        equality: its name in the scene.
-        compliance: of the spring [m/N or rad/(N m)], or None.
-        relaxation_s: time constant in which the spring follows its load [s]; a critically damped one below 5 ms.
-        damping: of the damper [N s/m or N m s/rad], or None.
-    """
-
-    equality: str
-    compliance: float | None = None
-    damping: float | None = None
+    equality: str  # its name in the scene
+    compliance: float | None = None  # of the spring [m/N or rad/(N m)], or None
+    damping: float | None = None  # of the damper [N s/m or N m s/rad], or None
+    # time constant in which the spring follows its load [s]; a critically damped one below 5 ms
     relaxation_s: float = 0.0
 
 
 def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
     """``solref`` and ``solimp`` of a critically damped spring.
 
-    Args:
-        compliance: of the spring, greater than 0 [m/N or rad/(N m)].
-        inverse_inertia: A, as MuJoCo has it [1/kg or 1/(kg m^2)].
+    Its compliance is greater than 0 [m/N or rad/(N m)]; the inverse inertia is A as MuJoCo has it [1/kg or 1/(kg m^2)].
     """
     s = min(_STIFFNESS_PER_S2, 0.5 * inverse_inertia / compliance)
     soft = s * compliance / inverse_inertia
@@ -84,8 +91,10 @@ def _constant_impedance(d: float) -> list[float]:
     return [float(d), float(d), 0.001, 0.5, 2.0]
 
 
-def tune(root: "mjcf.RootElement", model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
+def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
     """Set soft rows of a PyMJCF tree for the inertias of the model that it compiles to."""
+    import mujoco
+
     for row in rows:
         equality = model.equality(row.equality).id
         on = model.eq_obj1id[equality]
@@ -106,6 +115,8 @@ def tune(root: "mjcf.RootElement", model: mujoco.MjModel, rows: Sequence[SoftRow
 
 def row_compliance(model: mujoco.MjModel, joint: int) -> float:
     """Compliance of the spring row that holds a joint at zero, read back from the model; 0 if there is none."""
+    import mujoco
+
     for k in range(model.neq):
         if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj1id[k] == joint:
             s, soft = -model.eq_solref[k, 0], 1.0 - model.eq_solimp[k, 0]

@@ -1,4 +1,4 @@
-"""Addresses of the team's joints, sites and constraints in a compiled model, looked up by name."""
+"""Addresses of joints, sites, constraints and wheels in a compiled model, looked up by name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_sim.scene.design import GIMBAL_AXES
+from estimator.errors import InputError
+from mocobot_sim.base.design import WHEELS
+from mocobot_sim.scene.models import GIMBAL_AXES
 
 Index = NDArray[np.intp]
 
@@ -26,37 +28,28 @@ PAYLOAD_PREFIX = "omnid1/payload/"
 
 @dataclass(frozen=True)
 class TeamIndex:
-    """Where each robot's coordinates live; every joint here has one coordinate.
+    """Where each robot's coordinates live; every joint here has one coordinate."""
 
-    Attributes:
-        motor_qpos, spring_qpos, gimbal_qpos, slide_qpos: positions in ``qpos``, (N, 3); gimbal order z, y, x.
-        motor_dof, spring_dof, gimbal_dof, slide_dof, knee_dof: positions in ``qvel``; (N, 3), knees (N, 6).
-        actuator: positions in ``ctrl``, shape (N, 3).
-        grasp_site: the flange's site of every robot, shape (N,).
-        payload_site: the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held.
-        payload_body: body id of the payload; -1 where nothing is held.
-        yielding_dof: slides, and hinges on springs, that effects have added: bases and grasps that yield, are loose or
-            creep.
-        hanging_dof: other hinges that effects have added: what swings in the payload.
-        base_dof: free chassis, wheels and rollers; none in a team that is parked.
-    """
-
+    # positions in ``qpos``, (N, 3); gimbal order z, y, x
     motor_qpos: Index
     spring_qpos: Index
     gimbal_qpos: Index
     slide_qpos: Index
+    # positions in ``qvel``; (N, 3), knees (N, 6)
     motor_dof: Index
     spring_dof: Index
     gimbal_dof: Index
     slide_dof: Index
     knee_dof: Index
-    actuator: Index
-    grasp_site: Index
+    actuator: Index  # positions in ``ctrl``, shape (N, 3)
+    grasp_site: Index  # the flange's site of every robot, shape (N,)
+    # the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held
     payload_site: Index
-    payload_body: int
+    payload_body: int  # body id of the payload; -1 where nothing is held
+    # slides, and hinges on springs, that effects have added: bases and grasps that yield, are loose or creep
     yielding_dof: Index
-    hanging_dof: Index
-    base_dof: Index
+    hanging_dof: Index  # other hinges that effects have added: what swings in the payload
+    base_dof: Index  # free chassis, wheels and rollers; none in a team that is parked
 
     @property
     def robots(self) -> int:
@@ -65,11 +58,7 @@ class TeamIndex:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, carries: bool = True) -> TeamIndex:
-        """Look everything up by name.
-
-        Args:
-            model: the compiled scene.
-            carries: whether it has a payload.
+        """Look everything up by name in a compiled scene, with or without a payload.
 
         Raises:
             KeyError: the model is not a team scene (the message names what is missing).
@@ -133,3 +122,57 @@ def _base_joints(model: mujoco.MjModel) -> Index:
     return np.flatnonzero(
         np.array(wheel, dtype=bool) | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
     ).astype(np.intp)
+
+
+@dataclass(frozen=True)
+class BaseIndex:
+    """Where the wheels of N released robots live; wheels in the order of ``WHEELS``."""
+
+    # positions in ``qpos`` and ``qvel``, shape (N, 4)
+    wheel_qpos: Index
+    wheel_dof: Index
+    drive: Index  # positions of the wheels' motors in ``ctrl``, shape (N, 4)
+    chassis: Index  # body ids, shape (N,)
+    free_qpos: Index  # where the position and quaternion of every chassis begin in ``qpos``, shape (N,)
+    # number of the wheel, 4 robot + wheel from 0, that each geom is a roller of, or -1; shape (ngeom,)
+    geom_wheel: Index
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return len(self.chassis)
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> BaseIndex:
+        """Look everything up.
+
+        Raises:
+            InputError: a robot is parked, or there is none.
+        """
+        robots = robots_with(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
+        if not robots:
+            raise InputError("the model has no Omnid; a base that is to drive must be there")
+        drives = [f"drive_{wheel}" for wheel in WHEELS]
+        driven = min(robots_with(model, mujoco.mjtObj.mjOBJ_ACTUATOR, drive) for drive in drives)
+        if driven < robots:
+            raise InputError(f"omnid{driven + 1} is parked; a base that is to drive must be released")
+        names = [f"wheel_{wheel}" for wheel in WHEELS]
+        joints = ids_of(model.joint, robots, names)
+        geom_wheel = np.full(model.ngeom, -1, dtype=np.intp)
+        for number, hub in enumerate(ids_of(model.body, robots, names).ravel()):
+            geom_wheel[model.body_parentid[model.geom_bodyid] == hub] = number
+        return cls(
+            wheel_qpos=model.jnt_qposadr[joints].astype(np.intp),
+            wheel_dof=model.jnt_dofadr[joints].astype(np.intp),
+            drive=ids_of(model.actuator, robots, drives),
+            chassis=ids_of(model.body, robots, ("chassis",)).ravel(),
+            free_qpos=model.jnt_qposadr[ids_of(model.joint, robots, ("",)).ravel()].astype(np.intp),
+            geom_wheel=geom_wheel,
+        )
+
+    def poses(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Where every chassis is: x, y [m], yaw [rad] within +-pi in the world, shape (N, 3)."""
+        w, x, y, z = data.qpos[self.free_qpos[:, None] + np.arange(3, 7)].T
+        at = data.qpos[self.free_qpos[:, None] + np.arange(2)]
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.column_stack([at, yaw])

@@ -1,33 +1,32 @@
-"""What MJCF cannot say of a joint: torques by the state, one joint at a time."""
+"""Effects of a serial robot, and how those act that MJCF cannot say: torques by the state, one joint at a time."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
 from estimator.arrays import Array
-from mocobot_sim.serial.law import CREEP, direction
+from estimator.strict import Fields
+from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_law
+
+CREEP = 1e-3
+"""Speed over which dry friction changes its direction here [rad/s or m/s]: slow beside what joints do."""
 
 
 @dataclass(frozen=True)
 class RobotEffect:
-    """One effect.
+    """One effect."""
 
-    Attributes:
-        cause: such as ``stribeck``.
-        joint: which joint, from 1; None of a body that no joint moves, and of the whole robot.
-        partner: the other joint of a coupled drive, from 1.
-        parameters: numbers, by name with the unit as suffix.
-        body: name of the body that it is about, where it is about one; empty: the one that the joint moves.
-    """
-
-    cause: str
-    joint: int | None
-    partner: int | None = None
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    cause: str  # such as ``stribeck``
+    joint: int | None  # which joint, from 1; None of a body that no joint moves, and of the whole robot
+    partner: int | None = None  # the other joint of a coupled drive, from 1
+    parameters: Mapping[str, float] = field(default_factory=dict)  # numbers, by name with the unit as suffix
+    # name of the body that it is about, where it is about one; empty: the one that the joint moves
     body: str = ""
 
     def number(self, *stems: str) -> float:
@@ -41,15 +40,120 @@ class RobotEffect:
         return float(self.parameters[name])
 
 
+@dataclass(frozen=True, eq=False)
+class State:
+    """State of all joints at one step."""
+
+    time_s: float  # since the start
+    period_s: float  # of a step
+    q: Array  # positions and rates, shape (J,)
+    dq: Array  # positions and rates, shape (J,)
+    ddq: Array  # accelerations of the step before, shape (J,)
+    load: Array  # torques that the masses behind the joints ask for, shape (J,)
+    torque: Array  # that the drives give, shape (J,)
+
+    def signal(self, name: str) -> float:
+        """A signal by its name: ``time``, ``q_3``, ``direction_3`` and so on."""
+        if name == "time":
+            return self.time_s
+        kind, _, number = name.rpartition("_")
+        j = int(number) - 1
+        return direction(float(self.dq[j])) if kind == "direction" else float(getattr(self, kind)[j])
+
+
+def direction(speed: float) -> float:
+    """Direction of a motion in [-1, 1]."""
+    return math.tanh(speed / CREEP)
+
+
+TEXTS, NUMBERS = ("target", "function", "of", "times"), ("amplitude", "number", "second", "phase_rad")
+TARGET, TARGETS = re.compile(r"(torque|position)_[1-9][0-9]*"), "torque_3, position_3"
+SIGNAL = re.compile(r"time|(q|dq|ddq|direction|load|torque)_[1-9][0-9]*")
+SIGNALS = "time, q_3, dq_3, ddq_3, direction_3, load_3, torque_3"
+
+
+@dataclass(frozen=True)
+class JointLaw:
+    """``amplitude`` times a function of a signal, and times another signal where one is named, at a joint from 1."""
+
+    # ``torque_3``, what the torque of joint 3 holds besides, or ``position_3``, what its reading is off by, which is
+    # an error of the log and not simulated
+    target: str
+    function: str  # as in ``mocobot_sim.functions.FUNCTIONS``
+    # signals, all in SI: ``time``, ``q_3``, ``dq_3``, ``ddq_3``, ``direction_3``, ``load_3`` and ``torque_3``;
+    # ``times`` is empty where there is none
+    of: str
+    amplitude: float  # in the target's unit over those of the signals
+    # what the function has inside (docs/effects.md)
+    number: float = 0.0
+    second: float = 0.0
+    phase_rad: float = 0.0
+    times: str = ""
+
+    def __post_init__(self) -> None:
+        """Check names and numbers.
+
+        Raises:
+            InputError: a name is not known, or a number is not allowed with this function.
+        """
+        check_law(self, TARGET.fullmatch, TARGETS, SIGNAL.fullmatch, SIGNALS)
+
+    @property
+    def joint(self) -> int:
+        """At which joint, from 1."""
+        return int(self.target.rpartition("_")[2])
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is a torque, and no error of a reading."""
+        return self.target.startswith("torque")
+
+    def to_dict(self) -> dict[str, str | float]:
+        """Plain JSON values."""
+        return asdict(self)
+
+    @classmethod
+    def of_dict(cls, values: Mapping[str, Any], where: str) -> JointLaw:
+        """From plain JSON values.
+
+        Raises:
+            InputError: they are no formula.
+        """
+        entry = Fields(values, (*TEXTS, *NUMBERS), where)
+        given: dict[str, Any] = {key: entry.number(key) for key in NUMBERS}
+        given |= {key: str(entry.values[key]) for key in TEXTS}
+        return cls(**given)
+
+
+class ActingLaw:
+    """A law in one run: it may remember what was, such as a play.
+
+    Attributes:
+        law: which.
+    """
+
+    def __init__(self, law: JointLaw) -> None:
+        self.law = law
+        self._function: Step | None = None
+
+    def torque(self, state: State) -> float:
+        """What it takes from the drive of its joint now [N m or N]; to be asked once a step."""
+        law = self.law
+        if self._function is None:
+            inside = Inside(law.number, law.second, law.phase_rad, state.period_s)
+            self._function = FUNCTIONS[law.function](inside)
+        out = law.amplitude * self._function(state.signal(law.of))
+        return out * state.signal(law.times) if law.times else out
+
+
 def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Array, dry: Array) -> Array:
-    """Torques that effects take from their joints' drives beyond what the model does, shape (J,) [N m or N].
+    """Torques that ``SMOOTH`` effects take from the drives beyond what the model does, shape (J,) [N m or N].
 
     What rubs never drives: fitted friction that is a little below zero, the model's own with it, is none.
 
     Args:
-        effects: any; those of ``SMOOTH`` count.
-        q: joint positions [rad or m], shape (J,).
-        v: speeds, shape (J,).
+        effects: any.
+        q, v: joint positions and speeds, shape (J,).
         damping: the model's own [N m s/rad or N s/m], shape (J,).
         dry: dry friction, the model's own with it; what is below zero takes from the viscous friction, shape (J,).
     """
@@ -64,13 +168,9 @@ def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Arr
 
 
 def dry_levels(effects: Sequence[RobotEffect], v: Array, load: Array, time: float) -> Array:
-    """Dry friction beyond the model's at every joint, shape (J,) [N m or N]; it may be less than that.
+    """Dry friction of ``DRY`` effects beyond the model's, which may be negative, shape (J,) [N m or N].
 
-    Args:
-        effects: any; those of ``DRY`` count.
-        v: speeds, shape (J,).
-        load: torques that the gears pass on, shape (J,).
-        time: since the robot was switched on, as a log of it would have it [s].
+    ``load`` are the torques that the gears pass on, ``time`` since the robot was switched on, as a log has it [s].
     """
     out = np.zeros(len(v))
     for effect in effects:
@@ -80,67 +180,30 @@ def dry_levels(effects: Sequence[RobotEffect], v: Array, load: Array, time: floa
     return out
 
 
-def _coulomb(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("coulomb")
-
-
-def _viscous(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("viscous") * v
-
-
-def _asymmetric_coulomb(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("asymmetry") * direction(v)
-
-
-def _asymmetric_viscous(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("asymmetry") * abs(v)
-
-
-def _stribeck(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("excess") * math.exp(-abs(v) / e.number("fade"))
-
-
-def _sublinear(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("bend") * math.log1p(abs(v) / e.number("thins"))
-
-
-def _load_friction(e: RobotEffect, v: float, load: float, time: float) -> float:
-    return e.number("share") * abs(load)
-
-
 def _warming(e: RobotEffect, v: float, load: float, time: float) -> float:
     more = e.number("more_Nm", "more_N") + e.number("more_Nms", "more_Ns") * abs(v)
     return more * math.exp(-time / e.number("over"))
 
 
-def _ripple(e: RobotEffect, q: float, v: float) -> float:
-    angle = e.number("turns") * q
+def _wave(e: RobotEffect, angle: float) -> float:
     return e.number("cosine") * math.cos(angle) + e.number("sine") * math.sin(angle)
 
 
-def _counterbalance(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("cosine") * math.cos(q) + e.number("sine") * math.sin(q)
-
-
-def _spring(e: RobotEffect, q: float, v: float) -> float:
-    return e.number("stiffness") * (q - e.number("middle")) + e.number("offset")
-
-
 SMOOTH: dict[str, Callable[[RobotEffect, float, float], float]] = {
-    "friction": _viscous,
-    "asymmetric_viscous": _asymmetric_viscous,
-    "ripple": _ripple,
-    "counterbalance": _counterbalance,
-    "spring": _spring,
+    "friction": lambda e, q, v: e.number("viscous") * v,
+    "asymmetric_viscous": lambda e, q, v: e.number("asymmetry") * abs(v),
+    "ripple": lambda e, q, v: _wave(e, e.number("turns") * q),
+    "counterbalance": lambda e, q, v: _wave(e, q),
+    "spring": lambda e, q, v: e.number("stiffness") * (q - e.number("middle")) + e.number("offset"),
 }
 """Torques by position and speed, by cause; a slide's ripple counts waves per metre as ``turns`` over 2 pi."""
 
 DRY: dict[str, Callable[[RobotEffect, float, float, float], float]] = {
-    "friction": _coulomb,
-    "asymmetric_coulomb": _asymmetric_coulomb,
-    "stribeck": _stribeck,
-    "sublinear_friction": _sublinear,
-    "load_friction": _load_friction,
+    "friction": lambda e, v, load, time: e.number("coulomb"),
+    "asymmetric_coulomb": lambda e, v, load, time: e.number("asymmetry") * direction(v),
+    "stribeck": lambda e, v, load, time: e.number("excess") * math.exp(-abs(v) / e.number("fade")),
+    "sublinear_friction": lambda e, v, load, time: e.number("bend") * math.log1p(abs(v) / e.number("thins")),
+    "load_friction": lambda e, v, load, time: e.number("share") * abs(load),
     "warming": _warming,
 }
 """Dry friction by speed, load and time, by cause: against the motion, and at rest as much as keeps the joint there."""

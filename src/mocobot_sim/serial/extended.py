@@ -1,10 +1,10 @@
-"""A robot with effects, to take away: MJCF for what it can express, a small file for the rest, and how to step both."""
+"""A robot with effects, to take away and to roll out: MJCF for what it can express, a small file for the rest."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,10 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
-from mocobot_sim.scene.named_files import ASSETS as TYPES
-from mocobot_sim.scene.named_files import owned
-from mocobot_sim.serial.built import Effect, refused, steps
-from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
-from mocobot_sim.serial.law import ActingLaw, JointLaw, State
-from mocobot_sim.serial.mjcf import into_mjcf
+from mocobot_sim.model_check import ASSETS as TYPES
+from mocobot_sim.model_check import owned
+from mocobot_sim.serial.effects import DRY, ActingLaw, JointLaw, RobotEffect, State, dry_levels, resistances
+from mocobot_sim.serial.mjcf import Built, Effect, steps, with_effects
 
 ASSETS = "assets"
 
@@ -28,10 +26,7 @@ ASSETS = "assets"
 def take_along(spec: mujoco.MjSpec) -> dict[Path, str]:
     """Name meshes, height fields, skins and textures by their place in ``assets`` beside a model that is written anew.
 
-    What is not found stays as it is named.
-
-    Args:
-        spec: the model as it was read from its file; changed.
+    ``spec`` is the model as read from its file, and is changed; what is not found stays as it is named.
 
     Returns:
         The files, each with its name in ``assets``.
@@ -42,16 +37,14 @@ def take_along(spec: mujoco.MjSpec) -> dict[Path, str]:
     taken: dict[Path, str] = {}
 
     def moved(file: str, inside: str) -> str:
-        named = Path(
-            spec.modelfiledir, inside, Path(file).name if spec.strippath else file
-        )  # an absolute one alone
+        # An absolute name stands alone.
+        named = Path(spec.modelfiledir, inside, Path(file).name if spec.strippath else file)
         if not file or not named.is_file():
             return file
         source = owned(named, Path(spec.modelfiledir), TYPES)
         if source not in taken:
-            taken[source] = (
-                source.name if source.name not in taken.values() else f"{len(taken)}_{source.name}"
-            )
+            again = source.name in taken.values()
+            taken[source] = f"{len(taken)}_{source.name}" if again else source.name
         return taken[source]
 
     of = spec.compiler
@@ -106,14 +99,9 @@ def write_extended(
         reference: whether it is what has changed since other logs, whose own errors are then in no model.
 
     Raises:
-        InputError: the folder cannot be written, an effect makes a model that MuJoCo refuses, or a mesh or texture is
-            not the model's own.
+        InputError: the folder cannot be written, MuJoCo refuses the effects, or a file is not the model's.
     """
-    try:
-        inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
-        spec.compile()
-    except (ValueError, RuntimeError) as error:
-        raise refused(error) from error
+    inside = with_effects(spec, effects)[1]
     places = [
         SCENE if said else NUMBERS if steps(e) else "none" for e, said in zip(effects, inside, strict=True)
     ]
@@ -125,10 +113,8 @@ def write_extended(
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     write_text(folder / SCENE, spec.to_xml())
     causes = [_entry(e) | {"in": place} for e, place in zip(effects, places, strict=True)]
-    write_json(
-        folder / NUMBERS,
-        {"format": FORMAT, "version": VERSION, "causes": causes, "recordings": list(recordings)},
-    )
+    numbers = {"format": FORMAT, "version": VERSION, "causes": causes, "recordings": list(recordings)}
+    write_json(folder / NUMBERS, numbers)
     write_text(folder / README, _readme(effects, places, CHANGED if reference else ""))
 
 
@@ -147,11 +133,8 @@ def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
         InputError: ``effects.json`` cannot be read or is something else.
     """
     path = Path(folder) / NUMBERS
-    file = Fields(
-        read_json(path, "the effects of an extended robot"),
-        ("format", "version", "causes", "recordings"),
-        str(path),
-    )
+    values = read_json(path, "the effects of an extended robot")
+    file = Fields(values, ("format", "version", "causes", "recordings"), str(path))
     if file.values["format"] != FORMAT:
         file.refuse("format", repr(FORMAT))
     if file.values["version"] != VERSION:
@@ -223,11 +206,8 @@ def _readme(effects: Sequence[Effect], places: Sequence[str], more: str) -> str:
         f"| {_row(e)} | {'not simulated' if place == 'none' else f'`{place}`'} |"
         for e, place in zip(effects, places, strict=True)
     ]
-    table = (
-        "\n".join(["| cause | joint or body | parameters | in |", "|---|---|---|---|", *rows])
-        if rows
-        else "None."
-    )
+    head = ["| cause | joint or body | parameters | in |", "|---|---|---|---|"]
+    table = "\n".join([*head, *rows]) if rows else "None."
     return f"""# Extended robot
 
 The robot with these causes built in{more}:
@@ -251,7 +231,46 @@ One step with all of it, from torques at the joints:
 def _row(effect: Effect) -> str:
     entry = _entry(effect)
     numbers = entry["law"] or entry["parameters"]
-    each = (
-        f"`{n}` = {v:.6g}" if isinstance(v, float) else f"`{n}` = {v}" for n, v in numbers.items() if v != ""
-    )
-    return f"`{entry['cause']}` | {entry['joint'] or entry['body']} | {', '.join(each)}"
+    shown = {n: f"{v:.6g}" if isinstance(v, float) else v for n, v in numbers.items() if v != ""}
+    each = ", ".join(f"`{name}` = {value}" for name, value in shown.items())
+    return f"`{entry['cause']}` | {entry['joint'] or entry['body']} | {each}"
+
+
+Drive = Callable[[float, Array, Array], Array]
+"""Torques at the joints (J,) by time [s], positions and velocities (J,)."""
+MOST_SPEED = 1e4
+"""Beyond which a run is not followed [rad/s or m/s]: no joint is a hundredth as fast, and MuJoCo still has numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a rollout begins."""
+
+    time: float  # [s]
+    # positions, velocities and accelerations, shape (J,) each; with the latter the integration is centred, and
+    # friction by load begins
+    q: Array
+    dq: Array
+    ddq: Array
+
+
+def rollout(built: Built, start: Start, drive: Drive, samples: int, every: int) -> Array:
+    """Positions after every so many steps, shape (n, J), the start's first; n < samples + 1 where a run breaks off.
+
+    It breaks off where a number is not finite or a joint is faster than ``MOST_SPEED``. ``every`` steps of the
+    integration lie between two of the ``samples`` taken after the start.
+    """
+    model = built.model
+    data, effects = mujoco.MjData(model), built.running()
+    data.time, data.qpos[:], data.qacc[:] = start.time, start.q, start.ddq
+    # MuJoCo's positions go on with the velocity after a step: from half a step before, errors are of second order.
+    data.qvel[:] = start.dq - 0.5 * model.opt.timestep * start.ddq
+    out = np.empty((samples + 1, model.nq))
+    out[0] = start.q
+    for k in range(1, samples + 1):
+        for _ in range(every):
+            step(model, data, effects, drive(data.time, data.qpos, data.qvel))
+            if not np.abs(data.qvel).max() < MOST_SPEED:  # nor where it is no number
+                return out[:k]
+        out[k] = data.qpos
+    return out

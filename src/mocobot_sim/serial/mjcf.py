@@ -1,30 +1,33 @@
-"""Effects that MJCF can say, put into a model."""
+"""Effects that MJCF can say, put into a serial robot's model; the model with all effects, ready to be rolled out."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
-from mocobot_sim.serial.effects import DRY, RobotEffect
+from estimator.errors import InputError
+from mocobot_sim.serial.effects import DRY, LAWS, ActingLaw, JointLaw, RobotEffect
 
 LEAST_MOMENT = 1e-3
-"""Of a body's largest second moment of mass, the least that it has in any direction. Chosen: a thin sheet's."""
+"""Least second moment of mass of a body in any direction, over the largest. Chosen: a thin sheet's."""
 _POSSIBLE = 1e-9
 """Relative; by so much may an inertia be off one that a body can have: rounding of the model's own numbers."""
 
 
 def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Array) -> None:
-    """Give a body mass, centre and inertia in place of its own.
+    """Give a body of a model mass [kg], centre [m] and inertia about it in place of its own.
 
-    Args:
-        body: of the model, changed in place.
-        mass: [kg].
-        centre: of mass, in the body's frame [m], shape (3,).
-        inertia: about that centre, along the body's frame [kg m^2], shape (3, 3); as near as a body can have it.
+    The inertia is along the body's frame [kg m^2], shape (3, 3); the body gets the nearest that one can have.
     """
-    moments, axes = np.linalg.eigh(possible_inertia(inertia))
+    moments = np.linalg.eigvalsh(inertia)
+    if moments[0] < 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - _POSSIBLE):
+        inertia = real_inertia(inertia)
+    moments, axes = np.linalg.eigh(inertia)
     axes = axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
     body.mass, body.ipos, body.inertia = mass, centre, moments
     body.iquat = Rotation.from_matrix(axes).as_quat(scalar_first=True)
@@ -35,14 +38,10 @@ def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Arra
 
 
 def keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Fix all bodies at what the model was compiled to, if its compiler would change what is put into it.
+    """Fix all bodies of ``spec`` as its ``model`` has them, if its compiler would change what is put into it.
 
     Settings that take inertias from shapes whatever is written, scale the total mass or raise small ones would undo a
     cause, or pass it on to every other body.
-
-    Args:
-        spec: the model, changed in place.
-        model: what it compiles to.
     """
     of = spec.compiler
     from_shapes = of.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -63,23 +62,12 @@ def inertial_of(model: mujoco.MjModel, body: int) -> tuple[float, Array, Array]:
     return float(model.body_mass[body]), np.array(model.body_ipos[body]), inertia
 
 
-def possible_inertia(inertia: Array) -> Array:
-    """An inertia as it is where a body can have it, else the nearest that one can, shape (3, 3)."""
-    moments = np.linalg.eigvalsh(inertia)
-    if moments[0] >= 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - _POSSIBLE):
-        return inertia
-    return real_inertia(inertia)
-
-
 def real_inertia(inertia: Array) -> Array:
-    """The inertia nearest to a fitted one that a body can have, which MuJoCo asks for.
+    """The inertia nearest to a fitted, symmetric one about the centre of mass [kg m^2] that a body can have.
 
     A density is nowhere below zero, so second moments of mass are positive semidefinite (P. M. Wensing, S. Kim and
     J.-J. E. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", RA-L
     2018); those that are not are set to a thousandth of the largest.
-
-    Args:
-        inertia: about the centre of mass [kg m^2], shape (3, 3), symmetric.
     """
     size, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
     second = (axes * np.maximum(size, LEAST_MOMENT * max(size[-1], 0.0))) @ axes.T
@@ -88,17 +76,12 @@ def real_inertia(inertia: Array) -> Array:
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
-"""Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
+"""Rows of dry friction. By default it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
 20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
-    """Put an effect into a model; False if MJCF has no word for it, or not for its sign.
-
-    Args:
-        spec: the model, changed in place.
-        effect: with its joint counted in the order of qpos.
-    """
+    """Put an effect, its joint counted as in qpos, into a model; False if MJCF has no word for it or its sign."""
     model = spec.compile()
     if effect.cause == "gravity_direction":
         spec.option.gravity = [effect.number(axis) for axis in "xyz"]
@@ -215,3 +198,57 @@ def _spread(way: Array) -> Array:
 def _moments(effect: RobotEffect) -> Array:
     xx, yy, zz, xy, xz, yz = (effect.number(f"inertia_{axes}") for axes in INERTIA)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+Effect = RobotEffect | JointLaw
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A robot that a reference stepper can step."""
+
+    # compiled, with what MJCF can say; contacts, limits and actuators off, MuJoCo's ``implicitfast``, and dry
+    # friction that hardly depends on the speed
+    model: mujoco.MjModel
+    stepped: tuple[Effect, ...]  # effects that the stepper adds
+    left_out: tuple[int, ...]  # which of the given effects are in neither, numbers from 0
+
+    def running(self) -> list[RobotEffect | ActingLaw]:
+        """The stepper's effects for one run: laws may remember."""
+        return [ActingLaw(e) if isinstance(e, JointLaw) else e for e in self.stepped]
+
+
+def with_effects(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[mujoco.MjModel, list[bool]]:
+    """Put into a model what MJCF can say of effects; the model compiled, and which effects are in it.
+
+    Raises:
+        InputError: MuJoCo refuses the model with the effects in it.
+    """
+    try:
+        inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
+        return spec.compile(), inside
+    except (ValueError, RuntimeError) as error:
+        text = " ".join(str(error).split())
+        raise InputError(f"MuJoCo refuses the model with the causes in it ({text})") from error
+
+
+def build(spec: mujoco.MjSpec, effects: Sequence[Effect], step_s: float) -> Built:
+    """Put effects into a nominal model, which is changed, to be integrated in steps of ``step_s`` [s].
+
+    Raises:
+        InputError: MuJoCo refuses the model with the effects in it.
+    """
+    model, inside = with_effects(spec, effects)
+    off = mujoco.mjtDisableBit
+    for bit in (off.mjDSBL_CONTACT, off.mjDSBL_LIMIT, off.mjDSBL_ACTUATION, off.mjDSBL_AUTORESET):
+        model.opt.disableflags |= int(bit)
+    model.opt.integrator, model.opt.timestep = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST), step_s
+    model.dof_solref[:], model.dof_solimp[:] = SOLREF, SOLIMP
+    rest = [k for k, said in enumerate(inside) if not said]
+    stepped = tuple(effects[k] for k in rest if steps(effects[k]))
+    return Built(model, stepped, tuple(k for k in rest if not steps(effects[k])))
+
+
+def steps(effect: Effect) -> bool:
+    """Whether the stepper simulates an effect: errors of the log it does not."""
+    return effect.acts if isinstance(effect, JointLaw) else effect.cause in LAWS

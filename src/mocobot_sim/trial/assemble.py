@@ -42,12 +42,9 @@ def open_by(model: mujoco.MjModel, data: mujoco.MjData) -> float:
 
 
 def close(model: mujoco.MjModel, data: mujoco.MjData, dofs: Index, welds: bool = True) -> float:
-    """Close the loops with the smallest steps of some joints, and return the largest gap that remains.
+    """Close the loops with the smallest steps of some joints of one coordinate each; returns the gap that remains.
 
-    Args:
-        model, data: the team; ``data.qpos`` is changed.
-        dofs: which joints may move; each has one coordinate.
-        welds: also close the grasps, not only the rods.
+    Changes ``data.qpos``; without ``welds`` only the rods are closed, not the grasps.
     """
     at = model.jnt_qposadr[model.dof_jntid[dofs]]
     gap = np.inf

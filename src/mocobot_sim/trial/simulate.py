@@ -1,5 +1,7 @@
 """From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,9 +16,8 @@ from estimator.recording.model import Recording
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects import Effect, apply_effects
 from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.free import build_free_team, check_robots
 from mocobot_sim.scene.payload import grasp_frames, load_payload
-from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.scene.scene import TeamScene, build_free_team, build_team, check_robots
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
 from mocobot_sim.trial.trajectories import (
     Trajectory,
@@ -35,26 +36,16 @@ LEFT_RAD = 0.3
 
 @dataclass(frozen=True)
 class TrialRequest:
-    """One trial to simulate; equal requests give equal bits.
+    """One trial to simulate; equal requests give equal bits."""
 
-    Attributes:
-        payload: name of a shipped payload, or path of a payload MJCF; in a free trial the one that the robots have put
-            down.
-        trial: ``random``, ``periodic``, ``static`` or ``free``.
-        seed: seed of everything random, at least 0.
-        number: which of several trials of that kind, at least 0.
-        vias: number of vias of a random trial, and of a free one's fast part.
-        duration_s: length of a periodic trial's motion [s].
-        robots: number of robots of a free trial; None for as many as the payload has grasps.
-    """
-
+    # name of a shipped payload, or path of a payload MJCF; in a free trial the one that the robots have put down
     payload: str
-    trial: str
-    seed: int = 0
-    number: int = 0
-    vias: int = 80
-    duration_s: float = 60.0
-    robots: int | None = None
+    trial: str  # ``random``, ``periodic``, ``static`` or ``free``
+    seed: int = 0  # seed of everything random, at least 0
+    number: int = 0  # which of several trials of that kind, at least 0
+    vias: int = 80  # number of vias of a random trial, and of a free one's fast part
+    duration_s: float = 60.0  # length of a periodic trial's motion [s]
+    robots: int | None = None  # number of robots of a free trial; None for as many as the payload has grasps
 
     @property
     def label(self) -> str:
@@ -69,17 +60,11 @@ class TrialRequest:
 
 @dataclass(frozen=True)
 class Simulated:
-    """A finished trial.
+    """A finished trial."""
 
-    Attributes:
-        recordings: one per sensor preset.
-        log: what truly happened.
-        scene: the team.
-    """
-
-    recordings: dict[str, Recording]
-    log: TrialLog
-    scene: TeamScene
+    recordings: dict[str, Recording]  # one per sensor preset
+    log: TrialLog  # what truly happened
+    scene: TeamScene  # the team
 
     @cached_property
     def truth(self) -> GroundTruth:
@@ -121,6 +106,32 @@ def simulate(
         InputError: a request or preset that cannot be met.
         TrialError: the physics of the trial cannot be trusted.
     """
+    _check(request, presets, scene, units)
+    free = request.trial == FREE
+    if free:
+        scene = _free_team(request, presets[0], units)
+    elif scene is None:
+        scene = build_team(request.payload, units or draw_units(request.payload, presets[0], request.seed))
+    if effects:
+        scene = apply_effects(scene, effects)
+    trajectory = make_trajectory(request, scene, grasps)
+    number = request.number + 1 if place is None else place
+    log = run_trial(scene, trajectory, gains, progress, trial_number=number)
+    label, recordings = f"{request.label}_{request.trial}{request.number}", {}
+    for preset in presets:
+        rng, name = request.rng(f"sensors {preset.name}"), f"{label}_{preset.name}"
+        payload = None if free else request.label
+        recordings[preset.name] = measure(log, preset, rng, payload, request.seed, name)
+    return Simulated(recordings, log, scene)
+
+
+def _check(
+    request: TrialRequest,
+    presets: Sequence[SensorPreset],
+    scene: TeamScene | None,
+    units: Sequence[AsBuilt],
+) -> None:
+    """Refuse a request or preset that cannot be met."""
     if request.trial not in TRIALS:
         raise InputError(f"trial {request.trial!r} does not exist; the trials are {', '.join(TRIALS)}")
     if len({preset.spread for preset in presets}) != 1:
@@ -138,51 +149,28 @@ def simulate(
             f"preset {presets[0].name!r} draws robots of its own, but {who} how its robots deviate; "
             f"use {' or '.join(name for name, preset in PRESETS.items() if preset.calibrated)}"
         )
-    if free:
-        scene = _free_team(request, presets[0], units)
-    elif scene is None:
-        scene = build_team(request.payload, units or draw_units(request.payload, presets[0], request.seed))
-    if effects:
-        scene = apply_effects(scene, effects)
-    trajectory = make_trajectory(request, scene, grasps)
-    log = run_trial(
-        scene, trajectory, gains, progress, trial_number=request.number + 1 if place is None else place
-    )
-    recordings = {
-        preset.name: measure(
-            log,
-            preset,
-            request.rng(f"sensors {preset.name}"),
-            payload=None if free else request.label,
-            seed=request.seed,
-            name=f"{request.label}_{request.trial}{request.number}_{preset.name}",
-        )
-        for preset in presets
-    }
-    return Simulated(recordings, log, scene)
 
 
-def draw_units(payload: str, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
-    """The robots that carry a payload: as designed (empty) if the preset is calibrated, else drawn from the seed."""
-    return () if preset.calibrated else _draw(len(_grasps(payload)), preset, seed)
-
-
-def _draw(robots: int, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
+def draw_units(
+    payload: str, preset: SensorPreset, seed: int, robots: int | None = None
+) -> tuple[AsBuilt, ...]:
+    """Robots as designed (empty) if the preset is calibrated, else drawn from the seed; as many as there are grasps."""
     if preset.calibrated:
         return ()
-    return preset.spread.draw(robots, np.random.default_rng([seed, *b"units"]))
+    return preset.spread.draw(robots or _grasps(payload), np.random.default_rng([seed, *b"units"]))
 
 
-def _grasps(payload: str) -> RigidTransform:
-    return grasp_frames(load_payload(payload), payload)
+def _grasps(payload: str) -> int:
+    return len(grasp_frames(load_payload(payload), payload))
 
 
 def _free_team(request: TrialRequest, preset: SensorPreset, units: Sequence[AsBuilt]) -> TeamScene:
     """The seed's robots, which are those of its other trials, with their gimbals as somebody left them."""
-    robots = len(_grasps(request.payload)) if request.robots is None else request.robots
+    robots = _grasps(request.payload) if request.robots is None else request.robots
     check_robots(robots)
     theta = request.rng("gimbals").uniform(-LEFT_RAD, LEFT_RAD, (robots, 3))
-    return build_free_team(robots, units or _draw(robots, preset, request.seed), theta)
+    units = units or draw_units(request.payload, preset, request.seed, robots)
+    return build_free_team(robots, units, theta)
 
 
 def make_trajectory(

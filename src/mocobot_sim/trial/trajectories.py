@@ -1,13 +1,16 @@
-"""Commanded wrist positions: random vias, motion on a common sphere, static orientations, arms that hold nothing.
+"""Commanded motion of wrists and bases: random vias, a common sphere, static orientations, planar plans.
 
-Commands are sampled at the recording's rate; between them the controller follows the cubic spline through them, so
-a recording that carries its commands can be resimulated exactly.
+Commands of wrists are sampled at the recording's rate; between them the controller follows the cubic spline through
+them, so a recording that carries its commands can be resimulated exactly.
 """
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
@@ -63,10 +66,7 @@ def random_vias(
         InputError: fewer than one via, so many that the motion would last over an hour, or a transit that takes
             no time.
     """
-    if vias < 1:
-        raise InputError(f"vias is {vias}; it must be at least 1")
-    if vias * (transit_s[1] + dwell_s[1]) > LONGEST_S:
-        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+    _check_vias(vias, vias * (transit_s[1] + dwell_s[1]))
     if not min(transit_s) > 0:
         raise InputError(f"transit is {transit_s} s; it must be greater than 0")
     paths = []
@@ -75,9 +75,7 @@ def random_vias(
         transit = rng.uniform(*transit_s, vias + 1)
         dwell = rng.uniform(*dwell_s, vias + 1)
         paths.append((np.vstack([home, points, home]), transit, dwell))
-    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
-    time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
-    return Trajectory("random", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
+    return Trajectory("random", _via_paths(paths))
 
 
 def free_motion(
@@ -105,11 +103,8 @@ def free_motion(
     Raises:
         InputError: fewer than one via, or so many that the motion would last over an hour.
     """
-    if vias < 1:
-        raise InputError(f"vias is {vias}; it must be at least 1")
     holds = -(-vias // 4)
-    if holds * (slow_s[1] + hold_s) + vias * fast_s[1] > LONGEST_S:
-        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+    _check_vias(vias, holds * (slow_s[1] + hold_s) + vias * fast_s[1])
     paths = []
     for home in np.asarray(wrist_home_b):
         direction = rng.standard_normal((holds + vias, 3))
@@ -118,9 +113,21 @@ def free_motion(
         transit = np.concatenate([rng.uniform(*slow_s, holds), rng.uniform(*fast_s, vias), [slow_s[1]]])
         dwell = np.where(np.arange(holds + vias + 1) < holds, hold_s, 0.0)
         paths.append((np.vstack([home, points, home]), transit, dwell))
-    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell.sum() for _, transit, dwell in paths)
+    return Trajectory("free", _via_paths(paths))
+
+
+def _check_vias(vias: int, longest_s: float) -> None:
+    if vias < 1:
+        raise InputError(f"vias is {vias}; it must be at least 1")
+    if longest_s > LONGEST_S:
+        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+
+
+def _via_paths(paths: Sequence[tuple[Array, Array, Array]]) -> Array:
+    """Robots' points, times between them and at them; all at rest at both ends, shape (Q, N, 3)."""
+    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
-    return Trajectory("free", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
+    return np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1)
 
 
 def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: float) -> Array:
@@ -128,9 +135,8 @@ def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: f
     ref = np.tile(points[0], (len(time), 1))
     for k in range(len(transit)):
         on = time >= start
-        ref[on] = points[k] + minimum_jerk((time[on] - start) / transit[k])[:, None] * (
-            points[k + 1] - points[k]
-        )
+        share = minimum_jerk((time[on] - start) / transit[k])[:, None]
+        ref[on] = points[k] + share * (points[k + 1] - points[k])
         start += transit[k] + dwell[k]
     return ref
 
@@ -230,3 +236,140 @@ def _circumcentre(p: Array) -> Array:
         if np.linalg.norm(n) > 1e-3 * np.linalg.norm(a) * np.linalg.norm(b):
             return p[0] + (a @ a * np.cross(b, n) + b @ b * np.cross(n, a)) / (2.0 * n @ n)
     return p.mean(axis=0)
+
+
+def compose(pose: ArrayLike, of: ArrayLike) -> Array:
+    """Pose in the world of what has the pose ``of`` in the frame ``pose``; shapes (..., 3) broadcast."""
+    pose, of = np.broadcast_arrays(np.asarray(pose, dtype=float), np.asarray(of, dtype=float))
+    cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    x, y = of[..., 0], of[..., 1]
+    return pose + np.stack([cos * x - sin * y, sin * x + cos * y, of[..., 2]], axis=-1)
+
+
+def relative(frame: ArrayLike, pose: ArrayLike) -> Array:
+    """Pose of ``pose`` as seen from ``frame``, both in the world, yaw within +-pi; shapes (..., 3) broadcast."""
+    frame, pose = np.asarray(frame, dtype=float), np.asarray(pose, dtype=float)
+    away = pose - frame
+    return np.concatenate([seen_from(frame[..., 2], away[..., :2]), wrapped(away[..., 2:])], axis=-1)
+
+
+def seen_from(yaw: ArrayLike, vector: ArrayLike) -> Array:
+    """Vectors (x, y) in the axes of frames that are turned by ``yaw`` [rad]; shapes (...), (..., 2) -> (..., 2)."""
+    x, y = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
+
+
+def wrapped(angle: ArrayLike) -> Array:
+    """The same angle within +-pi [rad]."""
+    return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def moved(pose: ArrayLike, step: ArrayLike) -> Array:
+    """Pose (..., 3) after a constant body twist has acted for a while: odometry (Modern Robotics, section 13.4).
+
+    ``step`` is the twist times the time (turn [rad], along x, along y [m]), shape (..., 3).
+    """
+    pose, step = np.broadcast_arrays(np.asarray(pose, dtype=float), np.asarray(step, dtype=float))
+    turn, x, y = step[..., 0], step[..., 1], step[..., 2]
+    # The chord of an arc is turned by half the arc's angle and shorter by the sinc of that.
+    shorter = np.sinc(turn / (2.0 * np.pi))
+    heading = pose[..., 2] + 0.5 * turn
+    cos, sin = np.cos(heading), np.sin(heading)
+    return pose + np.stack([shorter * (cos * x - sin * y), shorter * (sin * x + cos * y), turn], axis=-1)
+
+
+def yaw_of(R: ArrayLike) -> Array:
+    """Yaw of rotations near level [rad], shape (..., 3, 3) -> (...): the heading of their x axis."""
+    R = np.asarray(R, dtype=float)
+    return np.arctan2(R[..., 1, 0], R[..., 0, 0])
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One straight piece of a plan; the frame starts and ends it at rest, with minimum jerk.
+
+    Attributes:
+        to: pose at its end in the world: x, y [m], yaw [rad].
+        duration_s: time to get there, greater than 0 [s].
+        rest_s: time at rest there [s].
+    """
+
+    to: tuple[float, float, float]
+    duration_s: float
+    rest_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlanarMotion:
+    """Where frames are meant to be at every tick; N frames.
+
+    Attributes:
+        rate_hz: ticks per second [Hz].
+        pose: x, y [m], yaw [rad] in the world, shape (T, N, 3).
+        twist: w_z [rad/s], v_x, v_y [m/s] in each frame, shape (T, N, 3).
+    """
+
+    rate_hz: float
+    pose: Array
+    twist: Array
+
+    @property
+    def duration_s(self) -> float:
+        """From the first tick to the last [s]."""
+        return (len(self.pose) - 1) / self.rate_hz
+
+
+def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 1000.0) -> PlanarMotion:
+    """Motion of one frame along straight legs.
+
+    Args:
+        start: pose at the beginning: x, y [m], yaw [rad].
+        legs: what to do, one after the other; yaw is not wrapped, so 2 pi is a full turn.
+        rest_s: time at rest before the first leg [s].
+        rate_hz: ticks per second [Hz].
+
+    Raises:
+        InputError: there is no leg, a number is not finite, a duration is not positive or the whole lasts over an hour.
+    """
+    if not legs:
+        raise InputError("a plan has no legs; it needs at least one")
+    poses = [np.asarray(pose, dtype=float) for pose in (start, *(leg.to for leg in legs))]
+    if not all(pose.shape == (3,) and np.isfinite(pose).all() for pose in poses):
+        raise InputError("a plan's poses are not x, y and yaw, all finite; they must be")
+    stations = np.array(poses)
+    times = np.array([[leg.duration_s, leg.rest_s] for leg in legs], dtype=float)
+    if not (times[:, 0] > 0).all() or not (times[:, 1] >= 0).all() or not rest_s >= 0:
+        raise InputError("a leg must last longer than 0 s and a rest 0 s or more")
+    duration = rest_s + times.sum()
+    if not duration <= LONGEST_S:
+        raise InputError(f"the plan lasts {duration:g} s; it may last {LONGEST_S:g} s at most")
+    time = np.arange(round(duration * rate_hz) + 1) / rate_hz
+    pose, rate = np.tile(stations[0], (len(time), 1)), np.zeros((len(time), 3))
+    begin = rest_s
+    for k, leg in enumerate(legs):
+        s = (time - begin) / leg.duration_s
+        on = s > 0
+        step = stations[k + 1] - stations[k]
+        pose[on] = stations[k] + minimum_jerk(s[on])[:, None] * step
+        within = np.clip(s[on], 0.0, 1.0)
+        rate[on] = (30.0 * within**2 * (1.0 - within) ** 2 / leg.duration_s)[:, None] * step
+        begin += leg.duration_s + leg.rest_s
+    twist = np.column_stack([rate[:, 2], seen_from(pose[:, 2], rate[:, :2])])
+    return PlanarMotion(rate_hz, pose[:, None], twist[:, None])
+
+
+def carried(motion: PlanarMotion, places: ArrayLike) -> PlanarMotion:
+    """Motion of N frames that are fixed to a moving one: what bases do that stay put under a moving payload.
+
+    ``places`` is where they are in the world at the beginning: x, y [m], yaw [rad], shape (N, 3).
+    """
+    lead, twist = motion.pose[:, 0], motion.twist[:, 0]
+    held = relative(lead[0], np.asarray(places, dtype=float))  # poses in the moving frame, (N, 3)
+    pose = compose(lead[:, None], held[None])
+    # Velocity of the held origins in the moving frame, turned into their own axes.
+    x, y, yaw = held.T
+    turn, v_x, v_y = (part[:, None] for part in twist.T)
+    velocity = seen_from(yaw, np.stack([v_x - turn * y, v_y + turn * x], axis=-1))
+    turns = np.broadcast_to(turn[..., None], (*velocity.shape[:2], 1))
+    return PlanarMotion(motion.rate_hz, pose, np.concatenate([turns, velocity], axis=-1))

@@ -11,50 +11,40 @@ from scipy.interpolate import CubicSpline
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_sim.control.control import ControlGains, TeamController
-from mocobot_sim.control.stability import control_stability
-from mocobot_sim.scene.applied import Pushing
+from mocobot_sim.control.control import ControlGains, TeamController, control_stability
+from mocobot_sim.effects.payload import PayloadMass, Push
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.actors import Acting, Actor, Loading, Reader, Stage
+from mocobot_sim.trial.actors import Actor, Reader, Stage
 from mocobot_sim.trial.assemble import assemble_at_home
-from mocobot_sim.trial.rows import Rows
-from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_sim.trial.trial_log import Rows, SensedLog, TrialLog
 
 
 @dataclass(frozen=True)
-class Others:
-    """Actors, sensors that misread, and pushes of one trial.
+class _Others:
+    """Actors, sensors that misread, and pushes of one trial."""
 
-    Attributes:
-        actors, readers, pushes: each in the order in which it acts.
-        carries: whether there is a payload to act on.
-        R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
-    """
-
-    actors: tuple[Actor, ...]
-    readers: tuple[Reader, ...]
-    pushes: tuple[Pushing, ...]
-    carries: bool
-    R_Wb1: Array
+    actors: tuple[Actor, ...]  # each in the order in which it acts
+    readers: tuple[Reader, ...]  # each in the order in which it acts
+    pushes: tuple[Push, ...]  # each in the order in which it acts
+    carries: bool  # whether there is a payload to act on
+    R_Wb1: Array  # axes of robot 1's {b} in the world, shape (3, 3)
 
     @classmethod
-    def of(cls, scene: TeamScene, trial_number: int | None, actors: Sequence[Actor]) -> Others:
+    def of(cls, scene: TeamScene, trial_number: int | None, actors: Sequence[Actor]) -> _Others:
         """``actors``, and after them what the scene's effects bring to a trial."""
-        acting = [effect for effect in scene.effects if isinstance(effect, Acting)]
+        pushes = (effect for effect in scene.effects if isinstance(effect, Push))
         return cls(
-            (*actors, *(actor for effect in acting for actor in effect.actors(trial_number))),
-            tuple(reader for effect in acting for reader in effect.readers(trial_number)),
-            tuple(push for push in scene.pushes if trial_number in (None, push.trial)),
+            (*actors, *(actor for effect in scene.effects for actor in effect.actors(trial_number))),
+            tuple(reader for effect in scene.effects for reader in effect.readers(trial_number)),
+            tuple(push for push in pushes if trial_number in (None, push.trial)),
             scene.carries,
             scene.mounts.rotation[0].as_matrix(),
         )
 
     def __bool__(self) -> bool:
-        """Whether there are any."""
         return bool(self.actors or self.readers or self.pushes)
 
     def start(self, stage: Stage) -> None:
@@ -124,7 +114,7 @@ def run_trial(
     index = TeamIndex.of(model, scene.carries)
     design = omnid_design()
     for effect in scene.effects:
-        if isinstance(effect, Loading):
+        if isinstance(effect, PayloadMass):
             effect.load(model, index, trial_number)
     assemble_at_home(scene, model, data, index)
     ticks = _whole("control rate over recording rate", gains.rate_hz / RATE_HZ)
@@ -135,7 +125,7 @@ def run_trial(
     parked = not actors and not index.base_dof.size
     stability = control_stability(scene, model, data, gains, trajectory.ref_b[0]) if parked else None
     sensed = np.empty((len(commands), index.robots, 3, 3))
-    others = Others.of(scene, trial_number, actors)
+    others = _Others.of(scene, trial_number, actors)
     seen = data.qpos.copy() if others.readers else data.qpos
     controller = TeamController(
         index, design, gains, data, scene.units, scene.sensors, feed_forward, commands, sensed, seen
@@ -186,12 +176,8 @@ def between_commands(ref_b: Array, ticks: int) -> tuple[Array, Array]:
     Straight lines between commands would jump in velocity at every sample; the ripple this causes is locked to
     the sampling, so it does not average out but aliases into the torques (up to 0.12 % on inertia).
 
-    Args:
-        ref_b: commands at ``RATE_HZ`` [m], shape (Q, N, 3).
-        ticks: control ticks per command.
-
     Returns:
-        Positions [m] and rates [m/s], shape (Q * ticks, N, 3); the last command is held.
+        Positions [m] and rates [m/s] at ``ticks`` per command, shape (Q * ticks, N, 3); the last command is held.
     """
     times = np.arange(len(ref_b)) / RATE_HZ
     spline = CubicSpline(times, ref_b, bc_type="clamped")

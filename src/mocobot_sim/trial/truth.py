@@ -11,14 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
 from estimator.files import write_json
-from mocobot_sim.control.stability import Stability
-from mocobot_sim.effects import effect_to_dict
-from mocobot_sim.scene.applied import Applied
+from mocobot_sim.control.control import Stability
+from mocobot_sim.effects import Effect, effect_to_dict
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.models import posed
+from mocobot_sim.scene.models import truth_path as truth_path
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.sidecar import truth_path as truth_path
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class GroundTruth:
     R_1c: Array
     principal_kgm2: Array
     units: tuple[AsBuilt, ...]
-    effects: tuple[Applied, ...] = ()
+    effects: tuple[Effect, ...] = ()
     control: Stability | None = None
 
     @classmethod
@@ -80,7 +79,7 @@ class GroundTruth:
     def to_dict(self) -> dict[str, Any]:
         """JSON-able form, units in the keys; orientations as rotation vectors in degrees.
 
-        Of robots that hold nothing it has ``as_built``, ``effects`` and ``control`` only.
+        Robots that hold nothing have ``as_built``, ``effects`` and ``control`` only.
         """
         payload = {
             "grasps": [

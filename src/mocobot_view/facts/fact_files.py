@@ -10,8 +10,7 @@ from estimator.arm.unit import seen_by_encoders
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.strict import Fields, read_json
-from mocobot_sim.scene.as_built import theta_x_zeros
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.scene.as_built import read_units, theta_x_zeros
 from mocobot_sim.trial.truth import truth_path
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps

@@ -11,7 +11,7 @@ from discrepancy.formulas.formula import Curve, Formula, Kind, formula_of
 from discrepancy.formulas.law import Law, Of
 from discrepancy.formulas.terms import KNOTS
 from estimator.arrays import Array
-from mocobot_sim.laws.functions import FUNCTIONS, Inside
+from mocobot_sim.functions import FUNCTIONS, Inside
 
 SAMPLES, ROWS, TERMS, PRIOR = 4000, 1600, 7, 25.0
 LOUD = 0.03

@@ -32,9 +32,9 @@ from discrepancy.joints.signals import Signals
 from discrepancy.joints.values import absolute, physical
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
+from mocobot_sim.serial.effects import ActingLaw, JointLaw
 from mocobot_sim.serial.extended import load_effects, step
 from mocobot_sim.serial.extended import write_extended as write_laws
-from mocobot_sim.serial.law import ActingLaw, JointLaw
 
 ARM = """<mujoco><compiler angle="radian"/><option timestep="1e-5" integrator="implicitfast"/><worldbody>
 <body name="one" pos="0 0 0.3"><joint name="turn" axis="0 0 1" armature="0.02" frictionloss="0.6" damping="0.4"/>

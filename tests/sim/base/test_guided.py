@@ -10,9 +10,19 @@ from scipy.spatial.transform import Rotation
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.control.control import ControlGains, TeamController
-from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
-from mocobot_sim.guided.hand import Grip, GuidingHand, HandLog, Move, PushingHand, hand_path
-from mocobot_sim.guided.weight import Payload, up_in_payload, weight_shares
+from mocobot_sim.guided import (
+    FLOAT_GAINS,
+    FloatArms,
+    Grip,
+    GuidingHand,
+    HandLog,
+    Move,
+    Payload,
+    PushingHand,
+    hand_path,
+    up_in_payload,
+    weight_shares,
+)
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.scene.team_index import TeamIndex

@@ -1,7 +1,10 @@
-"""A formula at a place: its functions against closed forms, its trace in a trial against what it says."""
+"""Formulas at a place of a team, and at a joint of a serial robot."""
+
+from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +13,13 @@ from effect_cases import one_robot, team_with
 from estimator.arm.delta import forward_kinematics, jacobian
 from estimator.errors import InputError
 from mocobot_sim.effects import apply_effects, effect_from_dict, effect_to_dict
+from mocobot_sim.effects.catalogue import parse_effect
 from mocobot_sim.effects.law import Law
-from mocobot_sim.effects.spec import parse_effect
 from mocobot_sim.extended.extended import load_extended, write_extended
-from mocobot_sim.laws.functions import FUNCTIONS
+from mocobot_sim.functions import FUNCTIONS
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team
+from mocobot_sim.serial.effects import ActingLaw, JointLaw, State
 from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import Trajectory, random_vias
 from mocobot_sim.trial.trial import run_trial
@@ -246,3 +250,40 @@ def test_a_robot_that_is_not_there_is_refused(target):
 def test_every_function_that_is_named_runs():
     for name in FUNCTIONS:
         assert np.isfinite(values_of([0.1, 0.2, 0.3], name, 1.0, 1.0)).all()
+
+
+STATE = State(
+    3.0, 1e-3, np.array([0.1, 0.2]), np.array([0.0, -0.5]), np.zeros(2), np.zeros(2), np.array([4.0, 0.0])
+)
+
+
+def test_laws_of_other_signals() -> None:
+    """Cross-talk, and friction that goes with the place, by hand."""
+    crossed = JointLaw("torque_2", "linear", "torque_1", 0.05)
+    assert ActingLaw(crossed).torque(STATE) == pytest.approx(0.2)
+    tight = JointLaw("torque_2", "sine", "q_2", 0.3, 2.0, 0.0, 0.1, "direction_2")
+    assert ActingLaw(tight).torque(STATE) == pytest.approx(-0.3 * np.sin(0.5), rel=1e-6)
+
+
+def test_a_law_remembers_within_a_run() -> None:
+    """A play of 0.05 rad half width: pushed against one side, it stays behind by its half width."""
+    acting = ActingLaw(JointLaw("torque_1", "play", "q_1", 2.0, 0.05))
+    out = [acting.torque(replace(STATE, q=np.array([x, 0.0]))) for x in (0.0, 0.03, 0.2, 0.19)]
+    assert out == pytest.approx([0.0, -1.2, -2.0, -1.6])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"target": "elbow"}, "target is 'elbow'"),
+        ({"function": "power"}, "function is 'power'"),
+        ({"of": "phi_2_1"}, "of is 'phi_2_1'"),
+        ({"times": "q"}, "times is 'q'"),
+        ({"function": "lag", "number": 0.0}, "number is 0.0"),
+    ],
+)
+def test_laws_that_are_none(values: dict[str, object], message: str) -> None:
+    good = JointLaw("torque_1", "linear", "q_1", 1.0).to_dict()
+    assert JointLaw.of_dict(good, "effects.json").of == "q_1"
+    with pytest.raises(InputError, match=message):
+        JointLaw.of_dict(good | values, "effects.json")

@@ -1,30 +1,58 @@
-"""The paper's experiment end to end: the errors it must reach, the JSON it writes, the tables it prints."""
+"""The paper's experiment end to end: errors, files, tables, progress, and outcomes of an interrupted run."""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+import pickle
+import time
+import zipfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace as Namespace
+from typing import Any
 
 import numpy as np
 import pytest
+from joblib import Parallel, delayed
 
-from estimator.calibrate.calibration import Calibration
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arrays import Array
+from estimator.calibrate.calibration import CalibratedTrial, Calibration
 from estimator.calibrate.json import calibration_from_dict
+from estimator.calibrate.prior import Prior
+from estimator.errors import InputError
+from estimator.estimate.identifiability import StepReport, WeakDirection
+from estimator.estimate.result import PayloadEstimate, RecordingEstimate
+from estimator.estimate.statics import MassEstimate
+from estimator.leftover.leftover import Leftover
+from estimator.rigid_team.residual import Bases
 from mocobot.cli import main
 from mocobot_sim.paper import experiment
-from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
-from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER, fit_trials, three_trials
-from mocobot_sim.paper.published import payload_truth, published_errors
-from mocobot_sim.paper.scoring import score_fit
-from mocobot_sim.paper.tables import BY_ENCODERS, summary_table
-from mocobot_sim.paper.text import format_tables
-from mocobot_sim.trial.sensors import SensorPreset, sensor_preset
-from mocobot_sim.trial.simulate import TrialRequest, draw_units
+from mocobot_sim.paper import store as shares_module
+from mocobot_sim.paper.experiment import (
+    ONE_FIT,
+    SELF_CALIBRATED,
+    TRANSFER,
+    PaperPlan,
+    PaperResult,
+    TrialSummary,
+    fit_trials,
+    run_paper,
+    three_trials,
+)
+from mocobot_sim.paper.scoring import payload_truth, published_errors, score_fit
+from mocobot_sim.paper.store import Store, shares
+from mocobot_sim.paper.tables import BY_ENCODERS, format_tables, summary_table
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.trial.sensors import SensorPreset, measure, sensor_preset
+from mocobot_sim.trial.simulate import Simulated, TrialRequest, draw_units
+from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_sim.trial.truth import GroundTruth
+from recordings import metadata, small_recording
 
 PAYLOADS = ("a", "b", "c", "d")
 PAIRS = ("12", "23", "31")
@@ -376,3 +404,129 @@ def test_fits_stand_beside_their_presets(monkeypatch: pytest.MonkeyPatch) -> Non
     stages = list(dict.fromkeys(stage for _, _, stage in told))
     assert stages == ["random trials", "grasps", "other trials", "estimates", "calibrations", "transfer"]
     assert told[-1][:2] == (plan.steps, plan.steps)
+
+
+def _work(share: Array, amount: float) -> None:
+    share[0] = amount
+
+
+@pytest.mark.slow
+def test_other_processes_fill_shares() -> None:
+    told: list[float] = []
+    with shares(3, told.append) as done, Parallel(n_jobs=2) as pool:
+        assert set(told) == {0.0}
+        pool(delayed(_work)(done[k : k + 1], amount) for k, amount in enumerate((0.25, 0.5, 1.0)))
+    assert told[-1] == 1.75
+
+
+def test_parts_of_trials_count(
+    monkeypatch: pytest.MonkeyPatch, random_a: TrialLog, team_a: TeamScene
+) -> None:
+    """Trials that take four looks each, one of which is the end."""
+    looks = 0.02
+    monkeypatch.setattr(shares_module, "EVERY_S", looks)
+    recording = measure(random_a, sensor_preset("ideal"), np.random.default_rng(0), name="rec")
+
+    def simulate(*_: object, progress: Callable[[int, int], object]) -> Simulated:
+        for quarter in range(5):
+            progress(100 * quarter, 400)
+            time.sleep(3.0 * looks)
+        return Simulated({"ideal": recording}, random_a, GroundTruth.of(team_a))
+
+    monkeypatch.setattr(experiment, "simulate", simulate)
+    monkeypatch.setattr(experiment, "estimate_both", lambda *_: (None, None))
+    monkeypatch.setattr(experiment, "score", lambda *_: {})
+    plan = PaperPlan(payloads=("a",), presets=("ideal",), trials=2)
+    told: list[tuple[float, float, str]] = []
+    run_paper(plan, progress=lambda *now: told.append(now))
+    done = [now for now, _, _ in told]
+    assert done == sorted(done)
+    assert (done[0], done[-1]) == (0.0, plan.steps)
+    assert {steps for _, steps, _ in told} == {plan.steps}
+    stages = list(dict.fromkeys(stage for _, _, stage in told))
+    assert stages == ["random trials", "grasps", "other trials", "estimates"]
+    assert {0.25, 0.5, 0.75, 1.25, 3.5} < set(done)
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two outcomes are alike, bit by bit."""
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes("A") == b.tobytes("A")
+    if is_dataclass(a):
+        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, dict):
+        return list(a) == list(b) and all(same(a[key], b[key]) for key in a)
+    if isinstance(a, tuple | list):
+        return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
+    return type(a) is type(b) and (a == b or (a != a and b != b))
+
+
+def outcomes() -> list[Any]:
+    rng = np.random.default_rng(1)
+    recording = small_recording(rows=600)
+    units = ArmUnit(metadata().design, rng.standard_normal((3, COUNT)))
+    bases = Bases(np.asfortranarray(rng.standard_normal((3, 3))), rng.standard_normal((3, 3)))
+    trial = CalibratedTrial(
+        "b", "static", 0, 1.5, (3, 4), None, (0.1, np.inf), (np.nan, 1e-300), bases, {"tilt": 0.1}
+    )
+    calibration = Calibration(
+        units, rng.standard_normal((9, 9)), rng.standard_normal((3, COUNT)), 0.0, Prior(), (), (trial,), ("a",), 4, (),
+        ("x",),
+    )  # fmt: skip
+    weak = WeakDirection("mass", "m", (0.1, 0.2), "why")
+    estimate = PayloadEstimate(
+        None, 3, "staged", None, MassEstimate(np.float64(0.1) * 3, 0.2, 0.3), rng.standard_normal(3), None, None,
+        (StepReport("mass", ("m",), "kg", (1.0, 0.0), 0.1, (weak,)),),
+        (RecordingEstimate("a", "static", 1.0, 2, leftovers=(Leftover("force", "N", 0.1, 0.2),)),), ("flag",),
+    )  # fmt: skip
+    return [
+        1.5, None, (rng.standard_normal((2, 3)), np.zeros((2, 3, 3), order="F")),
+        ({"ideal": recording}, TrialSummary("a", 0.1, 0.2, 1e-17, 0.3, -0.0, None)), calibration,
+        (estimate, None),
+    ]  # fmt: skip
+
+
+def test_every_bit_comes_back(tmp_path: Path) -> None:
+    store = Store(tmp_path, "key", force=False)
+    for k, outcome in enumerate(outcomes()):
+        store.put("some stage", k, outcome)
+        assert store.has("some stage", k)
+        assert same(Store(tmp_path, "key", force=False).get("some stage", k), outcome), outcome
+
+
+class Evil:
+    """Unpickling it makes a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (Path.touch, (self.path,))
+
+
+def spoiled(folder: Path) -> dict[str, bytes]:
+    evil, inside = pickle.dumps(Evil(folder / "executed")), io.BytesIO()
+    np.savez(inside, facts=np.array([Evil(folder / "executed")], dtype=object))
+    other, packed = io.BytesIO(), io.BytesIO()
+    np.savez(other, facts=np.frombuffer(b'{"Popen": {"args": "true"}}', np.uint8))
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("facts.npy", bytes(1000))
+    return {
+        "a pickle": evil, "a pickle in an array": inside.getvalue(), "another class": other.getvalue(),
+        "an unlimited packing": packed.getvalue(), "nothing": b"",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "what", ["a pickle", "a pickle in an array", "another class", "an unlimited packing", "nothing"]
+)
+def test_a_file_of_somebody_else_is_refused(tmp_path: Path, what: str) -> None:
+    store = Store(tmp_path / "out", "key", force=False)
+    store.put("stage", 0, 1.5)
+    (file,) = store.folder.iterdir()
+    file.write_bytes(spoiled(tmp_path)[what])
+    with pytest.raises(InputError) as caught:
+        store.get("stage", 0)
+    assert str(caught.value).startswith(f"{file}: ")
+    assert ("is not packed as numpy does it" in str(caught.value)) == (what == "an unlimited packing")
+    assert not (tmp_path / "executed").exists()

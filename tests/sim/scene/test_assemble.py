@@ -8,7 +8,7 @@ import pytest
 
 from closed_loop import ClosedLoop, in_world
 from estimator.errors import InputError
-from mocobot_sim.control.kernel import wrist
+from mocobot_sim.kernels import wrist
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team

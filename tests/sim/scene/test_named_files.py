@@ -12,8 +12,8 @@ import pytest
 from discrepancy.joints.model import load_spec
 from estimator.errors import InputError
 from mocobot_sim.extended.extended import load_extended, write_extended
+from mocobot_sim.model_check import check_named
 from mocobot_sim.scene.models import payload_path
-from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.scene.payload import load_payload
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.serial import extended as serial

@@ -1,6 +1,7 @@
-"""The composed team, read back from the compiled MuJoCo model."""
+"""The composed team and its ground truth, read back from the compiled MuJoCo model."""
 
 import dataclasses
+import json
 import os
 import subprocess
 import sys
@@ -9,14 +10,17 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from closed_loop import BASE_HEIGHT_M, ClosedLoop
 from estimator.errors import InputError
+from mocobot_sim.paper.scoring import payload_truth
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
-from mocobot_sim.scene.models import omnid_design, payload_names, payload_path
+from mocobot_sim.scene.models import omnid_design, payload_path
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.team_index import TeamIndex
-from payload_mjcf import FIVE, ONE, TEAMS, TWO, Grasp, Payload
+from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
+from payload_mjcf import FIVE, ONE, TEAMS, TWO
 
 OMNID_XML = Path(__file__).parents[3] / "models" / "omnid" / "omnid.xml"
 SHIPPED = ("a", "b", "c", "d")
@@ -35,10 +39,6 @@ def _state(model: mujoco.MjModel) -> mujoco.MjData:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return data
-
-
-def test_four_payloads_are_shipped():
-    assert payload_names() == list(SHIPPED)
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
@@ -120,11 +120,6 @@ def test_every_equality_is_stiff(teams):
     assert model.neq == 19
     np.testing.assert_array_equal(model.eq_solref, np.tile([0.004, 1.0], (19, 1)))
     np.testing.assert_array_equal(model.eq_solimp[:, :2], 0.9999)
-
-
-def test_timestep_is_a_choice():
-    assert build_team("a").compile().opt.timestep == 0.001
-    assert build_team("a", timestep_s=0.0005).compile().opt.timestep == 0.0005
 
 
 def _lengths(model: mujoco.MjModel, robot: int) -> dict[str, np.ndarray]:
@@ -369,11 +364,83 @@ def test_tilted_and_turned_grasps_compile_from_any_orientation_attribute(tmp_pat
     np.testing.assert_allclose(scene.X_1i[1].rotation.as_matrix(), Rx @ Ry @ Rz, rtol=0, atol=1e-12)
 
 
-def test_payload_file_helper_is_what_it_says(tmp_path):
-    """The tests' own payloads: mass, centre of mass and tilt as MuJoCo reads them."""
-    payload = Payload((Grasp(), Grasp((1, 0, 0), (90, 0, 0))), 2.0, (0.1, 0.2, 0.3))
-    model = mujoco.MjModel.from_xml_path(str(payload.write(tmp_path)))
-    assert model.body("payload").mass[0] == 2.0
-    np.testing.assert_array_equal(model.body("payload").ipos, [0.1, 0.2, 0.3])
-    np.testing.assert_allclose(model.site("grasp2").quat, [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-15)
-    assert len(FIVE.grasps) == 5
+EACH = pytest.mark.parametrize("name", list("abcd"))
+
+
+@pytest.fixture(scope="module")
+def truths() -> dict[str, GroundTruth]:
+    return {name: GroundTruth.of(build_team(name)) for name in "abcd"}
+
+
+@EACH
+def test_the_truth_is_table_one(truths, name):
+    truth, printed = truths[name], payload_truth(name)
+    np.testing.assert_allclose(truth.R_1i, printed.R_1i, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(truth.p_1i, printed.p_1i, rtol=0, atol=1e-12)
+    assert truth.mass_kg == printed.mass
+    np.testing.assert_allclose(truth.p_1c, printed.p_1c, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(truth.principal_kgm2, printed.principal_moments, rtol=1e-12)
+    np.testing.assert_allclose(truth.R_1c, printed.R_1c, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.det(truth.R_1c), 1.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "moments", [(0.08, 0.05, 0.06), (0.06, 0.08, 0.05), (0.05, 0.08, 0.06), (0.08, 0.06, 0.05)]
+)
+def test_moments_come_ascending_with_their_axes(tmp_path, moments):
+    payload = dataclasses.replace(ONE, inertia_kgm2=moments)
+    truth = GroundTruth.of(build_team(payload.write(tmp_path)))
+    np.testing.assert_allclose(truth.principal_kgm2, (0.05, 0.06, 0.08), rtol=1e-12)
+    assert abs(np.linalg.det(truth.R_1c) - 1) < 1e-12
+    whole = truth.R_1c @ np.diag(truth.principal_kgm2) @ truth.R_1c.T
+    np.testing.assert_allclose(whole, np.diag(moments), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5])
+def test_any_number_of_grasps(teams, robots):
+    truth = GroundTruth.of(teams[robots])
+    payload = TEAMS[robots]
+    np.testing.assert_allclose(truth.p_1i, [grasp.position for grasp in payload.grasps], rtol=0, atol=1e-12)
+    R_1i = [grasp.pose().rotation.as_matrix() for grasp in payload.grasps]
+    np.testing.assert_allclose(truth.R_1i, R_1i, rtol=0, atol=1e-12)
+    assert truth.mass_kg == payload.mass_kg
+    np.testing.assert_allclose(truth.p_1c, payload.com_m, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(truth.principal_kgm2, payload.inertia_kgm2, rtol=1e-12)
+
+
+def test_as_built_robots_carry_the_same_payload(truths):
+    units = CalibrationSpread(0.02, 0.02, 1e-3, 0.02).draw(3, np.random.default_rng(0))
+    other = GroundTruth.of(build_team("d", units))
+    assert other.units == units
+    for entry in dataclasses.fields(GroundTruth)[:-3]:
+        np.testing.assert_allclose(
+            getattr(other, entry.name), getattr(truths["d"], entry.name), rtol=0, atol=1e-12
+        )
+
+
+def test_sidecar_holds_the_truth_in_plain_json(tmp_path):
+    units = CalibrationSpread(0.02, 0.02, 1e-3, 0.02).draw(5, np.random.default_rng(0))
+    truth = GroundTruth.of(build_team(FIVE.write(tmp_path), units))
+    recording = tmp_path / "rec.parquet"
+    write_truth(truth, recording)
+    assert truth_path(recording) == tmp_path / "rec.truth.json"
+    values = json.loads((tmp_path / "rec.truth.json").read_text(encoding="utf-8"))
+    assert values["mass_kg"] == 16.0
+    np.testing.assert_allclose(values["p_1c_m"], FIVE.com_m, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(values["principal_inertia_kgm2"], FIVE.inertia_kgm2, rtol=1e-12)
+    np.testing.assert_allclose(values["R_1c_rotvec_deg"], 0, atol=1e-9)
+    assert len(values["grasps"]) == 5
+    for entry, grasp in zip(values["grasps"], FIVE.grasps, strict=True):
+        np.testing.assert_allclose(entry["p_1i_m"], grasp.position, rtol=0, atol=1e-12)
+        turn = Rotation.from_rotvec(entry["R_1i_rotvec_deg"], degrees=True)
+        assert (turn.inv() * grasp.pose().rotation).magnitude() < 1e-12
+    assert len(values["as_built"]) == 5
+    for entry, unit in zip(values["as_built"], units, strict=True):
+        assert entry == {f.name: np.asarray(getattr(unit, f.name)).tolist() for f in dataclasses.fields(unit)}
+
+
+def test_sidecar_that_cannot_be_written_is_refused(tmp_path, truths):
+    (tmp_path / "rec.truth.json").mkdir()
+    with pytest.raises(InputError, match=r"rec\.truth\.json: cannot be written"):
+        write_truth(truths["a"], tmp_path / "rec.parquet")
+    assert [path.name for path in tmp_path.iterdir()] == ["rec.truth.json"]

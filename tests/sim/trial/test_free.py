@@ -16,10 +16,10 @@ from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.errors import InputError
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.effects import EFFECTS, apply_effects
-from mocobot_sim.guided.hand import PushingHand
+from mocobot_sim.guided import PushingHand
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
-from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import build_free_team
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home, close
 from mocobot_sim.trial.resimulate import resimulate

@@ -1,4 +1,6 @@
-"""A person's hands on the payload: a spring-damper that moves along a path, or a force that is given."""
+"""A person guides the payload by hand; the arms carry its weight and are otherwise soft."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,10 +10,143 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from estimator.arm import gimbal
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.estimate.result import PayloadEstimate
+from mocobot_sim.control.control import ControlGains
+from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import minimum_jerk
+from mocobot_sim.trial.truth import GroundTruth
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What is believed of a payload.
+
+    Attributes:
+        mass_kg: mass; 0 if its weight is not to be carried.
+        p_1c: centre of mass in {1} [m], shape (3,).
+        p_1i: grasps in {1} [m], shape (N, 3).
+        R_1i: grasp orientations in {1}, shape (N, 3, 3).
+    """
+
+    mass_kg: float
+    p_1c: Array
+    p_1i: Array
+    R_1i: Array
+
+    @classmethod
+    def of_estimate(cls, estimate: PayloadEstimate) -> Payload:
+        """What an estimate says.
+
+        Raises:
+            InputError: it does not determine grasps, mass and centre of mass.
+        """
+        if estimate.grasps is None or estimate.mass is None or estimate.p_1c is None:
+            known = {"grasps": estimate.grasps, "mass": estimate.mass, "centre of mass": estimate.p_1c}
+            missing = ", ".join(name for name, value in known.items() if value is None)
+            raise InputError(f"the estimate has no {missing}; carrying a payload's weight needs it")
+        return cls(estimate.mass.mass, estimate.p_1c, estimate.grasps.p_1i, estimate.grasps.R_1i)
+
+    @classmethod
+    def of_truth(cls, truth: GroundTruth) -> Payload:
+        """What is so."""
+        return cls(truth.mass_kg, truth.p_1c, truth.p_1i, truth.R_1i)
+
+
+def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Array:
+    """Upward forces at the grasps that carry the payload's weight without turning it [N], shape (N,).
+
+    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique,
+    with more the smallest are taken; with one or two a moment stays that cannot be balanced. ``up_1`` is the direction
+    away from the ground in {1}, unit length, shape (3,).
+    """
+    up = np.asarray(up_1, dtype=float)
+    arms = payload.p_1i - payload.p_1c
+    # Forces along ``up`` balance only the moment across it: two directions.
+    across = np.linalg.svd(up[None])[2][1:]
+    scale = max(np.linalg.norm(arms, axis=1).max(), 1e-9)
+    rows = np.vstack([np.ones(len(arms)), across @ np.cross(arms, up).T / scale])
+    shares = np.linalg.lstsq(rows, np.array([payload.mass_kg * gravity_mps2, 0.0, 0.0]))[0]
+    return np.asarray(shares, dtype=np.float64)
+
+
+def up_in_payload(theta: Array, R_1i: Array) -> Array:
+    """Up, in {1}, as a level robot sees it through its own gimbal, shape (..., 3).
+
+    ``theta`` are its gimbal angles (z, y, x) [rad], shape (..., 3), ``R_1i`` its grasp's orientation, (..., 3, 3).
+    """
+    up_i = gimbal.rotation(theta)[..., 2, :]  # the third row of R_bi is z of {b} in {i}
+    return (R_1i @ up_i[..., None])[..., 0]
+
+
+# No stiffness. The SEA torque loop lags behind the changing lever arms, which takes about 1.4 N s/m of damping away
+# per arm (measured with payload (a)); a little more than that brings a payload that nobody holds to rest.
+FLOAT_GAINS = ControlGains(stiffness_N_per_m=0.0, damping_Ns_per_m=2.0)
+
+
+class FloatArms:
+    """Sets every arm's feed-forward force to its share of the weight, at the payload's present tilt.
+
+    A trial starts at rest with the payload held. From ``start_s`` on, within ``fade_s``, the forces that hold it then
+    give way to those that ``payload`` asks for; the gains do not change (``FLOAT_GAINS``, or softer arms' own).
+
+    Args:
+        payload: whose weight the robots believe they carry, or None for the forces that they start with, for ever.
+        as_built: sensor zeros of every unit; empty for robots as designed.
+        start_s, fade_s: when and how fast [s].
+    """
+
+    def __init__(
+        self,
+        payload: Payload | None,
+        as_built: Sequence[AsBuilt] = (),
+        start_s: float = 0.2,
+        fade_s: float = 1.5,
+    ) -> None:
+        if not start_s > 0 or not fade_s > 0:
+            raise InputError(f"start_s is {start_s} and fade_s {fade_s}; both must be greater than 0")
+        self._payload, self._as_built = payload, as_built
+        self._start_s, self._fade_s = start_s, fade_s
+
+    def start(self, stage: Stage) -> None:
+        """Get ready.
+
+        Raises:
+            InputError: the payload has another number of grasps than there are robots.
+        """
+        robots = stage.index.robots
+        if self._payload is not None and len(self._payload.p_1i) != robots:
+            raise InputError(
+                f"the payload has {len(self._payload.p_1i)} grasps; the team has {robots} robots"
+            )
+        self._stage = stage
+        self._theta_zero = np.array([unit.theta_zero_rad for unit in units_of(self._as_built, robots)])
+        self._gravity = omnid_design().gravity_mps2
+        self._held = np.zeros((robots, 3))
+
+    def act(self, tick: int) -> None:
+        """Every sample, set the forces; the payload turns slowly."""
+        stage = self._stage
+        if tick == 1:
+            self._held = stage.controller.feed_forward  # measured by the arms in their first tick
+            stage.controller.feed_forward = self._held
+        if tick and tick % stage.ticks == 0 and self._payload is not None:
+            share = minimum_jerk(np.array((tick / stage.rate_hz - self._start_s) / self._fade_s))
+            stage.controller.feed_forward = (1.0 - share) * self._held + share * self.forces()
+
+    def forces(self) -> Array:
+        """What the payload asks for now: force of every wrist in its {b} [N], shape (N, 3)."""
+        payload, force = self._payload, np.zeros_like(self._held)
+        if payload is not None and payload.mass_kg > 0:
+            theta = self._stage.data.qpos[self._stage.index.gimbal_qpos] + self._theta_zero
+            for i, up in enumerate(up_in_payload(theta, payload.R_1i)):
+                # Every robot sees the tilt by its own gimbal, and takes its own share.
+                force[i, 2] = weight_shares(payload, up, self._gravity)[i]
+        return force
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,49 @@
-"""Arithmetic of the wrist controller (see ``control``), compiled where numba is installed."""
+"""Arithmetic that runs every control tick, compiled where numba is installed.
 
+numba keeps the machine code for the next process in the folder ``NUMBA_CACHE_DIR`` if that is set, else beside the
+source, else, where an installation cannot be written, in the user's cache folder. Where none of them can be written,
+every process compiles again.
+
+Without numba (``pip install 'mocobot[fast]'`` brings it) Python itself does the same arithmetic, to the same bits. It
+reads arrays through memoryviews: those give plain floats, with which Python is faster than with numpy's. A function
+that is compiled here therefore indexes arrays to the last axis (``a[i, k]``, never ``a[i]``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
 from math import cos, sin, sqrt
+from typing import Any
 
-from mocobot_sim.compiled import compiled, entry
+import numpy as np
+
+try:
+    from numba import njit
+except ImportError:
+    njit = None
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function when it is first called, without Python's lock while it runs; nothing without numba."""
+    if njit is None:
+        return function
+    try:
+        return njit(cache=True, nogil=True)(function)
+    except RuntimeError:  # no folder can be written
+        return njit(nogil=True)(function)
+
+
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``compiled``, for what is called with arrays; they are changed in place."""
+    if njit is not None:
+        return compiled(function)
+
+    def called(*given: Any) -> Any:
+        return function(*[one.data if isinstance(one, np.ndarray) else one for one in given])
+
+    return called
+
 
 # The kernel works on tuples of three floats: an array per vector would cost more than the arithmetic.
 
@@ -68,15 +109,11 @@ def update_team(qpos, ctrl, address, units, constants, state, commands, sensed, 
 
 @compiled
 def wrist(phi, reach, proximal, rod):
-    """Forward kinematics of one Delta.
+    """Forward kinematics of one Delta from three driven angles [rad].
 
     c_k is the knee moved inward by the platform radius, so |h - c_k| = rod for every leg, and with
-    s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot.
-
-    Args:
-        phi: driven angles [rad], three.
-        reach: base radius minus platform radius [m].
-        proximal, rod: lengths [m].
+    s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot. ``reach`` is the base radius
+    minus the platform radius [m].
 
     Returns:
         h [m], (s_1, s_2, s_3) [m], lever [m^2/rad], cos(phi): tuples of three.
@@ -99,11 +136,7 @@ def wrist(phi, reach, proximal, rod):
     )
     # The normal points up for every phi in range. Out of reach there is no root; the trial's checks report it.
     rise = sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
-    h = (
-        c0[0] + centre[0] + rise * n[0],
-        c0[1] + centre[1] + rise * n[1],
-        c0[2] + centre[2] + rise * n[2],
-    )
+    h = (c0[0] + centre[0] + rise * n[0], c0[1] + centre[1] + rise * n[1], c0[2] + centre[2] + rise * n[2])
     s = (_minus(h, c0), _minus(h, c1), _minus(h, c2))
     lever = (
         proximal * (cos_phi[0] * s[0][2] - sin_phi[0] * (_COS[0] * s[0][0] + _SIN[0] * s[0][1])),
@@ -144,3 +177,50 @@ def _solve(m, y):
         scale * (y[0] * c0[1] + y[1] * c1[1] + y[2] * c2[1]),
         scale * (y[0] * c0[2] + y[1] * c1[2] + y[2] * c2[2]),
     )
+
+
+@entry
+def update_drives(
+    qpos, qvel, ctrl, wheel_qpos, wheel_dof, drive, matrix, inverse, constants, pose, twist, odometry, angle, lag, speed
+):  # fmt: skip
+    """One control tick of all bases, in place.
+
+    Addresses have shape (N, 4), the kinematics' matrices (4, 3) and (3, 4). ``constants`` are the position gain [1/s],
+    speed gain, integral gain, torque limit and period [s]; ``pose`` and ``twist`` are planned for this tick, (N, 3).
+    Brought up to date: ``odometry``, the pose by it, (N, 3); ``angle`` of the wheels at the last tick and ``lag``, by
+    how much they lag their commanded angles [rad], (N, 4). Written: ``ctrl`` and the commanded ``speed``, (N, 4).
+    """
+    position_gain, gain, integral, limit, period = constants
+    for i in range(wheel_qpos.shape[0]):
+        turn, along, across = 0.0, 0.0, 0.0
+        for k in range(4):
+            step = qpos[wheel_qpos[i, k]] - angle[i, k]
+            angle[i, k] += step
+            turn += inverse[0, k] * step
+            along += inverse[1, k] * step
+            across += inverse[2, k] * step
+        # As planar.moved: the chord of the arc.
+        half = 0.5 * turn
+        chord = math.sin(half) / half if abs(half) > 1e-9 else 1.0
+        cos, sin = math.cos(odometry[i, 2] + half), math.sin(odometry[i, 2] + half)
+        odometry[i, 0] += chord * (cos * along - sin * across)
+        odometry[i, 1] += chord * (sin * along + cos * across)
+        odometry[i, 2] += turn
+
+        ahead, aside = pose[i, 0] - odometry[i, 0], pose[i, 1] - odometry[i, 1]
+        cos, sin = math.cos(odometry[i, 2]), math.sin(odometry[i, 2])
+        rest = pose[i, 2] - odometry[i, 2]
+        # The planned twist is in the planned frame, which the base has not quite reached.
+        cos_rest, sin_rest = math.cos(rest), math.sin(rest)
+        v_x = cos_rest * twist[i, 1] - sin_rest * twist[i, 2] + position_gain * (cos * ahead + sin * aside)
+        v_y = sin_rest * twist[i, 1] + cos_rest * twist[i, 2] + position_gain * (cos * aside - sin * ahead)
+        w = twist[i, 0] + position_gain * rest
+        for k in range(4):
+            command = matrix[k, 0] * w + matrix[k, 1] * v_x + matrix[k, 2] * v_y
+            error = command - qvel[wheel_dof[i, k]]
+            torque = gain * error + integral * lag[i, k]
+            # No wind-up: a drive at its limit does not add to what it owes.
+            if abs(torque) < limit or torque * error < 0.0:
+                lag[i, k] += error * period
+            ctrl[drive[i, k]] = min(max(torque, -limit), limit)
+            speed[i, k] = command

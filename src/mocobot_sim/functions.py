@@ -1,31 +1,28 @@
-"""Functions of one signal, one value after the other, as a trial runs."""
+"""Functions of one signal, one value after the other, as a trial runs: what formulas at a place are made of."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from estimator.errors import InputError
 
 Step = Callable[[float], float]
 """The next value of the function from the next value of the signal."""
+Names = Callable[[str], object]
+"""Whether a name is known."""
 
 
 @dataclass(frozen=True)
 class Inside:
-    """Numbers inside a function.
+    """Numbers inside a function."""
 
-    Attributes:
-        number, second: its first and its second number.
-        phase_rad: of a sine.
-        dt: time from one value to the next [s].
-    """
-
-    number: float
-    second: float
-    phase_rad: float
-    dt: float
+    number: float  # its first and its second number
+    second: float  # its first and its second number
+    phase_rad: float  # of a sine
+    dt: float  # time from one value to the next [s]
 
 
 def _plain(of: Callable[[float, Inside], float]) -> Callable[[Inside], Step]:
@@ -106,14 +103,27 @@ WIDE = ("hat", "first_hat", "last_hat", "second_order")
 """Functions whose ``second``, a width or a damping ratio, must be above 0."""
 
 
-def check_numbers(function: str, number: float, second: float) -> None:
-    """Refuse numbers that a function cannot have inside.
+def check_law(law: Any, is_target: Names, targets: str, is_signal: Names, signals: str) -> None:
+    """Refuse a formula with a name that is not known, or numbers that its function cannot have inside.
+
+    Args:
+        law: with ``target``, ``function``, ``of``, ``times``, ``number`` and ``second``.
+        is_target, is_signal: whether a name is one.
+        targets, signals: what such names look like, in words.
 
     Raises:
-        InputError: one of them is not above 0 that must be.
+        InputError: it has.
     """
-    if function in POSITIVE and number <= 0.0:
-        what = NEEDS[function].replace(",", " and must be")
-        raise InputError(f"law: number is {number!r}; of {function} it is {what}")
-    if function in WIDE and second <= 0.0:
-        raise InputError(f"law: second is {second!r}; with {function} it must be above 0")
+    names = (
+        ("target", is_target, targets), ("function", FUNCTIONS.__contains__, ", ".join(FUNCTIONS)),
+        ("of", is_signal, signals), ("times", lambda name: not name or is_signal(name), signals),
+    )  # fmt: skip
+    for field, known, words in names:
+        value = getattr(law, field)
+        if not known(value):
+            raise InputError(f"law: {field} is {value!r:.60}; it must be one of {words}")
+    if law.function in POSITIVE and law.number <= 0.0:
+        what = NEEDS[law.function].replace(",", " and must be")
+        raise InputError(f"law: number is {law.number!r}; of {law.function} it is {what}")
+    if law.function in WIDE and law.second <= 0.0:
+        raise InputError(f"law: second is {law.second!r}; with {law.function} it must be above 0")

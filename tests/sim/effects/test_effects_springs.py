@@ -1,4 +1,4 @@
-"""Friction against Coulomb's law and closed forms, from MuJoCo's own constraint forces."""
+"""Friction, springs, sensors' zeros and timing, against Coulomb's law, closed forms and densely sampled truth."""
 
 from types import SimpleNamespace
 
@@ -8,9 +8,13 @@ import pytest
 
 from closed_loop import ClosedLoop
 from effect_cases import example, one_robot, team_with
+from mocobot_sim.control.control import lag_filter
+from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.soft import damper_parameters
+from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import SensedLog
 
 FRICTION = (
     int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
@@ -193,3 +197,171 @@ def test_gimbal_friction_leaves_the_welds_closed(robot, size):
     log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), 2))
     assert log.weld_error_m < 3e-6
     assert np.rad2deg(log.weld_error_rad) < 5e-4
+
+
+DESIGN_K = 100.0
+
+
+def _run(*effects, vias: int = 2):
+    scene = team_with("a", *effects)
+    return run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(1), vias))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return _run()
+
+
+@pytest.mark.parametrize("channel", ["phi", "theta", "tau"])
+@pytest.mark.parametrize("robot", [1, 3])
+def test_zeros_shift_one_reading(channel, robot):
+    cause, size = {"phi": ("phi_zero", 1e-3), "theta": ("theta_zero", 1e-3), "tau": ("sea_bias", 0.05)}[
+        channel
+    ]
+    log = _run(example(cause, robot, joint=3), vias=1)
+    recording = predicted(log)
+    for name in ("phi", "theta", "tau"):
+        shift = getattr(recording, name) - getattr(log, name)
+        expected = np.zeros((3, 3))
+        if name == channel:
+            expected[robot - 1, 2] = size
+        np.testing.assert_allclose(shift, np.tile(expected, (len(shift), 1, 1)), rtol=0, atol=1e-13)
+
+
+def test_a_theta_zero_is_not_seen_by_the_controller(clean):
+    np.testing.assert_array_equal(_run(example("theta_zero", 2)).phi, clean.phi)
+
+
+@pytest.mark.parametrize("cubic", [-100.0, 300.0, 3000.0])
+def test_hardening_is_read_as_a_linear_spring(cubic):
+    """True torque k d + k3 d^3 and reading k d of the same deflection."""
+    log = _run(example("sea_hardening", 2, joint=1, cubic_Nm_per_rad3=cubic))
+    reading = predicted(log).tau[:, 1, 0]
+    deflection = -reading / DESIGN_K
+    np.testing.assert_allclose(log.tau[:, 1, 0], -(DESIGN_K * deflection + cubic * deflection**3), rtol=1e-10)
+    assert np.abs(log.tau[:, 1, 0] - reading).max() > 1e-5 * abs(cubic)
+    np.testing.assert_allclose(predicted(log).tau[:, 0], log.tau[:, 0], rtol=0, atol=1e-12)
+
+
+def test_a_hardening_spring_starts_where_its_load_is(tmp_path):
+    """One robot at home: every leg carries the same torque; the deflection is a root of the cubic."""
+    linear = ClosedLoop(one_robot(tmp_path))
+    loop = ClosedLoop(one_robot(tmp_path, example("sea_hardening", cubic_Nm_per_rad3=5000.0)))
+    torque = linear.torque[0, 1]
+    np.testing.assert_allclose(loop.torque, linear.torque, rtol=1e-6)
+    roots = np.roots([5000.0, 0.0, DESIGN_K, torque])
+    root = roots[np.abs(roots.imag) < 1e-9].real[0]
+    assert loop.data.joint("omnid1/spring2").qpos[0] == pytest.approx(root, rel=1e-9)
+    assert abs(root) < 0.97 * abs(torque / DESIGN_K)
+
+
+def test_hysteresis_makes_the_reading_lag_the_link(clean):
+    """Reading and true spring agree: the deflection's. What differs from a clean trial is the friction's share."""
+    log = _run(example("sea_hysteresis", 2, friction_Nm=0.1))
+    np.testing.assert_allclose(predicted(log).tau, log.tau, rtol=0, atol=1e-12)
+    difference = log.tau[200:-200, 1, 1] - clean.tau[200:-200, 1, 1]
+    assert 0.02 < np.abs(difference).max() < 0.3
+
+
+def test_link_lengths_are_in_the_model_and_the_record():
+    effect = example("link_length", 3, joint=2, proximal_m=1e-3, rod_m=-2e-3, base_radius_m=3e-3)
+    scene, clean = team_with("a", effect), build_team("a")
+    model, design = scene.compile(), clean.compile()
+
+    def changed(part):
+        return getattr(model, part[0])(part[1]).pos - getattr(design, part[0])(part[1]).pos
+
+    np.testing.assert_allclose(changed(("body", "omnid3/rod2")), [1e-3, 0, 0], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(changed(("site", "omnid3/rod2_tip")), [-2e-3, 0, 0], rtol=0, atol=1e-15)
+    outward = np.array([-0.5, np.sqrt(0.75), 0])
+    np.testing.assert_allclose(changed(("body", "omnid3/proximal2")), 3e-3 * outward, rtol=0, atol=1e-15)
+    same = model.body_pos != design.body_pos
+    assert same.any(axis=1).sum() == 2
+    unit = scene.units[2]
+    np.testing.assert_array_equal(unit.rod_length_m, [0, -2e-3, 0])
+    np.testing.assert_array_equal(unit.proximal_length_m, [0, 1e-3, 0])
+    np.testing.assert_array_equal(unit.base_radius_m, [0, 3e-3, 0])
+
+
+@pytest.mark.parametrize("delay_ticks", [-7, 3, 12])
+def test_late_torques_are_earlier_rows_of_the_dense_log(clean, delay_ticks):
+    log = _run(example("torque_skew", 2, delay_s=delay_ticks * 1e-3))
+    recording = predicted(log)
+    np.testing.assert_array_equal(log.sensed.tau, clean.sensed.tau)
+    rows = 10 * np.arange(5, len(log.time) - 5)
+    np.testing.assert_allclose(
+        recording.tau[5:-5, 1], clean.sensed.tau[rows - delay_ticks, 1], rtol=0, atol=1e-9
+    )
+    for other in (0, 2):
+        np.testing.assert_array_equal(recording.tau[:, other], clean.tau[:, other])
+    np.testing.assert_array_equal(recording.phi, clean.phi)
+    np.testing.assert_array_equal(recording.theta, clean.theta)
+
+
+def test_a_late_clock_shifts_everything_but_the_commands(clean):
+    log = _run(example("clock_delay", 2, delay_s=0.004), example("torque_skew", 2, delay_s=0.003))
+    recording = predicted(log)
+    rows = 10 * np.arange(5, len(log.time) - 5)
+    for channel, ticks in (("phi", 4), ("theta", 4), ("tau", 7)):
+        expected = getattr(clean.sensed, channel)[rows - ticks, 1]
+        np.testing.assert_allclose(getattr(recording, channel)[5:-5, 1], expected, rtol=0, atol=1e-9)
+        np.testing.assert_array_equal(getattr(recording, channel)[:, 0], getattr(log, channel)[:, 0])
+    np.testing.assert_array_equal(recording.ref, clean.ref_b)
+    np.testing.assert_array_equal(log.phi, clean.phi)
+
+
+@pytest.mark.parametrize("delay_s", [-0.0033, 0.00025, 0.0017])
+def test_delays_between_ticks_are_interpolated(delay_s):
+    clock = np.arange(5000) / 1000.0
+    phase = np.arange(6).reshape(2, 3)
+
+    def signal(t):
+        return np.sin(2 * np.pi * 3.0 * t[:, None, None] + phase)
+
+    log = SensedLog(1000.0, 10, signal(clock), signal(clock), signal(clock))
+    rows = log.sampled("tau", np.array([0.0, delay_s]))
+    time = clock[::10]
+    np.testing.assert_array_equal(rows[:, 0], signal(time)[:, 0])
+    np.testing.assert_allclose(rows[2:-2, 1], signal(time - delay_s)[2:-2, 1], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("time_constant_s", [1e-4, 1e-3, 0.02])
+def test_lag_of_a_ramp_and_of_a_sine_is_the_filters(time_constant_s):
+    a, old, new = lag_filter(time_constant_s, 1e-3)
+    time = np.arange(2000) / 1000.0
+    for signal, steady in (
+        (time, time - time_constant_s),
+        (np.sin(20 * time), np.imag(np.exp(20j * time) / (1 + 20j * time_constant_s))),
+    ):
+        y = np.zeros(2000)
+        y[0] = signal[0]
+        for k in range(1, 2000):
+            y[k] = a * y[k - 1] + old * signal[k - 1] + new * signal[k]
+        np.testing.assert_allclose(y[1000:], steady[1000:], rtol=0, atol=5e-5)
+
+
+def test_a_lagging_torque_sensor_is_seen_by_log_and_controller(clean):
+    """y + T dy/dt = x: the reading against the true spring torque, and a motion that is no longer the same."""
+    T = 0.004
+    log = _run(example("torque_lag", 2, time_constant_s=T))
+    y = log.sensed.tau[:, 1]
+    x = y + T * np.gradient(y, 1e-3, axis=0)
+    np.testing.assert_allclose(x[20:-20:10], log.tau[2:-2, 1][: len(x[20:-20:10])], rtol=0, atol=5e-3)
+    assert np.abs(log.tau[:, 1] - y[::10]).max() > 0.02
+    np.testing.assert_allclose(log.sensed.tau[::10, 0], log.tau[:, 0], rtol=0, atol=1e-12)
+    assert np.abs(log.phi - clean.phi).max() > 1e-5
+
+
+def test_a_single_lagging_sensor_is_seen_by_log_and_controller(clean):
+    """y + T dy/dt = x of its own torque alone; exact for inputs that are straight between ticks."""
+    T, k = 0.004, 1
+    log = _run(example("sensor_lag", 2, joint=k + 1, time_constant_s=T))
+    y = log.sensed.tau[:, 1]
+    x = y[:, k] + T * np.gradient(y[:, k], 1e-3)
+    np.testing.assert_allclose(x[20:-20:10], log.tau[2:-2, 1, k][: len(x[20:-20:10])], rtol=0, atol=5e-3)
+    assert np.abs(log.tau[:, 1, k] - y[::10, k]).max() > 0.02
+    others = np.ones((3, 3), dtype=bool)
+    others[1, k] = False
+    np.testing.assert_allclose(log.sensed.tau[::10, others], log.tau[:, others], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(log.sensed.phi[::10], log.phi, rtol=0, atol=1e-12)
+    assert np.abs(log.phi - clean.phi).max() > 1e-5

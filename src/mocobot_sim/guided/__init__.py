@@ -1,1 +1,0 @@
-"""A person guides the payload by hand, and the robots carry its weight."""

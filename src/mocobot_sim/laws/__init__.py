@@ -1,1 +1,0 @@
-"""Formulas that act in a trial: what the effect ``law`` is made of."""
