@@ -15,7 +15,7 @@ from estimator.errors import InputError
 from mocobot.cli import COMMANDS
 from mocobot.comparison.compare import compare
 from mocobot.parsing import with_config
-from mocobot_logs.joints.parse import read_joint_map
+from mocobot_logs.joints.joint_map import read_joint_map
 from mocobot_sim.effects.spec import EXAMPLE, parse_effect
 from mocobot_sim.scene.as_built_file import read_units
 from mocobot_sim.scene.payload import grasp_frames, load_payload

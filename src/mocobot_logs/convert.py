@@ -10,14 +10,22 @@ from estimator.errors import InputError
 from estimator.recording.checks import check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot_logs.cut.choice import WHOLE, Choice, Piece, Span, seconds
-from mocobot_logs.cut.extent import extent_of
-from mocobot_logs.cut.split import SHORTEST_NS, Omission, omissions, split
+from mocobot_logs.cut import (
+    SHORTEST_NS,
+    WHOLE,
+    Choice,
+    Omission,
+    Piece,
+    Span,
+    extent_of,
+    omissions,
+    seconds,
+    split,
+)
 from mocobot_logs.formats import output_kind
 from mocobot_logs.log import NS, Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording
-from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ, resample
-from mocobot_logs.resample.report import StreamReport
+from mocobot_logs.resample import MAX_GAP_S, RATE_HZ, StreamReport, resample
 from mocobot_logs.table.write import write_csv, write_npz
 
 UNKNOWN_TRIAL = "random"

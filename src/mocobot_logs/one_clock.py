@@ -22,7 +22,7 @@ from estimator.recording.metadata import FREE, RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.sampling import Sampling
 from mocobot_logs.log import CHANNELS, NS, REF, THETA, Array
-from mocobot_logs.resample.log import Resampled
+from mocobot_logs.resample import Resampled
 
 EARLY_S = 1.0
 """A robot's log that ends so much before another's is broken off."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mocobot_logs.joints.turns import unwrapped
+from mocobot_logs.joints.read import unwrapped
 
 
 def test_positions_within_one_turn_are_unwrapped() -> None:

@@ -15,13 +15,17 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_logs.log import NS, Samples, Stamps
-from mocobot_logs.readings import repeated
-from mocobot_logs.resample.fill import Merger
-from mocobot_logs.resample.filter import Decimator, fineness
-from mocobot_logs.resample.grid import TOLERANCE_NS, Grid, Interpolator, fitted_rows
-from mocobot_logs.resample.screen import Screen
-from mocobot_logs.resample.tally import MOST_MISSING, beyond_s
+from mocobot_logs.log import NS, Samples, Stamps, repeated
+from mocobot_logs.resample import MOST_MISSING, Screen, beyond_s
+from mocobot_logs.resample_filter import (
+    TOLERANCE_NS,
+    Decimator,
+    Grid,
+    Interpolator,
+    Merger,
+    fineness,
+    fitted_rows,
+)
 
 MAX_GAP_S = 0.05
 """Longest time without samples, beyond one period, that is bridged [s]."""

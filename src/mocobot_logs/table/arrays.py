@@ -1,20 +1,35 @@
-"""Tables of arrays, one for each column: checked by what their headers say, then read in step."""
+"""Tables of arrays, one for each column: checked by what their headers say, then read in step.
 
+NPZ archives of numpy arrays: headers checked before anything is allocated, then read in step; never a pickle.
+
+MATLAB files of level 5 (-v6, -v7): vectors and matrices of real numbers, read in step; never an object.
+
+A file is a header of 128 bytes and elements, each a tag (type, number of bytes) and its data; a matrix is an element of
+elements: flags, sizes, name, numbers ("MAT-File Format", The MathWorks, 2024).
+"""
+
+import io
+import struct
+import zipfile
+import zlib
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from math import prod
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.archive import refuse_other_packing
 from estimator.errors import InputError
-from estimator.inputs import Unpacked
+from estimator.inputs import Unpacked, open_input
+from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.faults import shown, told_in_one_sentence
-from mocobot_logs.table.stamps import from_numbers
 from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
+from mocobot_logs.table.text import from_numbers
 
 MAX_WHOLE_BYTES = 1 << 30
 """Arrays in Fortran order do not come row by row; up to this size they are loaded whole."""
@@ -146,3 +161,257 @@ def read_exactly(file: IO[bytes], count: int) -> bytes:
     if len(content) < count:
         raise EOFError(f"{len(content)} of {count} bytes are there")
     return content
+
+
+METADATA_NAME = "mocobot"
+"""Array of one text: the JSON metadata of a recording (docs/recording.md)."""
+MAX_HEADER_BYTES = 10_000
+MAX_METADATA_BYTES = 1 << 20
+
+
+class NpzTable(ArrayTable):
+    """An NPZ archive as a ``Table``: every array of at least one dimension is a column."""
+
+    noun, kind = "array", "NPZ archive"
+
+    def __init__(self, path: Path, name: str) -> None:
+        """Read the directory of the archive and the header of every array.
+
+        Raises:
+            InputError: the archive is damaged, or a header claims what is not there.
+        """
+        self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
+        with self._opened() as archive:
+            self.arrays = {key: array for key, array in self._headers(archive)}
+            self.metadata = self._read_metadata(archive)
+        self.shapes: Mapping[str, tuple[int, ...]] = {
+            key: array.row_shape for key, array in self.arrays.items() if array.shape
+        }
+        self.size = max((array.shape[0] for array in self.arrays.values() if array.shape), default=0)
+
+    def readers(self, names: Sequence[str], stack: ExitStack) -> dict[str, Callable[[int], NDArray]]:
+        """See ``ArrayTable.readers``."""
+        archive = stack.enter_context(self._opened())
+        return {
+            name: self.arrays[name].reader(stack.enter_context(archive.open(self.arrays[name].at)))
+            for name in names
+        }
+
+    def _headers(self, archive: zipfile.ZipFile) -> Iterator[tuple[str, Stored]]:
+        seen: set[str] = set()
+        for member in archive.infolist():
+            if not member.filename.endswith(".npy"):
+                continue
+            name = member.filename.removesuffix(".npy")
+            if name in seen:
+                raise InputError(f"{self.name}: array {name!r:.60} is in the archive twice")
+            seen.add(name)
+            with archive.open(member) as file:
+                yield name, _header(member, file, f"{self.name}: array {name!r:.60}")
+
+    def _read_metadata(self, archive: zipfile.ZipFile) -> RecordingMetadata | None:
+        array = self.arrays.get(METADATA_NAME)
+        if array is None:
+            return None
+        if array.shape != () or array.dtype.kind != "U" or array.size > MAX_METADATA_BYTES:
+            raise InputError(
+                f"{self.name}: array {METADATA_NAME!r} must be one text, the recording's metadata"
+            )
+        with archive.open(array.at) as file:
+            read_exactly(file, array.start)
+            text = str(np.frombuffer(read_exactly(file, array.size), array.dtype)[0])
+        return RecordingMetadata.from_json(text, where=f"{self.name}: metadata")
+
+    @contextmanager
+    def _opened(self) -> Iterator[zipfile.ZipFile]:
+        with told_in_one_sentence(self.name, self.kind), zipfile.ZipFile(self._path) as archive:
+            refuse_other_packing(archive, self.name)
+            yield archive
+
+
+def _header(member: zipfile.ZipInfo, file: IO[bytes], where: str) -> Stored:
+    """Header of one array, checked against the size of its entry."""
+    start = read_exactly(file, 8)
+    if start[:6] != b"\x93NUMPY" or start[6] not in (1, 2):
+        raise InputError(f"{where} is not in numpy's format 1.0 or 2.0")
+    width = 2 if start[6] == 1 else 4
+    length_bytes = read_exactly(file, width)
+    length = int.from_bytes(length_bytes, "little")
+    if length > MAX_HEADER_BYTES:
+        raise InputError(f"{where} has a header of {length} bytes; it may have {MAX_HEADER_BYTES}")
+    text = io.BytesIO(length_bytes + read_exactly(file, length))
+    read = np.lib.format.read_array_header_1_0 if start[6] == 1 else np.lib.format.read_array_header_2_0
+    shape, fortran, dtype = read(text, max_header_size=MAX_HEADER_BYTES)
+    array = Stored(member, dtype, shape, fortran, 8 + width + length)
+    if dtype.hasobject:
+        raise InputError(f"{where} holds Python objects, which are never loaded; save it as numbers")
+    if any(length < 0 for length in shape) or array.start + array.size != member.file_size:
+        raise InputError(
+            f"{where} claims the shape {shape!s:.80} of {dtype!s:.40}, {array.size} bytes, but has "
+            f"{member.file_size - array.start}"
+        )
+    return array
+
+
+HEADER_BYTES, TAG_BYTES = 128, 8
+MATRIX, COMPRESSED = 14, 15
+"""Types of elements at a file's top level."""
+NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""Types of elements that hold numbers, as numpy names them."""
+NUMERIC_CLASSES = range(6, 16)
+"""Classes of matrices of numbers, from double to uint64; the others are cells, structs, objects, text, sparse ones."""
+COMPLEX_FLAG = 0x0800
+MOST_NAME_BYTES, MOST_DIMENSIONS = 1 << 10, 32
+PIECE_BYTES = 1 << 16
+
+
+class _Inflated(io.RawIOBase):
+    """What zlib packed, as a file that is read from its beginning."""
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        """Take a file at the packed bytes, and how many they are."""
+        super().__init__()
+        self._file, self._left, self._zlib = file, size, zlib.decompressobj()
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer: memoryview) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Fill a buffer as far as there is something."""
+        while not self._zlib.eof:
+            packed = self._zlib.unconsumed_tail
+            if not packed:
+                packed = self._file.read(min(PIECE_BYTES, self._left))
+                self._left -= len(packed)
+            found = self._zlib.decompress(packed, len(buffer))
+            if found:
+                buffer[: len(found)] = found
+                return len(found)
+            if not packed:
+                break
+        return 0
+
+
+class MatTable(ArrayTable):
+    """A MATLAB file as a ``Table``: a vector is a column; of a matrix, a row is a sample."""
+
+    noun, kind = "variable", "MATLAB file"
+
+    def __init__(self, path: Path, name: str) -> None:
+        """Read the tags, sizes and names of all variables.
+
+        Raises:
+            InputError: the file is damaged, cut off, of another version, or holds no matrix of real numbers.
+        """
+        self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
+        with told_in_one_sentence(name, self.kind), open_input(path) as file:
+            self._order = self._byte_order(file.read(HEADER_BYTES))
+            self.arrays = dict(self._found(file))
+        if not self.arrays:
+            raise InputError(
+                f"{name}: holds no matrix of real numbers; save each column as a vector (structs, cells, tables, "
+                "objects and text are not read)"
+            )
+        self.shapes: Mapping[str, tuple[int, ...]] = {
+            key: array.row_shape for key, array in self.arrays.items()
+        }
+        self.size = max(array.shape[0] for array in self.arrays.values())
+
+    def readers(self, names: Sequence[str], stack: ExitStack) -> dict[str, Callable[[int], NDArray]]:
+        """See ``ArrayTable.readers``."""
+        return {
+            name: self.arrays[name].reader(
+                self._content(stack.enter_context(open_input(self._path)), self.arrays[name].at)
+            )
+            for name in names
+        }
+
+    def _byte_order(self, header: bytes) -> str:
+        if header.startswith(b"MATLAB 7.3"):
+            raise InputError(f"{self.name}: is a MATLAB 7.3 file, which is not read; save it with -v7")
+        order = {b"IM": "<", b"MI": ">"}.get(header[126:])
+        if order is None or struct.unpack(f"{order}H", header[124:126]) != (0x0100,):
+            raise InputError(
+                f"{self.name}: is not a MATLAB file of level 5, or a damaged one; save it with -v7"
+            )
+        return order
+
+    def _found(self, file: IO[bytes]) -> Iterator[tuple[str, Stored]]:
+        size, at, seen = self.stored_bytes, HEADER_BYTES, set()
+        while at < size:
+            file.seek(at)
+            kind, count = struct.unpack(f"{self._order}II", read_exactly(file, TAG_BYTES))
+            if kind not in (MATRIX, COMPRESSED):
+                raise InputError(f"{self.name}: is damaged: byte {at} begins an element of type {kind}")
+            if at + TAG_BYTES + count > size:
+                raise InputError(
+                    f"{self.name}: is cut off: the variable from byte {at} on goes beyond the end of the file"
+                )
+            found = self._header(at, self._content(file, at))
+            if found is not None:
+                if found[0] in seen:
+                    raise InputError(f"{self.name}: variable {found[0]!r:.60} is in the file twice")
+                if kind == MATRIX and found[1].start + found[1].size > count:
+                    raise InputError(
+                        f"{self.name}: variable {shown(found[0])!r} goes beyond its {count} bytes"
+                    )
+                seen.add(found[0])
+                yield found
+            at += TAG_BYTES + count
+
+    def _content(self, file: IO[bytes], at: int) -> IO[bytes]:
+        """A file that is at the content of the matrix whose element begins at a byte."""
+        file.seek(at)
+        kind, count = struct.unpack(f"{self._order}II", read_exactly(file, TAG_BYTES))
+        if kind == MATRIX:
+            return file
+        inside = io.BufferedReader(_Inflated(file, count), PIECE_BYTES)
+        kind, _ = struct.unpack(f"{self._order}II", read_exactly(inside, TAG_BYTES))
+        if kind != MATRIX:
+            raise InputError(f"{self.name}: is damaged: what is packed at byte {at} is no matrix")
+        return inside
+
+    def _header(self, at: int, content: IO[bytes]) -> tuple[str, Stored] | None:
+        """Name and place of a matrix; None if it is not one of real numbers."""
+        _, flags, begun = self._element(content, TAG_BYTES)
+        (flag,) = struct.unpack(f"{self._order}I4x", flags)
+        if flag & 0xFF not in NUMERIC_CLASSES or flag & COMPLEX_FLAG:
+            return None
+        _, sizes, length = self._element(content, 4 * MOST_DIMENSIONS)
+        begun += length
+        shape = struct.unpack(f"{self._order}{len(sizes) // 4}i", sizes)
+        _, text, length = self._element(content, MOST_NAME_BYTES)
+        begun += length
+        name = text.decode("utf-8")
+        if not name:  # what MATLAB keeps for itself
+            return None
+        kind, count, small = self._tag(content)
+        if len(shape) < 2 or min(shape) < 0 or kind not in NUMBERS:
+            raise InputError(f"{self.name}: variable {shown(name)!r} is damaged")
+        if len(shape) == 2 and shape[0] == 1:
+            shape = shape[::-1]
+        shape = shape[:1] if shape[1:] == (1,) else shape
+        dtype = np.dtype(self._order + NUMBERS[kind])
+        found = Stored(at, dtype, shape, True, begun + (4 if small else TAG_BYTES))
+        if found.size != count:
+            raise InputError(
+                f"{self.name}: variable {shown(name)!r} claims {found.size} bytes of numbers, but has {count}"
+            )
+        return name, found
+
+    def _tag(self, content: IO[bytes]) -> tuple[int, int, bool]:
+        """Type and bytes of the next element, and whether they share four bytes; then the data are at once behind."""
+        (first,) = struct.unpack(f"{self._order}I", read_exactly(content, 4))
+        if first >> 16:
+            return first & 0xFFFF, first >> 16, True
+        (count,) = struct.unpack(f"{self._order}I", read_exactly(content, 4))
+        return first, count, False
+
+    def _element(self, content: IO[bytes], most: int) -> tuple[int, bytes, int]:
+        """Type and data of the next element, and the bytes that it takes with its tag."""
+        kind, count, small = self._tag(content)
+        if count > (4 if small else most):
+            raise InputError(f"{self.name}: is damaged: a header has an element of {count} bytes")
+        room = 4 if small else -(-count // 8) * 8
+        return kind, read_exactly(content, room)[:count], room + (4 if small else TAG_BYTES)

@@ -13,7 +13,7 @@ from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.faults import shown
 from mocobot_logs.log import REF, Level, Samples, Stamps
-from mocobot_logs.map.log_map import ChannelMap, LogMap
+from mocobot_logs.maps import ChannelMap, LogMap
 
 SHOWN_COLUMNS = 12
 """So many columns are listed in a message."""

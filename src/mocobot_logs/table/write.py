@@ -12,7 +12,7 @@ from estimator.errors import InputError
 from estimator.files import whole_file
 from estimator.recording.model import Recording
 from mocobot_logs.log import Level
-from mocobot_logs.table.npz import METADATA_NAME
+from mocobot_logs.table.arrays import METADATA_NAME
 
 _ROWS = 10_000
 

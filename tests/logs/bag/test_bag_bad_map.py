@@ -6,8 +6,7 @@ import bags
 from bag_refusals import TEAM, refuses
 from bags import Team, raw_mcap, said, wrist_map
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.map.files import builtin_map
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.maps import builtin_map, parse_map
 from recordings import small_recording
 
 

@@ -12,9 +12,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import bags
 from bags import EPOCH_NS, OMNID
 from estimator.errors import InputError
-from mocobot_logs.bag.cdr import CdrReader, Selector
+from mocobot_logs.bag.cdr import CdrReader, Selector, message_type
 from mocobot_logs.bag.messages import Topic, joined
-from mocobot_logs.bag.types import message_type
 
 RANGES = {
     "bool": (0, 1), "byte": (0, 127), "char": (0, 255), "int8": (-(2**7), 2**7 - 1), "uint8": (0, 2**8 - 1),

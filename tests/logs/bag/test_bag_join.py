@@ -9,10 +9,9 @@ from scipy.interpolate import CubicSpline
 import bags
 from bags import EPOCH_NS, raw_mcap, said
 from estimator.errors import InputError
-from mocobot_logs.bag.align import MAX_GAP_NS, Part, RowAligner
-from mocobot_logs.bag.read import open_bag
+from mocobot_logs.bag.read import MAX_GAP_NS, Part, RowAligner, open_bag
 from mocobot_logs.log import CHANNELS, REF, Samples, collect
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.maps import parse_map
 
 
 def part(stamps, values, columns):

@@ -11,8 +11,7 @@ from bags import EPOCH_NS, OMNID, Team, raw_mcap, rosbags_bag, said, wrist_map
 from estimator.errors import InputError
 from mocobot_logs.bag.read import open_bag
 from mocobot_logs.log import CHANNELS, REF, collect
-from mocobot_logs.map.files import builtin_map
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.maps import builtin_map, parse_map
 
 TEAM = Team.draw()
 

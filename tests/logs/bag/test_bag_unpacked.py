@@ -14,7 +14,7 @@ from bags import Team, assert_holds, raw_mcap, rosbags_bag
 from estimator import inputs
 from estimator.errors import InputError
 from estimator.inputs import set_max_unpacked
-from mocobot_logs.bag.storage.files import BagFiles
+from mocobot_logs.bag.files import BagFiles
 
 TEAM = Team.draw(rows=60)
 MEGABYTE = "x" * 1_000_000

@@ -7,7 +7,7 @@ import numpy as np
 import mocobot
 from array_log import ArrayLog, stream
 from mocobot.options import Convert
-from mocobot_logs.resample.log import MAX_GAP_S, resample
+from mocobot_logs.resample import MAX_GAP_S, resample
 
 
 def test_four_in_a_row_lost_at_50_hz_are_filled_within_the_sensors_noise():

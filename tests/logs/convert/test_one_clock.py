@@ -12,7 +12,7 @@ from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
 from mocobot_logs.log import CHANNELS, REF, Samples
 from mocobot_logs.one_clock import to_recording
-from mocobot_logs.resample.log import resample
+from mocobot_logs.resample import resample
 from mocobot_sim.trial.sensors import PRESETS, measure
 from omnid_design import DESIGN
 from recordings import metadata

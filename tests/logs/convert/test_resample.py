@@ -14,8 +14,8 @@ from scipy.signal import firwin
 
 from array_log import ArrayLog, stream, tones
 from mocobot_logs.log import Samples
-from mocobot_logs.resample.filter import low_pass_taps
-from mocobot_logs.resample.log import Resampled, resample
+from mocobot_logs.resample import Resampled, resample
+from mocobot_logs.resample_filter import low_pass_taps
 
 EPOCH_NS = 1_700_000_000_123_456_789
 BAND_HZ = (0.7, 3.0, 5.0, 19.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from mocobot_logs.resample.fill import Merger, fill_gaps
+from mocobot_logs.resample_filter import Merger, fill_gaps
 
 EVERY_M = [1, 2, 3, 5, 12, 49]
 

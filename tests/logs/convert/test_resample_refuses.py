@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from array_log import ArrayLog, stream, tones
 from estimator.errors import InputError
 from mocobot_logs.log import Samples
-from mocobot_logs.resample.log import resample
+from mocobot_logs.resample import resample
 
 TIME = np.arange(3000) / 100.0
 VALUES = tones(TIME, [1.0])

@@ -13,8 +13,8 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.sampling import Sampling
 from mocobot_inspect.stream.survey import survey
 from mocobot_logs.one_clock import to_recording
-from mocobot_logs.resample.log import resample
-from mocobot_logs.resample.resampling import Resampling
+from mocobot_logs.resample import resample
+from mocobot_logs.resample_filter import Resampling
 from omnid_design import DESIGN
 
 STEP = 2 * np.pi / 2**14

@@ -6,8 +6,8 @@ from numpy.polynomial import Polynomial
 
 from array_log import ArrayLog, stream, tones
 from estimator.errors import InputError
-from mocobot_logs.resample.grid import Grid, Interpolator
-from mocobot_logs.resample.log import resample
+from mocobot_logs.resample import resample
+from mocobot_logs.resample_filter import Grid, Interpolator
 
 RATE_HZ = 1000.0
 

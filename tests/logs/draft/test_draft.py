@@ -17,14 +17,9 @@ import command
 from estimator.errors import InputError
 from log_files import channels_of, read_log, write_lerobot, write_text
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.draft.candidates import Candidate
-from mocobot_logs.draft.channels import find_channels
-from mocobot_logs.draft.draft import put_together
-from mocobot_logs.draft.of_log import draft_of
-from mocobot_logs.draft.reading import read_name
-from mocobot_logs.map.files import read_map
-from mocobot_logs.map.log_map import LogMap
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.draft import draft_of, team_draft
+from mocobot_logs.draft_names import Candidate, find_channels, read_name
+from mocobot_logs.maps import LogMap, parse_map, read_map
 from mocobot_logs.table.write import write_csv, write_npz
 from recordings import small_recording
 
@@ -328,7 +323,7 @@ def test_whatever_columns_are_called_the_draft_is_toml(names: list[str], value: 
         for n in names
         if "\x1f" not in n and (r := read_name(n)) is not None
     ]
-    draft = put_together("log\n.csv", find_channels(found), [])
+    draft = team_draft(Path("log\n.csv"), find_channels(found), [])
     parsed = tomllib.loads(draft.text)
     assert parsed["version"] == 1
     if not draft.missing:

@@ -9,7 +9,7 @@ import pytest
 from scipy.io import savemat
 
 from joint_logs import write_table
-from mocobot_logs.joints.draft import draft_joint_map
+from mocobot_logs.draft import draft_joint_map
 
 JOINTS = ("shoulder", "elbow")
 

@@ -10,7 +10,7 @@ import pytest
 
 from estimator.errors import InputError
 from joint_logs import JOINTS, MAP, SLIDES, columns, write_csv, write_table
-from mocobot_logs.joints.parse import read_joint_map
+from mocobot_logs.joints.joint_map import read_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
 
 TIME = np.arange(400) / 250.0

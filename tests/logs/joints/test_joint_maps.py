@@ -50,7 +50,7 @@ REFUSED = {
     ),
     "turns without counts": (
         lambda t: t.replace('unit = "deg"', 'unit = "deg"\ncounts_per_turn = 4096'),
-        "channels.q: counts_per_turn does not go with positions in 'deg'; leave it out",
+        "channels.q: counts_per_turn does not go with positions of a turning joint in 'deg'; leave it out",
     ),
     "sign": (lambda t: t.replace('unit = "deg"', 'unit = "deg"\nsign = 0'), "channels.q: sign is 0; it must be 1"),
     "bits": (

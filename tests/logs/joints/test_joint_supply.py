@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from joint_logs import JOINTS, read, write_csv
-from mocobot_logs.joints.assemble import mean_supply
+from mocobot_logs.joints.read import mean_supply
 
 RATE_HZ, VOLTS = 200.0, 7.0
 TIME = np.arange(1600) / RATE_HZ

@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from estimator.errors import InputError
 from log_files import assert_same, read_log, refused
-from mocobot_logs.map.files import builtin_map_text
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.maps import builtin_map_text, parse_map
 from mocobot_logs.table import csv as table_csv
-from mocobot_logs.table.dates import TextClock, is_date
+from mocobot_logs.table.text import TextClock, is_date
 from recordings import small_recording
 
 RECORDING = small_recording(rows=60, ref=False)

@@ -8,7 +8,7 @@ import pytest
 
 from estimator.errors import InputError
 from log_files import assert_same, read_log, refused, write_text
-from mocobot_logs.draft.of_log import draft_of
+from mocobot_logs.draft import draft_of
 from recordings import small_recording
 
 RECORDING = small_recording(rows=60)
@@ -48,7 +48,7 @@ def test_dates_that_are_not_of_iso(tmp_path: Path, form: str) -> None:
     assert 'unit = "s"  # doubtful: its values cannot be read' in draft_of(path).text
     iso = draft_of(path).text.replace('unit = "s"', 'unit = "iso"')
     (tmp_path / "my.toml").write_text(iso)
-    from mocobot_logs.map.files import read_map
+    from mocobot_logs.maps import read_map
 
     assert "in row 0; a time must be a date like 2026-" in refused(path, read_map(tmp_path / "my.toml"))
 

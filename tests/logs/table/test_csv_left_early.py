@@ -10,7 +10,7 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from estimator.errors import InputError
-from mocobot_logs.map.log_map import CsvMap
+from mocobot_logs.maps import CsvMap
 from mocobot_logs.table import csv
 from mocobot_logs.table.table import Wanted
 

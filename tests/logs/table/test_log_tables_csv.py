@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from log_files import assert_same, channels_of, read_log, refused, write_text
-from mocobot_logs.map.files import TimeMap, builtin_map
-from mocobot_logs.map.log_map import CsvMap, LogMap
+from mocobot_logs.maps import CsvMap, LogMap, TimeMap, builtin_map
 from mocobot_logs.table import csv as table_csv
 from mocobot_logs.table import table as tables
 from recordings import small_recording

@@ -13,7 +13,7 @@ import pytest
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from log_files import assert_same, channels_of, column, read_log, refused, write_lerobot
-from mocobot_logs.map.files import builtin_map
+from mocobot_logs.maps import builtin_map
 from recordings import small_recording
 
 JOINT = builtin_map("mocobot")

@@ -15,7 +15,7 @@ from scipy.io import savemat
 from estimator.errors import InputError
 from estimator.inputs import set_max_unpacked
 from log_files import assert_same, read_log, refused
-from mocobot_logs.map.log_map import CsvMap
+from mocobot_logs.maps import CsvMap
 from mocobot_logs.open_log import open_table
 from mocobot_logs.table import table as tables
 from mocobot_logs.table.table import Wanted

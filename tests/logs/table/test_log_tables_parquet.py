@@ -14,7 +14,7 @@ import pytest
 from estimator import inputs
 from estimator.recording.parquet import write_recording
 from log_files import assert_same, channels_of, column, read_log, refused
-from mocobot_logs.map.files import TimeMap, builtin_map
+from mocobot_logs.maps import TimeMap, builtin_map
 from mocobot_logs.open_log import open_log
 from mocobot_logs.table import table as tables
 from recordings import metadata, small_recording

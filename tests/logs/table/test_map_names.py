@@ -12,8 +12,7 @@ import pytest
 from estimator.errors import InputError
 from log_files import assert_same, read_log, write_text
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.map.files import builtin_map_text
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.maps import builtin_map_text, parse_map
 from recordings import small_recording
 
 RECORDING = small_recording(rows=60, ref=False)

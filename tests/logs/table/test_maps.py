@@ -13,10 +13,7 @@ import pytest
 
 from estimator.errors import InputError
 from mocobot_logs.log import CHANNELS, REF
-from mocobot_logs.map import parse as map_parse
-from mocobot_logs.map.files import MAPS, builtin_map, builtin_map_text, read_map
-from mocobot_logs.map.parse import parse_map
-from mocobot_logs.map.units import units_of
+from mocobot_logs.maps import KEYS, MAPS, builtin_map, builtin_map_text, parse_map, read_map, units_of
 
 ROOT = Path(__file__).resolve().parents[3]
 UNITS = {"phi": "rad", "theta": "rad", "tau": "Nm", "h": "m", "force": "N", "ref": "m"}
@@ -200,16 +197,16 @@ SLIPS: list[tuple[dict[str, Any], list[str]]] = [
     (with_channel(unit=...), ["channels.phi1: missing key 'unit'", "rad, deg, counts"]),
     (
         with_channel(unit="grad"),
-        ["channels.phi1: unit is 'grad'", "angles are logged in rad, deg, counts"],
+        ["channels.phi1: unit is 'grad'", "angles come in rad, deg, counts"],
     ),
     (with_channel(unit=1), ["channels.phi1: unit is 1", "rad"]),
     (
         with_channel("tau1", unit="counts", counts_per_turn=10),
-        ["unit is 'counts'", "torques are logged in Nm"],
+        ["unit is 'counts'", "torques come in Nm"],
     ),
     (with_channel("tau1", unit="N"), ["unit is 'N'", "Nm, mNm"]),
     (with_channel(unit="counts"), ["channels.phi1: missing key 'counts_per_turn'"]),
-    (with_channel(counts_per_turn=100), ["counts_per_turn goes with unit 'counts' only"]),
+    (with_channel(counts_per_turn=100), ["counts_per_turn does not go with angles in 'rad'; leave it out"]),
     (with_channel(unit="counts", counts_per_turn=0), ["counts_per_turn is 0"]),
     (with_channel(unit="counts", counts_per_turn=math.nan), ["counts_per_turn is nan"]),
     (with_channel(sign=0), ["channels.phi1: sign is 0", "1 or -1"]),
@@ -313,7 +310,7 @@ def test_documented_maps_are_allowed(block: str) -> None:
 def test_the_docs_name_every_key_unit_and_map() -> None:
     text = (ROOT / "docs" / "measured-data.md").read_text()
     for word in [
-        *map_parse.KEYS,
+        *KEYS,
         *MAPS,
         *(u for name in CHANNELS["joint"] for u in units_of(name) if " " not in u),
     ]:

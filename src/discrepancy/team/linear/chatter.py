@@ -11,7 +11,7 @@ from scipy.signal import butter, periodogram, sosfiltfilt
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.recording.sampling import SENSORS
-from mocobot_logs.resample.resampling import Resampling
+from mocobot_logs.resample_filter import Resampling
 
 NOISE_SEED = 20250
 """Of these draws. Chosen: any will do; fixed, so that a verdict can be had again."""

@@ -23,7 +23,7 @@ from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.sampling import SENSORS
-from mocobot_logs.resample.resampling import Resampling
+from mocobot_logs.resample_filter import Resampling
 
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
 """Noise of the rates that tell rest from sliding, up to which they are smoothed as usual; signals with more are

@@ -22,8 +22,16 @@ from mcap.records import Channel, Schema, Statistics
 
 from estimator.errors import InputError
 from estimator.inputs import Unpacked
-from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, Topic, check_sizes, merged
-from mocobot_logs.bag.storage.unpack import CHUNK_BYTES, UnpackError, unpack
+from mocobot_logs.bag.messages import (
+    BLOCK_BYTES,
+    CHUNK_BYTES,
+    Messages,
+    Topic,
+    UnpackError,
+    check_sizes,
+    merged,
+    unpack,
+)
 from mocobot_logs.faults import readable
 from mocobot_logs.formats import MCAP as MAGIC
 

@@ -1,21 +1,256 @@
-"""Text tables: one header line, then one row per sample, cells of numbers; time may be dates."""
+"""Time of a table in whole nanoseconds: exact for whole numbers and dates, rounded for floats and decimal text.
+
+Dates and times of ISO 8601 as stamps, exact to the nanosecond.
+
+Text tables: one header line, then one row per sample, cells of numbers; time may be dates.
+"""
 
 import contextlib
 import csv
 import re
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pcsv
+from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from mocobot_logs.faults import detail_of, readable
-from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.table.dates import TextClock, is_date
+from mocobot_logs.log import Stamps
+from mocobot_logs.maps import CsvMap
 from mocobot_logs.table.table import Block, Table, Wanted
+
+LARGEST_NS = (1 << 63) - 1
+_DIGITS = {10**exponent: exponent for exponent in range(10)}
+_BELOW_NS = 6
+"""Decimals below the nanosecond that are looked at, to round: programs write 32439.999999999996 ms for 32.44 s."""
+
+Given = NDArray[np.bool_]
+
+
+def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
+    """Stamps from numbers.
+
+    Args:
+        values: times in any unit, whole numbers or floats, NaN where there is none, shape (q,).
+        unit_ns: nanoseconds in one unit; None where the map's unit is "iso".
+        where: file and column, for messages.
+        row: row of the first one, for messages.
+
+    Returns:
+        Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
+
+    Raises:
+        InputError: a time is infinite or beyond 292 years, or there is no unit.
+    """
+    unit_ns = _unit(unit_ns, where)
+    if values.dtype.kind in "iu":
+        limit = LARGEST_NS // unit_ns
+        beyond = (values > limit) | (values < -limit)
+        _refuse(values, beyond, where, row)
+        return values.astype(np.int64) * unit_ns, np.ones(len(values), bool)
+    given = ~np.isnan(values)
+    with np.errstate(over="ignore"):
+        scaled = np.where(given, values, 0.0).astype(np.float64) * unit_ns
+    # One below 2**63: the next float down from it is whole and fits.
+    _refuse(values, np.abs(scaled) >= float(LARGEST_NS), where, row)
+    return np.rint(scaled).astype(np.int64), given
+
+
+def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
+    """Stamps from decimal text, to the nearest nanosecond: a float of the Unix time resolves 0.24 us only.
+
+    Args:
+        values: decimal numbers, null where there is none, shape (q,).
+        unit_ns: nanoseconds in one unit, a power of ten; None where the map's unit is "iso".
+        where: file and column, for messages.
+        row: row of the first one, for messages.
+
+    Returns:
+        As ``from_numbers``.
+
+    Raises:
+        InputError: a time is not a number, or is beyond 292 years, or there is no unit.
+    """
+    digits = _DIGITS[_unit(unit_ns, where)]
+    exact = pa.decimal128(38, digits)
+    try:
+        cut = pc.cast(values, exact, safe=False)
+    except pa.ArrowInvalid:
+        # The first count of texts that do not cast ends with the one that is no number.
+        bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
+        text = values[bad].as_py()
+        or_date = "" if row + bad else " or a date of ISO 8601, such as 2026-03-01T12:00:00.5Z"
+        raise InputError(
+            f"{where} is {text!r:.60} in row {row + bad}; a time must be a number{or_date}"
+        ) from None
+    _in_ns(cut, values, where, row)
+    finer = pc.cast(values, pa.decimal256(76, digits + _BELOW_NS), safe=False)
+    rounded = pc.cast(pc.call_function("round", [finer], pc.RoundOptions(digits)), exact)
+    ns = _in_ns(rounded, values, where, row)
+    given = ns.is_valid().to_numpy(zero_copy_only=False)
+    return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given
+
+
+def _in_ns(decimals: pa.Array, values: pa.Array, where: str, row: int) -> pa.Array:
+    """Decimals with nanoseconds as their last digits as these; refused beyond 292 years."""
+    ns = decimals.view(pa.decimal128(38, 0))  # the digits without the point are the nanoseconds
+    size = pc.call_function("abs", [ns])
+    beyond = pc.fill_null(pc.call_function("greater", [size, pa.scalar(LARGEST_NS)]), False)
+    _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
+    return ns
+
+
+def _unit(unit_ns: int | None, where: str) -> int:
+    if unit_ns is None:
+        raise InputError(f"{where} holds numbers, but the map's unit of time is 'iso', which is for dates")
+    return unit_ns
+
+
+def _casts(values: pa.Array, kind: pa.DataType) -> bool:
+    try:
+        pc.cast(values, kind, safe=False)
+    except pa.ArrowInvalid:
+        return False
+    return True
+
+
+def _refuse(values: NDArray | pa.Array, beyond: Given, where: str, row: int) -> None:
+    if beyond.any():
+        first = int(np.flatnonzero(beyond)[0])
+        raise InputError(_range(where, row + first, values[first]))
+
+
+def _range(where: str, row: int, value: object) -> str:
+    return f"{where} is {value!s:.40} in row {row}; a time must be finite and within 292 years (is its unit right?)"
+
+
+_DATE = r"[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8}"
+_TIME = r"[0-9]{2}(?::[0-9]{2}(?::[0-9]{2})?|[0-9]{2}(?:[0-9]{2})?)"
+_ZONE = r"[Zz]|UTC|[+-][0-9]{2}(?::?[0-9]{2})?"
+_PATTERN = rf"(?P<date>{_DATE})[Tt ](?P<time>{_TIME})(?:[.,](?P<fraction>[0-9]{{1,18}}))? ?(?P<zone>{_ZONE})?"
+_ISO = re.compile(_PATTERN)
+_S = 1_000_000_000
+EXAMPLE = "2026-03-01T12:00:00.000000001Z"
+_MUST = f"a time must be a date like {EXAMPLE}"
+
+
+def is_date(text: str) -> bool:
+    """Whether a cell holds date and time."""
+    return _ISO.fullmatch(text.strip()) is not None
+
+
+class TextClock:
+    """A column of time as text, block by block: numbers or dates, but not both.
+
+    Dates with and without a zone do not mix either: nobody knows what separates them. Dates without one count as UTC;
+    digits beyond nanoseconds are cut off.
+    """
+
+    def __init__(self, unit_ns: int | None, where: str) -> None:
+        """Take the unit of numbers [ns], None for dates only, and what messages call the column."""
+        self._unit_ns, self._where = unit_ns, where
+        self._form: str | None = None
+
+    def read(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
+        """Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
+
+        Args:
+            values: text, null where there is none, shape (q,).
+            row: row of the first one, for messages.
+
+        Raises:
+            InputError: a time is neither a number nor a date, of another form than the first one, or out of range.
+        """
+        values = pc.call_function("utf8_trim_whitespace", [values])
+        if self._form is None and values.null_count < len(values):
+            first = values.drop_null()[0].as_py()
+            self._form = _form(first)
+            if self._unit_ns is None and self._form == "number" and not _is_float(first):
+                self._refuse(values, values.is_valid().to_numpy(zero_copy_only=False), row, _MUST)
+        if self._form in (None, "number"):
+            return from_text(values, self._unit_ns, self._where, row)
+        return self._dates(values, row)
+
+    def _dates(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
+        given = values.is_valid().to_numpy(zero_copy_only=False)
+        parts = pc.call_function("extract_regex", [values], pc.ExtractRegexOptions(f"^(?:{_PATTERN})$"))
+        no_date = given & ~parts.is_valid().to_numpy(zero_copy_only=False)
+        if no_date.any():
+            self._refuse(values, no_date, row, f"{_MUST}, as the first one is")
+        zone = _part(parts, "zone", "")
+        zoned = pc.call_function("not_equal", [zone, pa.scalar("")]).to_numpy(zero_copy_only=False)
+        if (other := given & (zoned != (self._form == "zone"))).any():
+            which = "with a time zone" if self._form == "zone" else "without a time zone"
+            self._refuse(values, other, row, f"all times must be {which}, as the first one is")
+        date, clock = _digits(_part(parts, "date", "19700101")), _digits(_part(parts, "time", "00"))
+        moment = _padded(date, 8) * 10**6 + _padded(clock, 6)
+        below = _padded(_part(parts, "fraction", ""), 9)
+        seconds = self._seconds(values, moment, row) - _zone_s(zone)
+        beyond = np.abs(seconds) >= LARGEST_NS // _S
+        if beyond.any():
+            self._refuse(values, beyond, row, "it must be within 292 years of 1970")
+        return np.where(given, seconds * _S + below, 0), given
+
+    def _seconds(self, values: pa.Array, number: Stamps, row: int) -> Stamps:
+        """Seconds of UTC from numbers of 14 digits each: year, month, day, hour, minute, second."""
+        months, days, hours, minutes, seconds = (number // 10**k % 100 for k in (8, 6, 4, 2, 0))
+        first = ((number // 10**10 - 1970) * 12 + months - 1).astype("datetime64[M]").astype("datetime64[D]")
+        date = first + (days - 1)
+        wrong = (months < 1) | (months > 12) | (date.astype("datetime64[M]") != first.astype("datetime64[M]"))
+        wrong |= (hours > 23) | (minutes > 59) | (seconds > 59)
+        if wrong.any():
+            self._refuse(values, wrong, row, "there is no such date or time of day")
+        return date.astype(np.int64) * 86_400 + hours * 3600 + minutes * 60 + seconds
+
+    def _refuse(self, values: pa.Array, bad: Given, row: int, why: str) -> None:
+        first = int(np.flatnonzero(bad)[0])
+        raise InputError(f"{self._where} is {values[first].as_py()!r:.60} in row {row + first}; {why}")
+
+
+def _form(text: str) -> str:
+    """Whether a time is a number, or a date with or without a zone."""
+    found = _ISO.fullmatch(text.strip())
+    return "number" if found is None else "zone" if found["zone"] else "local"
+
+
+def _is_float(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _part(parts: pa.Array, name: str, default: str) -> pa.Array:
+    """One group of the pattern, the default where there is none."""
+    return pc.fill_null(pc.call_function("struct_field", [parts], pc.StructFieldOptions([name])), default)
+
+
+def _digits(text: pa.Array) -> pa.Array:
+    options = pc.ReplaceSubstringOptions("[^0-9]", "")
+    return pc.call_function("replace_substring_regex", [text], options)
+
+
+def _padded(digits: pa.Array, width: int) -> Stamps:
+    """Digits as numbers, zeros added behind or digits left out there so that each has as many."""
+    padded = pc.call_function("utf8_rpad", [digits], pc.PadOptions(width, "0"))
+    cut = pc.call_function("utf8_slice_codeunits", [padded], pc.SliceOptions(0, width))
+    return cut.cast(pa.int64()).to_numpy(zero_copy_only=False)
+
+
+def _zone_s(zone: pa.Array) -> Stamps:
+    """Seconds that clocks of each zone are ahead of UTC."""
+    number = _padded(_digits(zone), 4)
+    behind = pc.call_function("starts_with", [zone], pc.MatchSubstringOptions("-"))
+    sign = np.where(behind.to_numpy(zero_copy_only=False), -1, 1)
+    return sign * (number // 100 * 3600 + number % 100 * 60)
+
 
 _COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
 
