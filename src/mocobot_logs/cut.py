@@ -1,10 +1,6 @@
-"""What of a log is wanted, as a user says it: ``12:95`` and ``robot=2:30-31``, in seconds from the log's start.
+"""Parts of a log: what a user keeps (``12:95``) and drops (``robot=2:30-31``), and the parts between gaps.
 
-The log's start is the earliest first stamp of its robots. Both ends of a span belong to it.
-
-One look through a log's stamps: where it begins and ends, where samples are missing, what a choice leaves out.
-
-Parts of a log between its holes.
+Seconds count from the log's start, the earliest first stamp of its robots. Both ends of a span belong to it.
 """
 
 import re
@@ -19,12 +15,19 @@ from estimator.errors import InputError
 from mocobot_logs.log import Level, LogSource, Samples, Stamps, rows_of
 from mocobot_logs.resample import is_hole
 
+SHORTEST_NS = 9_500_000_000
+"""Shortest part that becomes a trial [ns]: of what resampling leaves (it may take 0.1 s at either end), ``estimate``
+and ``diagnose`` leave out 2 s at either end for their filters, and a diagnosis needs 5 s of the rest."""
+UNEVEN_NS = 100_000_000
+"""Robots that begin or end so much apart are told of [ns]."""
 _S = r"(\d{1,12}(?:\.\d*)?|\.\d+)"
 _CROP = re.compile(rf"{_S}?:{_S}?", re.ASCII)
 _DROP = re.compile(rf"robot=(\d{{1,4}}):{_S}-{_S}", re.ASCII)
 _NS_PER_S = 1_000_000_000
 LATEST_NS = 10**12 * _NS_PER_S
 """Where a span ends that says no end: later than any log."""
+_UNEVEN = "not all robots have samples"
+_LOOK = 1024  # stamps that tell the period
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,10 @@ class Span:
         """From one end to the other [ns]."""
         return self.last_ns - self.first_ns
 
+    def holds(self, after_ns: Stamps) -> NDArray[np.bool_]:
+        """Which times after the log's start [ns] are inside."""
+        return (after_ns >= self.first_ns) & (after_ns <= self.last_ns)
+
     def __str__(self) -> str:
         """Such as "12 to 95 s"."""
         return f"{seconds(self.first_ns)} to {'the end' if self.last_ns >= LATEST_NS else f'{seconds(self.last_ns)} s'}"
@@ -46,12 +53,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Drop:
-    """Samples of one robot that are left out.
-
-    Attributes:
-        robot: counted from 1.
-        span: when.
-    """
+    """Samples of one robot, counted from 1, that are left out."""
 
     robot: int
     span: Span
@@ -63,12 +65,7 @@ class Drop:
 
 @dataclass(frozen=True)
 class Choice:
-    """What is wanted of a log.
-
-    Attributes:
-        crop: the part that is kept, None for all of it.
-        drops: what is left out of it.
-    """
+    """What is wanted of a log: the part that is kept (None for all of it), and what is left out of that."""
 
     crop: Span | None = None
     drops: tuple[Drop, ...] = ()
@@ -80,6 +77,23 @@ class Choice:
 
 WHOLE = Choice()
 """All of a log."""
+
+
+@dataclass(frozen=True)
+class Omission:
+    """Time of a log that is in no recording.
+
+    Attributes:
+        span: after the log's start.
+        robot: whose samples are left out, from 1, or None for all robots.
+        samples: how many of them, where they were counted.
+        why: in words.
+    """
+
+    span: Span
+    robot: int | None
+    samples: int | None
+    why: str
 
 
 def parse_choice(crop: str | None, drops: Iterable[str] = ()) -> Choice:
@@ -101,8 +115,7 @@ def seconds(ns: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def to_ns(text: str) -> int:
-    """Seconds in decimals as nanoseconds, exact down to these."""
+def _ns(text: str) -> int:
     return round(Decimal(text) * _NS_PER_S)
 
 
@@ -113,7 +126,7 @@ def _crop(text: str) -> Span:
             f"--crop is {text!r:.60}; it must be FROM:TO in seconds from the log's start, such as 12:95, 12: or :95"
         )
     first, last = found.groups()
-    span = Span(to_ns(first or "0"), LATEST_NS if last is None else to_ns(last))
+    span = Span(_ns(first or "0"), LATEST_NS if last is None else _ns(last))
     if span.last_ns <= span.first_ns:
         raise InputError(f"--crop is {text!r:.60}, which ends before it begins; nothing would be left")
     return span
@@ -126,7 +139,7 @@ def _drop(text: str) -> Drop:
             f"--drop is {text!r:.60}; it must be robot=N:FROM-TO in seconds from the log's start, such as "
             "robot=2:30-31"
         )
-    span = Span(to_ns(found[2]), to_ns(found[3]))
+    span = Span(_ns(found[2]), _ns(found[3]))
     if span.last_ns < span.first_ns:
         raise InputError(f"--drop is {text!r:.60}, which ends before it begins")
     return Drop(int(found[1]), span)
@@ -162,30 +175,14 @@ class Piece:
             after = samples.stamp_ns - self._origin_ns
             keep = np.ones(len(after), bool)
             if self.span is not None:
-                keep &= (after >= self.span.first_ns) & (after <= self.span.last_ns)
+                keep &= self.span.holds(after)
                 passed[robot] |= bool(len(after) and after[-1] > self.span.last_ns)
             for span in self._drops[robot]:
-                keep &= (after < span.first_ns) | (after > span.last_ns)
+                keep &= ~span.holds(after)
             if keep.any():
                 yield robot, samples if keep.all() else rows_of(samples, keep)
             if all(passed):
                 return
-
-
-_LOOK = 1024  # stamps that tell the period
-
-
-@dataclass(frozen=True)
-class Hole:
-    """Time without samples that is too long to be filled.
-
-    Attributes:
-        robot: counted from 1.
-        span: from the last sample before to the first one after it.
-    """
-
-    robot: int
-    span: Span
 
 
 @dataclass(frozen=True)
@@ -194,39 +191,32 @@ class Extent:
 
     Attributes:
         origin_ns: stamp of the start, the earliest first stamp of all robots [ns].
-        whole: from the start to the latest stamp.
-        chosen: what of that is kept.
+        chosen: what of the log is kept.
         common: from the latest first to the earliest last sample of the robots, as chosen; None if they have no time
             in common.
-        holes: in what is chosen.
-        dropped: samples that each of the choice's drops leaves out.
+        holes: robot (from 1) and time without samples, from sample to sample, that is too long to be filled.
+        left_out: what the choice leaves out.
         period_ns: the longest period of a robot's samples [ns].
     """
 
     origin_ns: int
-    whole: Span
     chosen: Span
     common: Span | None
-    holes: tuple[Hole, ...]
-    dropped: tuple[int, ...]
+    holes: tuple[tuple[int, Span], ...]
+    left_out: tuple[Omission, ...]
     period_ns: float
 
 
 def extent_of(
     source: LogSource, choice: Choice, max_gap_s: float, advance: Callable[[int], object] = lambda _: None
 ) -> Extent:
-    """Look through a log; only its stamps are kept in memory.
-
-    Rows that lack a value are no samples.
+    """Look through a log; only its stamps are kept in memory. Rows that lack a value are no samples.
 
     Args:
         source: the log.
         choice: what is wanted of it.
         max_gap_s: longest time without samples beyond one period that is no hole [s].
         advance: takes the progress made, in the source's units.
-
-    Raises:
-        InputError: the log is damaged; a drop names no robot or no sample; or the crop leaves a robot without samples.
     """
     for drop in choice.drops:
         if not 1 <= drop.robot <= source.robots:
@@ -234,65 +224,61 @@ def extent_of(
                 f"{source.name}: --drop {drop}: there is no robot {drop.robot}; robots are counted from 1 to "
                 f"{source.robots}"
             )
-    stamps, starts, ends = _stamps(source, advance)
-    known = [robot for robot, start in enumerate(starts) if start is not None]
-    if not known:
+    stamps, ends = _stamps(source, advance)
+    if not ends:
         raise InputError(f"{source.name}: has no samples")
-    origin_ns = min(starts[robot] for robot in known)  # type: ignore[type-var]
-    whole = Span(0, max(ends[robot] for robot in known) - origin_ns)
+    origin_ns = min(first for first, _ in ends.values())
+    last_ns = max(last for _, last in ends.values()) - origin_ns
     after = [np.asarray(each - origin_ns) for each in stamps]  # wraps for what the screen refuses
-    if choice.crop is not None and choice.crop.first_ns > whole.last_ns:
-        raise InputError(
-            f"{source.name}: --crop {choice.crop}: the log ends {seconds(whole.last_ns)} s after its start"
-        )
-    dropped = []
-    keep = [_inside(each, choice.crop) if choice.crop else np.ones(len(each), bool) for each in after]
+    chosen, left_out = Span(0, last_ns), []
+    if (crop := choice.crop) is not None:
+        if crop.first_ns > last_ns:
+            raise InputError(
+                f"{source.name}: --crop {crop}: the log ends {seconds(last_ns)} s after its start"
+            )
+        chosen = Span(crop.first_ns, min(crop.last_ns, last_ns))
+        if chosen.first_ns > 0:
+            left_out.append(Omission(Span(0, chosen.first_ns), None, None, "cropped"))
+        if chosen.last_ns < last_ns:
+            left_out.append(Omission(Span(chosen.last_ns, last_ns), None, None, "cropped"))
+    keep = [np.ones(len(each), bool) if crop is None else crop.holds(each) for each in after]
     for drop in choice.drops:
-        out = _inside(after[drop.robot - 1], drop.span)
+        times = after[drop.robot - 1]
+        out = drop.span.holds(times)
         if not out.any():
             raise InputError(
-                f"{source.name}: --drop {drop}: robot {drop.robot} has no samples then{_range(after[drop.robot - 1])}"
+                f"{source.name}: --drop {drop}: robot {drop.robot} has no samples then{_range(times)}"
             )
-        dropped.append(int(out.sum()))
+        left_out.append(Omission(drop.span, drop.robot, int(out.sum()), "dropped"))
         keep[drop.robot - 1] &= ~out
-    chosen = [each[mask] for each, mask in zip(after, keep, strict=True)]
-    for robot, each in enumerate(chosen, 1):
+    kept = [each[mask] for each, mask in zip(after, keep, strict=True)]
+    for robot, each in enumerate(kept, 1):
         if choice and not len(each):
             raise InputError(
                 f"{source.name}: what --crop and --drop leave holds no sample of robot {robot}"
                 f"{_range(after[robot - 1])}"
             )
-    periods = [_period_ns(each) for each in chosen]
+    periods = [_period_ns(each) for each in kept]
     holes = [
-        Hole(robot, Span(int(each[k]), int(each[k + 1])))
-        for robot, (each, period) in enumerate(zip(chosen, periods, strict=True), 1)
+        (robot, Span(int(each[k]), int(each[k + 1])))
+        for robot, (each, period) in enumerate(zip(kept, periods, strict=True), 1)
         for k in np.flatnonzero(is_hole(np.diff(each), period, max_gap_s))
     ]
-    window = whole
-    if choice.crop is not None:
-        window = Span(choice.crop.first_ns, min(choice.crop.last_ns, whole.last_ns))
-    return Extent(origin_ns, whole, window, _common(chosen), tuple(holes), tuple(dropped), max(periods))
+    return Extent(origin_ns, chosen, _common(kept), tuple(holes), tuple(left_out), max(periods))
 
 
 def _stamps(
     source: LogSource, advance: Callable[[int], object]
-) -> tuple[list[Stamps], list[int | None], list[int]]:
-    """Stamps of every robot's whole rows, its first stamp of all, and its last."""
+) -> tuple[list[Stamps], dict[int, tuple[int, int]]]:
+    """Stamps of every robot's whole rows, and by robot its first and last stamp of all."""
     parts: list[list[Stamps]] = [[np.empty(0, np.int64)] for _ in range(source.robots)]
-    starts: list[int | None] = [None] * source.robots
-    ends = [0] * source.robots
+    ends: dict[int, tuple[int, int]] = {}
     for robot, samples in source.chunks(advance):
-        if not len(samples.stamp_ns):
-            continue
-        if starts[robot] is None:
-            starts[robot] = int(samples.stamp_ns[0])
-        ends[robot] = int(samples.stamp_ns[-1])
-        parts[robot].append(samples.stamp_ns[~np.isnan(samples.values).any(axis=1)])
-    return [np.concatenate(each) for each in parts], starts, ends
-
-
-def _inside(after_ns: Stamps, span: Span) -> NDArray[np.bool_]:
-    return (after_ns >= span.first_ns) & (after_ns <= span.last_ns)
+        if len(samples.stamp_ns):
+            first, last = int(samples.stamp_ns[0]), int(samples.stamp_ns[-1])
+            ends[robot] = ends.get(robot, (first, last))[0], last
+            parts[robot].append(samples.stamp_ns[~np.isnan(samples.values).any(axis=1)])
+    return [np.concatenate(each) for each in parts], ends
 
 
 def _range(after_ns: Stamps) -> str:
@@ -307,80 +293,33 @@ def _period_ns(after_ns: Stamps) -> float:
     return float(np.median(steps)) if len(steps) else 1.0
 
 
-def _common(chosen: list[Stamps]) -> Span | None:
-    if not all(map(len, chosen)):
+def _common(kept: list[Stamps]) -> Span | None:
+    if not all(map(len, kept)):
         return None
-    first, last = max(int(each[0]) for each in chosen), min(int(each[-1]) for each in chosen)
+    first, last = max(int(each[0]) for each in kept), min(int(each[-1]) for each in kept)
     return Span(first, last) if first < last else None
 
 
-SHORTEST_NS = 9_500_000_000
-"""Shortest part that becomes a trial [ns]: of what resampling leaves (it may take 0.1 s at either end), ``estimate``
-and ``diagnose`` leave out 2 s at either end for their filters, and a diagnosis needs 5 s of the rest."""
-
-UNEVEN_NS = 100_000_000
-"""Robots that begin or end so much apart are told of [ns]."""
-UNEVEN = "not all robots have samples"
-
-
-@dataclass(frozen=True)
-class Omission:
-    """Time of a log that is in no recording.
-
-    Attributes:
-        span: after the log's start.
-        robot: whose samples are left out, from 1, or None for all robots.
-        samples: how many of them, where they were counted.
-        why: in words.
-    """
-
-    span: Span
-    robot: int | None
-    samples: int | None
-    why: str
-
-
-def omissions(extent: Extent, choice: Choice) -> list[Omission]:
-    """What a choice leaves out of a log."""
-    out = []
-    if extent.chosen.first_ns > 0:
-        out.append(Omission(Span(0, extent.chosen.first_ns), None, None, "cropped"))
-    if extent.chosen.last_ns < extent.whole.last_ns:
-        out.append(Omission(Span(extent.chosen.last_ns, extent.whole.last_ns), None, None, "cropped"))
-    return out + [
-        Omission(drop.span, drop.robot, count, "dropped")
-        for drop, count in zip(choice.drops, extent.dropped, strict=True)
-    ]
-
-
 def split(extent: Extent) -> tuple[list[Span], list[Omission]]:
-    """Spans in which every robot has samples without a hole, and what lies between them.
+    """Spans in which every robot has samples without a hole, however short, and what lies between them, in order.
 
     A hole in one robot's samples is one for all: forces and motions of a team mean something together only.
-
-    Args:
-        extent: of the log.
-
-    Returns:
-        The spans, however short, and the rest, each in order.
     """
     if extent.common is None:
         return [], []
     at, last = extent.common.first_ns, extent.common.last_ns
     spans, out = [], []
     if at - extent.chosen.first_ns > UNEVEN_NS:
-        out.append(Omission(Span(extent.chosen.first_ns, at), None, None, UNEVEN))
-    holes = sorted(extent.holes, key=lambda hole: (hole.span.first_ns, hole.span.last_ns))
-    for hole in holes:
-        start, end = hole.span.first_ns, hole.span.last_ns
-        if end < at or start >= last:
+        out.append(Omission(Span(extent.chosen.first_ns, at), None, None, _UNEVEN))
+    for robot, hole in sorted(extent.holes, key=lambda each: (each[1].first_ns, each[1].last_ns)):
+        if hole.last_ns < at or hole.first_ns >= last:
             continue
-        if start > at:
-            spans.append(Span(at, start))
-        out.append(Omission(hole.span, None, None, f"robot {hole.robot} has no samples"))
-        at = max(at, end)
+        if hole.first_ns > at:
+            spans.append(Span(at, hole.first_ns))
+        out.append(Omission(hole, None, None, f"robot {robot} has no samples"))
+        at = max(at, hole.last_ns)
     if last > at:
         spans.append(Span(at, last))
     if extent.chosen.last_ns - last > UNEVEN_NS:
-        out.append(Omission(Span(last, extent.chosen.last_ns), None, None, UNEVEN))
+        out.append(Omission(Span(last, extent.chosen.last_ns), None, None, _UNEVEN))
     return spans, out

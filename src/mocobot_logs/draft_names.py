@@ -213,11 +213,7 @@ class Candidate:
 
 
 def of_table(table: Table) -> list[Candidate]:
-    """Candidates of a table.
-
-    Raises:
-        InputError: it is damaged.
-    """
+    """Candidates of a table."""
     places: dict[Place, str] = {}
     for column, shape in table.shapes.items():
         if np.prod(shape, dtype=object) == 1:
@@ -264,11 +260,7 @@ def _of_robots(column: str, robot: int, k: int) -> Reading | None:
 
 
 def _values(table: Table, places: list[Place]) -> dict[Place, Array]:
-    """First values of some places; nothing of columns that hold no numbers.
-
-    Raises:
-        BrokenRowsError: no column can be read.
-    """
+    """First values of some places; nothing of columns that hold no numbers."""
     try:
         return _values_of(table, places)
     except BrokenRowsError:
@@ -302,11 +294,7 @@ _DEEPEST, _MOST = 4, 64
 
 
 def of_bag(path: Path) -> tuple[list[Candidate], frozenset[str]]:
-    """Candidates of a bag (joints of joint states, numbers of other messages), and topics without stamps of their own.
-
-    Raises:
-        InputError: it is damaged.
-    """
+    """Candidates of a bag (joints of joint states, numbers of other messages), and topics that have no stamps."""
     from mocobot_logs.bag.cdr import (  # takes a third of a second
         JOINT_STATE,
         CdrReader,

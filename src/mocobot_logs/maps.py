@@ -18,7 +18,7 @@ from estimator.errors import InputError
 from estimator.inputs import parse_toml
 from estimator.recording.metadata import TRIALS
 from estimator.strict import Fields, check_known
-from mocobot_logs.faults import detail_of, read_small
+from mocobot_logs.formats import detail_of, read_small
 from mocobot_logs.log import CHANNELS, REF, Level
 from mocobot_logs.units import COUNTS, DATES, TIME_UNITS, si_factor
 
@@ -191,11 +191,7 @@ class LogMap:
         return re.sub(r"\{(\w+)\}", lambda found: values.get(found[1], found[0]), text)
 
     def require(self, key: Literal["topic", "field", "column"], kind: str) -> None:
-        """Check that the map locates every channel in a kind of log, named in the plural.
-
-        Raises:
-            InputError: a channel lacks the key.
-        """
+        """Check that the map locates every channel in a kind of log, named in the plural."""
         tables = {"channels": self.common, **{f"robot.{r}.channels": own for r, own in self.own.items()}}
         for table, channels in tables.items():
             for name, channel in channels.items():
@@ -214,9 +210,6 @@ class LogMap:
             where: what messages call the log.
             is_there: whether it has anything of a robot, counted from 1.
             key: what locates channels in it.
-
-        Raises:
-            InputError: one robot is missing between others.
         """
         if self.robots is not None:
             return self.robots
@@ -252,22 +245,14 @@ class LogMap:
 
 
 def check_version(values: Values, where: str) -> None:
-    """Refuse a map of another version, before all else: it may have other keys.
-
-    Raises:
-        InputError: it is of another version.
-    """
+    """Refuse a map of another version, before all else: it may have other keys."""
     version = values.get("version", VERSION)
     if type(version) is not int or version != VERSION:
         raise InputError(f"{where}: version is {version!r:.40}; this program reads version {VERSION}")
 
 
 def table_of(values: Values, key: str, where: str) -> dict[str, Any]:
-    """A table inside another one, empty where there is none.
-
-    Raises:
-        InputError: it is no table.
-    """
+    """A table inside another one, empty where there is none."""
     table = values.get(key, {})
     if not isinstance(table, dict):
         raise InputError(f"{where}: {key} is {table!r:.40}; it must be a table, [{key}]")
@@ -275,11 +260,7 @@ def table_of(values: Values, key: str, where: str) -> dict[str, Any]:
 
 
 def check_placeholders(fields: Fields, key: str, known: Sequence[str]) -> str | None:
-    """A text whose placeholders are known, None where there is none.
-
-    Raises:
-        InputError: a placeholder is not known; without ``known``, none is.
-    """
+    """A text whose placeholders are known, None where there is none."""
     if key not in fields:
         return None
     text = fields.text(key)
@@ -301,9 +282,6 @@ def parse_channel(
         fields: of the table, ``unit`` among them.
         placeholders: that its texts may hold.
         dimension, units, noun: see ``si_factor``.
-
-    Raises:
-        InputError: a value is not allowed, or one is missing, or does not go with another.
     """
     place = {key: check_placeholders(fields, key, placeholders) for key in PLACES}
     if place["column"] is None and (place["topic"] is None or place["field"] is None):
@@ -332,11 +310,7 @@ def parse_channel(
 
 
 def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEHOLDERS) -> TimeMap:
-    """Where time is, by the table ``[time]``.
-
-    Raises:
-        InputError: a key is unknown, or a value not allowed.
-    """
+    """Where time is, by the table ``[time]``."""
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     return TimeMap(
         column=check_placeholders(fields, "column", placeholders),
@@ -346,11 +320,7 @@ def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEH
 
 
 def parse_csv(values: Values, where: str) -> CsvMap:
-    """How a text table is written, by the table ``[csv]``.
-
-    Raises:
-        InputError: a key is unknown, or a value not allowed.
-    """
+    """How a text table is written, by the table ``[csv]``."""
     fields = Fields(values, (), where, _CSV)
     delimiter = values.get("delimiter")
     decimal: Literal[".", ","] = fields.one_of("decimal", (".", ",")) if "decimal" in fields else "."

@@ -51,11 +51,7 @@ def _open(path: Path, log_map: LogMap | None, episode: int | None) -> LogSource:
 
 @contextmanager
 def draft_suggested(path: Path) -> Iterator[None]:
-    """A block in which a log is read without a map, and what is said if it cannot be.
-
-    Raises:
-        InputError: it cannot be.
-    """
+    """A block in which a log is read without a map, and what is said if it cannot be."""
     try:
         yield
     except InputError as error:

@@ -13,11 +13,7 @@ rate of 1 kHz leaves 4e-4 of its amplitude below 0.18 r, one at 0.49 leaves 3 %.
 Then, for k > 1, a linear-phase FIR filter, its delay taken out, and every k-th sample: flat to 5e-6 below 0.2 r,
 weaker than -108 dB from 0.5 r on, so that nothing above half the output rate folds to anywhere.
 
-Missing samples of a stream, and samples that crowd.
-
-From a robot's rows to evenly spaced samples, block by block, whatever pieces the rows come in.
-
-What a conversion makes of the sensors' errors: drawn where samples were read, and sent the same way.
+Before that, rows that crowd are averaged (``Merger``) and missing samples filled in (``fill_gaps``).
 """
 
 from __future__ import annotations
@@ -32,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.signal import firwin, kaiser_beta, kaiserord, upfirdn
 
-from estimator.recording.sampling import Method, Sampling
+from estimator.recording.sampling import Sampling
 from mocobot_logs.log import NS, Array, Stamps
 
 PASS, STOP = 0.2, 0.5
@@ -102,12 +98,10 @@ def side(missing: int) -> int:
 def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[Array, Array]:
     """Put samples where some are missing, evenly spaced in each gap.
 
-    They lie on the polynomial of degree 7 through ``side`` samples before and after the gap, by least squares
-    where these are more than eight. An interpolating spline would be as good without noise; with noise it
-    swings the wider the longer the gap, because its slopes rest on single samples. This rests on as many
-    samples as are missing, and two more, on either side: its noise is 0.8 to 1.9 times that of one sample,
-    however long the gap. Of a sine of 1 Hz sampled at 100 Hz it misses 4e-12 with one sample missing, 9e-9 with
-    five; of 5 Hz, 1.3e-6 and 3e-3.
+    They lie on the polynomial of degree 7 through ``side`` samples before and after the gap, by least squares where
+    these are more than eight. A spline would swing with noise, the wider the longer the gap; this has 0.8 to 1.9 times
+    the noise of one sample, however long the gap. It misses 4e-12 of a sine of 1 Hz sampled at 100 Hz with one sample
+    missing, 9e-9 with five; 1.3e-6 and 3e-3 of one of 5 Hz.
 
     Args:
         time: of the samples, strictly increasing, shape (q,); q at least 2.
@@ -151,13 +145,9 @@ def polynomial_weights(nodes: Array, targets: Array, degree: int) -> Array:
 
 
 class Merger:
-    """Averages rows that crowd, chunk by chunk.
+    """Averages rows less than ``CROWDED`` periods after the row before, chunk by chunk; counts them as ``merged``.
 
-    A callback that is late and then in time leaves two samples a moment apart. Any slope between them would be
-    noise, so that rows less than ``CROWDED`` periods after the row before them become one with it.
-
-    Attributes:
-        merged: rows that are no longer rows of their own.
+    A callback that is late and then in time leaves two samples a moment apart. Any slope between them would be noise.
     """
 
     def __init__(self, period_ns: float) -> None:
@@ -220,11 +210,6 @@ class Grid:
     fitted_rows: int = 0
     uneven: bool = False
 
-    @property
-    def method(self) -> Method:
-        """What is done to samples that do not fit."""
-        return "fitted" if self.fitted_rows else "interpolated"
-
     def holds(self, time_ns: Stamps) -> bool:
         """Whether all times [ns] are within ``TOLERANCE_NS`` of instants of the grid, no two at the same."""
         index = self.index(time_ns)
@@ -237,11 +222,9 @@ class Grid:
 
 
 class Interpolator:
-    """Fills gaps and interpolates onto a grid.
+    """Fills gaps and interpolates onto a grid, in blocks of ``BLOCK`` rows with enough rows on either side.
 
-    Blocks of ``BLOCK`` rows are worked on with enough rows on either side that the result is that of the whole
-    stream, to rounding. Where blocks begin depends on the rows alone, so that the pieces in which they come
-    change nothing at all.
+    The result is that of the whole stream, to rounding, and does not depend on the pieces in which rows come.
     """
 
     def __init__(self, grid: Grid, max_gap_s: float) -> None:
@@ -324,6 +307,28 @@ def _fitted(time: Array, values: Array, at: Array, width: int) -> Array:
     return np.einsum("nw,nwc->nc", weights, values[rows], optimize=True)
 
 
+def on_grid(time_ns: Stamps, values: Array, grid: Grid, k: int) -> tuple[Array, int]:
+    """All rows of a stream at once: merged, filled, brought onto a grid, low-passed, thinned.
+
+    Args:
+        time_ns: after the first row [ns], shape (q,).
+        values: shape (q, C).
+        grid: the fine grid.
+        k: so many of its samples make one of the output.
+
+    Returns:
+        Output samples, shape (Q, C), and how many are missing before the first one (``Decimator.lead``).
+    """
+    if not (grid.fits or grid.fitted_rows):
+        merger = Merger(grid.period_ns)
+        (time_ns, values), (last_ns, last) = merger.push(time_ns, values), merger.finish()
+        time_ns, values = np.concatenate([time_ns, last_ns]), np.concatenate([values, last])
+    interpolator = Interpolator(grid, float(np.max(np.diff(time_ns))) * NS)
+    fine = np.concatenate([*interpolator.push(time_ns, values), interpolator.finish()])
+    decimator = Decimator(k)
+    return decimator.push(fine), decimator.lead
+
+
 _MARGIN_S = 0.3
 """Read before and after the recording, so that the low-pass is filled [s]."""
 
@@ -336,10 +341,8 @@ class Resampling:
 
     Attributes:
         instants_ns: when samples are read, in the recording's time [ns], shape (q,).
-        grid: onto which they are brought.
-        thinned: so many samples of the grid make one of the recording.
-        rate_hz: of the recording [Hz].
-        samples: of the recording.
+        grid, thinned: onto which they are brought, see ``on_grid``.
+        rate_hz, samples: of the recording.
     """
 
     instants_ns: Stamps
@@ -374,15 +377,8 @@ class Resampling:
     def __call__(self, values: Array) -> Array:
         """Samples of the recording from readings at ``instants``, shape (q, C) -> (Q, C)."""
         time_ns = self.instants_ns - self.instants_ns[0]
-        if not (self.grid.fits or self.grid.fitted_rows):
-            merger = Merger(self.grid.period_ns)
-            (time_ns, values), (last_ns, last) = merger.push(time_ns, values), merger.finish()
-            time_ns, values = np.concatenate([time_ns, last_ns]), np.concatenate([values, last])
-        interpolator = Interpolator(self.grid, float(np.max(np.diff(time_ns))) * NS)
-        fine = [*interpolator.push(time_ns, values), interpolator.finish()]
-        decimator = Decimator(self.thinned)
-        own = decimator.push(np.concatenate(fine))
-        first_s = self.instants_ns[0] * NS + decimator.lead / self.rate_hz
+        own, lead = on_grid(time_ns, values, self.grid, self.thinned)
+        first_s = self.instants_ns[0] * NS + lead / self.rate_hz
         at = np.arange(self.samples) - first_s * self.rate_hz
         whole = np.rint(at).astype(np.int64)
         if np.all(np.abs(at - whole) <= TOLERANCE_NS * NS * self.rate_hz):

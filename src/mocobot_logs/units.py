@@ -21,7 +21,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "flag": {"1": 1.0},
 }  # fmt: skip
 COUNTS = "counts"
-"""Of an encoder, once ``counts_per_turn`` (per metre of a slide) is known; of a duty by its ``full_scale``."""
+"""Counts of an encoder need ``counts_per_turn`` (per metre of a slide), those of a duty ``full_scale``."""
 RATED = {"%": 0.01, "permille": 0.001, "V": 1.0}
 """Shares of a ``rated`` torque, force or current."""
 NUMBERED = ("counts_per_turn", "full_scale", "rated")
@@ -47,9 +47,6 @@ def si_factor(fields: Fields, dimension: str, allowed: Sequence[str], noun: str)
         dimension: a key of ``FACTORS``.
         allowed: the units that may be used.
         noun: what messages call the quantity, in the plural.
-
-    Raises:
-        InputError: the unit is not allowed, or the number that belongs to it is missing, too much or not positive.
     """
     unit, where = fields.values["unit"], fields.where
     if unit not in allowed:

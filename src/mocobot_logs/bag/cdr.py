@@ -1,15 +1,12 @@
-"""Message types of a bag: from their definitions to typed fields, and dotted paths through them.
-
-One CDR message, walked field by field to find where its numbers lie.
-
-Encapsulation as in OMG DDSI-RTPS 2.5, section 10; alignment as in plain CDR (XCDR1), which is what ROS 2 writes.
-
-Numbers out of CDR messages, many at a time.
+"""Numbers out of CDR messages, many at a time.
 
 Where a number lies in a CDR message depends on the lengths of the strings and arrays before it. Robots send messages
 whose lengths never change, so one message is walked field by field to find where its numbers are (its layout), and all
 messages with the same lengths, and the same joint names, are read at those places at once. A message with other lengths
 gets a layout of its own.
+
+Encapsulation is that of OMG DDSI-RTPS 2.5, section 10; alignment is plain CDR (XCDR1), which is what ROS 2 writes.
+Every refusal is an ``InputError`` that names the bag and the topic.
 """
 
 import re
@@ -31,15 +28,30 @@ from mocobot_logs.log import Stamps
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STRING = "std_msgs/msg/String"
-SIZES = {
+LARGEST_NESTED = 10_000
+"""Most strings and structures in one message; numbers in arrays do not count."""
+_SIZES = {
     "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
     "int64": 8, "uint64": 8, "float32": 4, "float64": 8,
 }  # fmt: skip
 """Numbers of a message and their sizes [bytes]."""
+_SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 _TIME = "builtin_interfaces/msg/Time"
 _DEEPEST = 32
 _IDL = "=" * 80 + "\n"
 _EMPTY: list[tuple[str, FieldDesc]] = [("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))]
+_REFUSED = {
+    **dict.fromkeys((2, 3), "PL_CDR"),
+    **dict.fromkeys((6, 7, 16, 17), "CDR2"),
+    **dict.fromkeys((8, 9, 20, 21), "delimited CDR2"),
+    **dict.fromkeys((10, 11, 18, 19), "PL_CDR2"),
+}  # numbers of RTPS and of older XTypes
+_TRAILING = 3  # bytes that bring a message to a multiple of four
+_NEW_LAYOUTS = 4
+"""So many new layouts of one size are looked for among all messages of a block; beyond them, one by one."""
+_KEPT_LAYOUTS = 64
+_GROUP = 8192
+"""So many messages are read at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +69,7 @@ class MessageType:
     where: str
 
     def fields(self, name: str) -> list[tuple[str, FieldDesc]]:
-        """Names and types of a type's fields; one byte where it has none, as ROS 2 does.
-
-        Raises:
-            InputError: the bag does not define the type, and no ROS 2 distribution does.
-        """
+        """Names and types of a type's fields; one byte where it has none, as ROS 2 does."""
         if name not in self.types and name not in _known():
             raise InputError(
                 f"{self.where}: its messages hold the type {printable(name)}, which the bag does not define"
@@ -69,11 +77,7 @@ class MessageType:
         return (self.types[name] if name in self.types else _known()[name])[1] or _EMPTY
 
     def require(self, path: str) -> None:
-        """Check that a dotted path leads to a number, such as ``point.x`` or ``data[2]``.
-
-        Raises:
-            InputError: it does not.
-        """
+        """Refuse a dotted path that does not lead to a number, as ``point.x`` or ``data[2]`` may."""
         here, walked = self.name, ""
         parts = path.split(".")
         for number, part in enumerate(parts):
@@ -87,29 +91,24 @@ class MessageType:
                 )
             walked = f"{walked}.{part}" if walked else part
             kind, detail = fields[found[1]]
-            is_array = kind in (Nodetype.ARRAY, Nodetype.SEQUENCE)
+            is_array, is_last = kind in (Nodetype.ARRAY, Nodetype.SEQUENCE), number == len(parts) - 1
+            what = None
             if is_array != (found[2] is not None):
-                hint = f"is an array; name one element, such as {part}[0]" if is_array else "is not an array"
-                raise InputError(f"{self.where}: field {walked!r:.80} {hint}")
-            if is_array:
+                what = f"is an array; name one element, such as {part}[0]" if is_array else "is not an array"
+            elif is_array:
                 kind, detail = detail[0]  # type: ignore[misc]
-            if kind == Nodetype.NAME:
+            if what is None and kind == Nodetype.NAME:
                 here = str(detail)
-                if number == len(parts) - 1:
-                    raise InputError(
-                        f"{self.where}: field {walked!r:.80} is a {printable(here)}, not a number"
-                    )
-            elif str(detail[0]) not in SIZES:
-                raise InputError(f"{self.where}: field {walked!r:.80} is a {detail[0]}, not a number")
-            elif number < len(parts) - 1:
-                raise InputError(f"{self.where}: field {walked!r:.80} is a number and has no fields")
+                what = f"is a {printable(here)}, not a number" if is_last else None
+            elif what is None and str(detail[0]) not in _SIZES:
+                what = f"is a {detail[0]}, not a number"
+            elif what is None and not is_last:
+                what = "is a number and has no fields"
+            if what is not None:
+                raise InputError(f"{self.where}: field {walked!r:.80} {what}")
 
     def require_stamp(self) -> None:
-        """Check that messages carry ``header.stamp``.
-
-        Raises:
-            InputError: they do not.
-        """
+        """Refuse messages without ``header.stamp``."""
         if dict(self.fields(self.name)).get("header") != (Nodetype.NAME, "std_msgs/msg/Header"):
             raise InputError(
                 f"{self.where}: {printable(self.name)} has no header and so no stamp of its own; "
@@ -122,32 +121,25 @@ class MessageType:
             )
 
     def require_joints(self, field: str) -> None:
-        """Check that messages have named joints with such numbers.
-
-        Raises:
-            InputError: they are not joint states.
-        """
+        """Refuse messages that are no joint states with such numbers."""
         if self.name != JOINT_STATE:
             raise InputError(
                 f"{self.where} holds {printable(self.name)}; a map's key joint goes with {JOINT_STATE}, and a dotted "
                 "path as field with other messages"
             )
         fields = dict(self.fields(self.name))
-        string, numbers = fields.get("name"), fields.get(field)
-        if string is None or string[0] != Nodetype.SEQUENCE or string[1][0][1] != ("string", 0):
-            raise InputError(
-                f"{self.where}: the bag defines {JOINT_STATE} without string[] name, which it must have"
-            )
-        if numbers is None or numbers[0] != Nodetype.SEQUENCE or numbers[1][0][1] != ("float64", 0):
-            raise InputError(f"{self.where}: the bag defines {JOINT_STATE} without float64[] {field}")
+        for wanted, base, text in (
+            ("name", "string", "string[] name"),
+            (field, "float64", f"float64[] {field}"),
+        ):
+            found = fields.get(wanted)
+            if found is None or found[0] != Nodetype.SEQUENCE or found[1][0][1] != (base, 0):
+                needed = ", which it must have" if base == "string" else ""
+                raise InputError(f"{self.where}: the bag defines {JOINT_STATE} without {text}{needed}")
 
 
 def message_type(topic: Topic, bag: str) -> MessageType:
     """The type of a topic's messages, as the bag defines it, or as ROS 2 does where the bag does not say.
-
-    Args:
-        topic: the topic.
-        bag: what messages call the bag.
 
     Raises:
         InputError: messages are not CDR, or the type is neither defined in the bag nor known.
@@ -173,11 +165,7 @@ def type_name(topic: Topic) -> str:
 
 
 def string_of(message: bytes, where: str) -> str:
-    """The text of a std_msgs/msg/String.
-
-    Raises:
-        InputError: it is not one.
-    """
+    """The text of a std_msgs/msg/String."""
     try:
         return get_typestore(Stores.LATEST).deserialize_cdr(message, STRING).data  # type: ignore[attr-defined]
     except Exception as error:  # the library raises its own type, and others on damaged bytes
@@ -214,7 +202,7 @@ def _check_depth(found: MessageType, name: str, depth: int, done: set[str]) -> N
             if (mark := f"{depth} {detail}") not in done:
                 done.add(mark)
                 _check_depth(found, str(detail), depth + 1, done)
-        elif str(detail[0]) not in SIZES and detail[0] != "string":
+        elif str(detail[0]) not in _SIZES and detail[0] != "string":
             raise InputError(
                 f"{found.where}: field {printable(field)} of {printable(name)} is a {detail[0]}, which is not read"
             )
@@ -226,33 +214,18 @@ def _known() -> Typesdict:
     return get_typestore(Stores.LATEST).fielddefs
 
 
-LARGEST_NESTED = 10_000
-"""Most strings and structures in one message; numbers in arrays do not count."""
-_REFUSED = {
-    **dict.fromkeys((2, 3), "PL_CDR"),
-    **dict.fromkeys((6, 7, 16, 17), "CDR2"),
-    **dict.fromkeys((8, 9, 20, 21), "delimited CDR2"),
-    **dict.fromkeys((10, 11, 18, 19), "PL_CDR2"),
-}  # numbers of RTPS and of older XTypes
-_TRAILING = 3  # bytes that bring a message to a multiple of four
-
-
 class CdrError(ValueError):
-    """A message is not what its type says; tells what is wrong, not where.
-
-    Attributes:
-        row: which of the messages that are read together.
-    """
+    """A message is not what its type says; tells what is wrong, not where."""
 
     def __init__(self, what: str, row: int = 0) -> None:
-        """What is wrong with which message."""
+        """What is wrong with which of the messages that are read together."""
         super().__init__(what)
         self.row = row
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """Numbers at ``offset`` in a message: one, or an array."""
+    """Numbers at ``offset`` in a message, one or an array, of a kind as NumPy has it."""
 
     offset: int
     kind: str
@@ -263,17 +236,16 @@ class Walk:
     """One message, walked.
 
     Attributes:
-        order: byte order of its numbers, as NumPy's "<" or ">".
         leaves: the numbers and arrays of numbers that are wanted, by dotted path.
         joints: the strings of its field ``name``, if wanted.
         fixed: every byte on which the places of the numbers depend: encapsulation, lengths, and names if wanted.
     """
 
     def __init__(self, message: bytes, kind: MessageType, wanted: set[str], names: bool) -> None:
-        """Walk a message.
+        """Walk a message with its encapsulation.
 
         Args:
-            message: the message with its encapsulation.
+            message: the message.
             kind: its type.
             wanted: dotted paths of numbers or of arrays of numbers.
             names: whether the strings of a field ``name`` are wanted.
@@ -289,8 +261,7 @@ class Walk:
             raise CdrError(
                 f"its encapsulation is {scheme:#06x} ({known}); plain CDR (0x0000, 0x0001) is read"
             )
-        self.order = "<" if scheme else ">"
-        self._little = "little" if scheme else "big"
+        self._order = "<" if scheme else ">"
         self._message, self._kind, self._wanted, self._names = message, kind, wanted, names
         self._at, self._nested = 4, 0
         self.leaves: dict[str, Leaf] = {}
@@ -310,7 +281,10 @@ class Walk:
             self._count(1)
             self._structure(str(detail), path)
         elif kind == Nodetype.BASE:
-            self._base(str(detail[0]), path)
+            if str(detail[0]) == "string":
+                self._string(path)
+            else:
+                self._numbers(str(detail[0]), 1, path)
         else:
             (inner, what), count = detail  # type: ignore[misc]
             if kind == Nodetype.SEQUENCE:
@@ -322,10 +296,7 @@ class Walk:
             for number in range(int(count)):
                 self._field((inner, what), f"{path}[{number}]")  # type: ignore[arg-type]
 
-    def _base(self, base: str, path: str) -> None:
-        if base != "string":
-            self._numbers(base, 1, path)
-            return
+    def _string(self, path: str) -> None:
         length = self._length()
         begin = self._at
         self._skip(length)
@@ -334,11 +305,12 @@ class Walk:
             self.joints.append(self._message[begin : self._at].rstrip(b"\0").decode(errors="replace"))
 
     def _numbers(self, base: str, count: int, path: str) -> None:
-        size = SIZES[base]
+        size = _SIZES[base]
         if count:
             self._align(size)
         if path in self._wanted:
-            self.leaves[path] = Leaf(self._at, f"{_letter(base)}{size}", count)
+            letter = "f" if base.startswith("float") else "i" if base.startswith("int") else "u"
+            self.leaves[path] = Leaf(self._at, f"{self._order}{letter}{size}", count)
         self._skip(size * count)
 
     def _length(self) -> int:
@@ -346,7 +318,7 @@ class Walk:
         begin = self._at
         self._skip(4)
         self.fixed += range(begin, self._at)
-        return int.from_bytes(self._message[begin : self._at], self._little)  # type: ignore[arg-type]
+        return int.from_bytes(self._message[begin : self._at], "little" if self._order == "<" else "big")
 
     def _align(self, size: int) -> None:
         self._at += (4 - self._at) % size  # counted from behind the encapsulation
@@ -361,18 +333,6 @@ class Walk:
         self._nested += more
         if self._nested > LARGEST_NESTED:
             raise CdrError(f"it holds more than {LARGEST_NESTED} strings and structures")
-
-
-def _letter(base: str) -> str:
-    """NumPy's letter for a kind of number."""
-    return "f" if base.startswith("float") else "i" if base.startswith("int") else "u"
-
-
-_NEW_LAYOUTS = 4
-"""So many new layouts of one size are looked for among all messages of a block; beyond them, one by one."""
-_KEPT_LAYOUTS = 64
-_GROUP = 8192
-"""So many messages are read at once."""
 
 
 @dataclass(frozen=True)
@@ -404,15 +364,12 @@ class Layout:
         """
         names = any(selector.joint is not None for selector in selectors)
         arrays = {re.sub(r"\[\d+\]$", "", selector.field) for selector in selectors}
-        time = {"header.stamp.sec", "header.stamp.nanosec"} if stamp else set()
+        time = {_SEC, _NANOSEC} if stamp else set()
         walk = Walk(message, kind, arrays | time, names)
         self.joints = walk.joints
         self._at = np.array(walk.fixed, np.intp)
         self._fixed = np.frombuffer(message, np.uint8)[self._at]
-        places: dict[str, tuple[str, int]] = {}
-        for path in time:
-            leaf = walk.leaves[path]
-            places[path] = walk.order + leaf.kind, leaf.offset
+        places = {path: (walk.leaves[path].kind, walk.leaves[path].offset) for path in time}
         self.lacking: list[str | None] = []
         for number, selector in enumerate(selectors):
             place = self._place(selector, walk)
@@ -439,7 +396,7 @@ class Layout:
         leaf = walk.leaves.get(path)
         if leaf is None or index >= leaf.count:
             return f"has no {selector.field}" if selector.joint is not None else "is missing"
-        return walk.order + leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
+        return leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Which messages, one per row, have this layout."""
@@ -453,14 +410,14 @@ class Layout:
         """
         table = np.ascontiguousarray(rows).view(self._record)[:, 0]
         stamps = np.zeros(len(rows), np.int64)
-        if "header.stamp.sec" in (self._record.names or ()):
-            nanoseconds = table["header.stamp.nanosec"].astype(np.int64)
+        if _SEC in (self._record.names or ()):
+            nanoseconds = table[_NANOSEC].astype(np.int64)
             if (bad := nanoseconds >= 1_000_000_000).any():
                 row = int(np.argmax(bad))
                 raise CdrError(
                     f"the nanoseconds of its stamp are {nanoseconds[row]}; they must be below 1e9", row
                 )
-            stamps = table["header.stamp.sec"].astype(np.int64) * 1_000_000_000 + nanoseconds
+            stamps = table[_SEC].astype(np.int64) * 1_000_000_000 + nanoseconds
         values = np.full((len(rows), len(self.lacking)), np.nan)
         for number, lacking in enumerate(self.lacking):
             if lacking is None:
@@ -478,13 +435,7 @@ class CdrReader:
     """
 
     def __init__(self, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
-        """Prepare.
-
-        Args:
-            kind: type of the messages.
-            selectors: the numbers.
-            stamp: whether to read ``header.stamp``.
-        """
+        """Take the type of the messages, the numbers, and whether to read ``header.stamp``."""
         self._kind, self._selectors, self._stamp = kind, tuple(selectors), stamp
         self._layouts: dict[int, list[Layout]] = {}
         self._kept = 0
@@ -493,11 +444,7 @@ class CdrReader:
         self.count = 0
 
     def read(self, messages: Messages) -> tuple[Stamps, Array]:
-        """Stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where a message lacks one, shape (q, S).
-
-        Raises:
-            InputError: a message is not what its type says.
-        """
+        """Stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where a message lacks one, shape (q, S)."""
         stamps = np.zeros(len(messages), np.int64)
         values = np.empty((len(messages), len(self._selectors)))
         memory = np.frombuffer(messages.block, np.uint8)

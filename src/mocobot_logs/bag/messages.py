@@ -1,12 +1,8 @@
-"""What a bag's storage hands over: its topics, and serialised messages by the block.
+"""What files of a bag hand over (topics, blocks of serialised messages), and decompression that is bounded."""
 
-Decompression that never makes more than was claimed, and refuses claims that are too large.
-"""
-
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import lz4.frame
 import numpy as np
@@ -15,15 +11,18 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.inputs import Unpacked
-from mocobot_logs.faults import detail_of, shown
+from mocobot_logs.formats import detail_of, shown
 from mocobot_logs.log import Stamps
 
 BLOCK_BYTES = 4 << 20
 """About so many bytes of messages are handed over at a time, unless a chunk of the file is larger."""
 MESSAGE_BYTES = 16 << 20
 """Largest message that is read [bytes]; one robot's joint states take some hundred."""
+CHUNK_BYTES = 256 << 20
+"""Largest chunk of a file that is unpacked in memory; recorders write chunks of about 1 MiB."""
 SHOWN = 20
 """So many topics or joints are listed in a message."""
+_STEP = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -73,60 +72,15 @@ class Messages:
         return self.block[start : start + int(self.size[index])]
 
 
-class Storage(Protocol):
-    """One file of a bag.
-
-    Attributes:
-        name: what messages call it.
-        size: bytes to read.
-        topics: by name.
-    """
-
-    name: str
-    size: int
-    topics: dict[str, Topic]
-
-    def blocks(
-        self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
-    ) -> Iterator[dict[str, Messages]]:
-        """Messages of some topics in the order of the file; topics without messages in a block are left out.
-
-        Args:
-            topics: names of the topics.
-            advance: takes the bytes read since the last call.
-            block_bytes: about so many bytes at a time, where the file leaves the choice.
-
-        Raises:
-            InputError: the file is damaged.
-        """
-        ...
-
-    def has_messages(self, topic: str) -> bool:
-        """Whether there is any message of a topic, as far as the file says.
-
-        Raises:
-            InputError: the file is damaged.
-        """
-        ...
-
-
 def joined(payloads: Sequence[bytes], log_ns: Stamps, where: str) -> Messages:
-    """Messages that come one by one, in one block of memory.
-
-    Raises:
-        InputError: one is larger than ``MESSAGE_BYTES``.
-    """
+    """Messages that come one by one, in one block of memory."""
     size = np.fromiter(map(len, payloads), np.int64, len(payloads))
     check_sizes(size, where)
     return Messages(b"".join(payloads), np.cumsum(size) - size, size, log_ns)
 
 
 def check_sizes(size: NDArray[np.int64], where: str) -> None:
-    """Refuse messages that are larger than ``MESSAGE_BYTES``.
-
-    Raises:
-        InputError: one is.
-    """
+    """Refuse messages that are larger than ``MESSAGE_BYTES``."""
     if len(size) and (largest := int(size.max())) > MESSAGE_BYTES:
         raise InputError(
             f"{where}: a message of {largest / 2**20:.1f} MiB; joint data are read from messages of at most "
@@ -135,11 +89,7 @@ def check_sizes(size: NDArray[np.int64], where: str) -> None:
 
 
 def merged(topics: Iterable[Topic], where: str) -> dict[str, Topic]:
-    """Topics by name: recorders list one once for each quality of service, and once in each file.
-
-    Raises:
-        InputError: a topic has one type or encoding here and another one there.
-    """
+    """Topics by name: recorders list one once for each quality of service, and once in each file."""
     found: dict[str, Topic] = {}
     for topic in topics:
         known = found.setdefault(topic.name, topic)
@@ -175,22 +125,12 @@ def printable(text: str) -> str:
     return shown(text, 80)
 
 
-CHUNK_BYTES = 256 << 20
-"""Largest chunk of a file that is unpacked in memory; recorders write chunks of about 1 MiB."""
-_STEP = 1 << 20
-
-
 class UnpackError(ValueError):
     """What was to be unpacked is damaged, or larger than it may be; says what is wrong, not where."""
 
 
 def unpack(data: bytes, compression: str, size: int) -> bytes:
-    """Unpack a chunk whose size is known.
-
-    Args:
-        data: packed bytes.
-        compression: "" (none), "zstd" or "lz4", as MCAP names them.
-        size: unpacked size [bytes].
+    """Unpack a chunk that claims ``size`` bytes; the compression is "", "zstd" or "lz4", as MCAP names them.
 
     Raises:
         UnpackError: unknown compression, damaged data, or another size.
@@ -203,7 +143,10 @@ def unpack(data: bytes, compression: str, size: int) -> bytes:
         elif compression == "zstd":
             unpacked = _zstd(data, size)
         elif compression == "lz4":
-            unpacked = _lz4(data, size)
+            stream = lz4.frame.LZ4FrameDecompressor()
+            unpacked = stream.decompress(data, max_length=size + 1)
+            if not stream.eof and len(unpacked) <= size:
+                raise UnpackError("is cut off")
         else:
             raise UnpackError(f"is compressed by {compression!r:.40}; it must be zstd, lz4 or not compressed")
     except (zstandard.ZstdError, RuntimeError) as error:  # lz4 raises RuntimeError
@@ -214,30 +157,29 @@ def unpack(data: bytes, compression: str, size: int) -> bytes:
     return unpacked
 
 
-def unpack_message(data: bytes, limit: int) -> bytes:
+def unpack_message(data: bytes) -> bytes:
     """Unpack one message that was compressed by itself (zstd).
 
     Raises:
-        UnpackError: damaged, or larger than ``limit`` bytes.
+        UnpackError: damaged, or larger than ``MESSAGE_BYTES``.
     """
     try:
         size = zstandard.frame_content_size(data)
-        unpacked = _zstd(data, limit if size < 0 else min(size, limit))
+        unpacked = _zstd(data, MESSAGE_BYTES if size < 0 else min(size, MESSAGE_BYTES))
     except zstandard.ZstdError as error:
         raise UnpackError(f"does not unpack ({detail_of(error)})") from error
-    if size > limit or len(unpacked) > limit:
-        raise UnpackError(f"unpacks to more than {limit >> 20} MiB")
+    if max(size, len(unpacked)) > MESSAGE_BYTES:
+        raise UnpackError(f"unpacks to more than {MESSAGE_BYTES >> 20} MiB")
     return unpacked
 
 
-def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str, unpacked: Unpacked) -> None:
+def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], unpacked: Unpacked) -> None:
     """Unpack a file of a bag that was compressed as a whole (zstd).
 
     Args:
         source: packed file.
         target: where to unpack it.
         heads: first bytes that the unpacked file may have.
-        name: what messages call it.
         unpacked: counts.
 
     Raises:
@@ -252,18 +194,17 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str,
         ):
             while block := stream.read(_STEP):
                 if not done and not block.startswith(heads):
-                    raise InputError(f"{name}: what it unpacks to is neither an MCAP nor an SQLite file")
+                    raise InputError(f"{source}: what it unpacks to is neither an MCAP nor an SQLite file")
                 done += len(block)
                 unpacked.add(len(block))
                 out.write(block)
     except zstandard.ZstdError as error:
-        raise InputError(f"{name}: damaged, does not unpack ({detail_of(error)})") from error
+        raise InputError(f"{source}: damaged, does not unpack ({detail_of(error)})") from error
     except OSError as error:
-        raise InputError(
-            f"{name}: cannot be unpacked into {target.parent} ({error.strerror or error})"
-        ) from error
+        reason = error.strerror or error
+        raise InputError(f"{source}: cannot be unpacked into {target.parent} ({reason})") from error
     if not done:
-        raise InputError(f"{name}: unpacks to nothing, or is cut off")
+        raise InputError(f"{source}: unpacks to nothing, or is cut off")
 
 
 def _zstd(data: bytes, size: int) -> bytes:
@@ -273,12 +214,3 @@ def _zstd(data: bytes, size: int) -> bytes:
         return unpacker.decompress(data, max_output_size=size) if size else b""
     with unpacker.stream_reader(data, read_across_frames=True) as stream:
         return stream.read(size + 1)
-
-
-def _lz4(data: bytes, size: int) -> bytes:
-    """At most ``size`` bytes and one more."""
-    stream = lz4.frame.LZ4FrameDecompressor()
-    unpacked = stream.decompress(data, max_length=size + 1)
-    if not stream.eof and len(unpacked) <= size:
-        raise UnpackError("is cut off")
-    return unpacked

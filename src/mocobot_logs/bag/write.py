@@ -99,7 +99,7 @@ class ChecksummedMcap:
 Storage = Literal["mcap", "sqlite3"]
 
 SUFFIXES: dict[Storage, str] = {"mcap": ".mcap", "sqlite3": ".db3"}
-"""Of single files; any other path is a folder."""
+"""Suffixes of single files; any other path is a folder."""
 POINT = "geometry_msgs/msg/PointStamped"
 _ARM: dict[Level, tuple[str, ...]] = {"joint": ("phi1", "phi2", "phi3"), "wrist": ("x", "y", "z")}
 _GIMBAL = ("gimbal_z", "gimbal_y", "gimbal_x")

@@ -1,14 +1,16 @@
-"""Positions that are told within one turn, unwrapped.
+"""Logs of one robot's joints, of any format, by a map: on an even grid, in the units and order of the model's joints.
 
-From a log's channels to what the joints do: gears and coupled drives, zeros, torque constants, the loop.
-
-Read logs of one robot's joints, of any format, by a map.
+A log is taken at its own rate where its stamps are even, else interpolated and low-passed. The parts between long gaps
+are logs of their own. Stamps that are not even are treated as those of a team (``resample``): gaps are bridged by
+polynomials, a quintic spline leads onto a finer grid, and a known low-pass back to the log's rate, so that noise of
+samples a moment apart is averaged and nothing folds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,6 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import low_pass
 from estimator.quantisation import rounding_step
-from mocobot_logs.joints.even import Even, even_parts
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_logs.joints.joint_map import (
     COMMANDS,
@@ -31,23 +32,285 @@ from mocobot_logs.joints.joint_map import (
     JointMap,
     label,
 )
-from mocobot_logs.log import LogSource, Samples, collect
+from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated
 from mocobot_logs.open_log import open_log
+from mocobot_logs.resample import MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
+from mocobot_logs.resample_filter import (
+    TOLERANCE_NS,
+    Grid,
+    fineness,
+    fitted_rows,
+    on_grid,
+)
+
+MAX_GAP_S = 0.05
+"""Longest time without samples, beyond one period, that is bridged [s]."""
+SHORTEST_S, LEAST_ROWS = 1.0, 32
+"""Parts between gaps that are shorter are left out."""
+LEAST_HZ, MOST_HZ = 20.0, 20e3
+_BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; of the blocks; times the usual one
+_GAP = 1.75  # periods: jitter alone makes no longer intervals
+_INSIDE = 0.1  # of a period: nearer to a sample than that, a bridged gap does not show
+
+
+def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = None) -> LogSource:
+    """A log of any format that ``open_log`` knows, as a map reads it; ``episode`` is of a LeRobot dataset.
+
+    Raises:
+        InputError: there is no such log, or the map does not suit it.
+    """
+    return open_log(path, log_map.of_source(), episode)
+
+
+def read_joint_log(
+    source: LogSource, log_map: JointMap, advance: Callable[[int], object] = lambda _: None
+) -> list[JointLog]:
+    """The parts of a log between long gaps, mostly one; ``advance`` takes the progress made, in the source's units.
+
+    Raises:
+        InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
+    """
+    return joint_logs_of(source.name, collect(source, advance).streams[0], log_map)
+
+
+def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointLog]:
+    """The parts of a log that is in memory.
+
+    Args:
+        name: of the log, whose last part may decide about gains.
+        samples: its rows, channels in the map's order.
+        log_map: its map.
+
+    Raises:
+        InputError: see ``read_joint_log``.
+    """
+    channels = tuple(label(*key) for key in log_map.channels)
+    at = [k for k, (quantity, _) in enumerate(log_map.channels) if QUANTITIES[quantity].kind == "position"]
+    positions, notes = unwrapped(samples.values[:, at], [channels[k] for k in at])
+    if notes:
+        values = samples.values.copy()
+        values[:, at] = positions
+        samples = replace(samples, values=values)
+    control = log_map.control_of(Path(name).name)
+    logs = [
+        _joint_log(part, log_map, name, control, notes)
+        for part in _even_parts(name, channels, samples, log_map.rate_hz)
+    ]
+    if len(logs) == 1:
+        return logs
+    return [replace(log, name=f"{log.name} (part {number})") for number, log in enumerate(logs, 1)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Even:
+    """A part of a log on an even grid.
+
+    Attributes:
+        start_s: of the first sample, after the log's first stamp [s].
+        rate_hz: of the grid [Hz].
+        values: channels [SI], shape (Q, C).
+        usable: False where a gap was bridged, shape (Q,).
+        native_hz: rate of the samples [Hz].
+        resampled: whether they were interpolated and low-passed.
+        raw: samples as they came, shape (q, C).
+        notes: what was done, in sentences.
+    """
+
+    start_s: float
+    rate_hz: float
+    values: Array
+    usable: NDArray[np.bool_]
+    native_hz: float
+    resampled: bool
+    raw: Array
+    notes: tuple[str, ...]
+
+
+def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz: float | None) -> list[_Even]:
+    """Parts of a log between gaps too long to be bridged, at ``rate_hz`` [Hz] or the log's own rate."""
+    _check_values(name, channels, samples.values)
+    screen = Screen(name, channels)
+    time_ns, values = screen.keep(samples)
+    if len(time_ns) < LEAST_ROWS:
+        again = f" ({repeated(screen.repeats)})" if screen.repeats else ""
+        raise InputError(f"{name}: has {len(time_ns)} samples{again}; at least {LEAST_ROWS} are needed")
+    period_ns = _period_ns(np.diff(time_ns))
+    native_hz = 1.0 / (period_ns * NS)
+    if not LEAST_HZ <= native_hz <= MOST_HZ:
+        raise InputError(
+            f"{name}: samples come {period_ns * NS:.6g} s apart, at {native_hz:.6g} Hz; {LEAST_HZ:g} to {MOST_HZ:g} Hz "
+            "are allowed (is the unit of time right?)"
+        )
+    if rate_hz is not None and rate_hz > 1.01 * native_hz:
+        raise InputError(
+            f"{name}: the map's rate_hz is {rate_hz:g}, but the log has {native_hz:.6g} samples a second; it must be "
+            "at most that"
+        )
+    notes = _notes(screen)
+    holes = np.flatnonzero(beyond_s(np.diff(time_ns), period_ns) > MAX_GAP_S)
+    edges = np.concatenate([[0], holes + 1, [len(time_ns)]])
+    parts, lost_s = [], 0.0
+    for first, end in pairwise(edges):
+        length_s = float(time_ns[end - 1] - time_ns[first]) * NS
+        if length_s < SHORTEST_S or end - first < LEAST_ROWS:
+            lost_s += length_s
+            continue
+        parts.append(_even(time_ns[first:end], values[first:end], period_ns, rate_hz))
+    if not parts:
+        raise InputError(
+            f"{name}: no part of it has samples for {SHORTEST_S:g} s without a gap of more than {MAX_GAP_S:g} s"
+        )
+    if len(holes):
+        longest = float(np.diff(time_ns)[holes].max()) * NS
+        notes.append(
+            f"{len(holes)} gap{'s' * (len(holes) > 1)} of up to {longest:.3g} s cut the log into {len(parts)} part"
+            f"{'s' * (len(parts) > 1)}{f'; {lost_s:.3g} s are in none of them' if lost_s else ''}."
+        )
+    return [replace(part, notes=(*notes, *part.notes)) for part in parts]
+
+
+def _even(time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | None) -> _Even:
+    """One part without long gaps."""
+    first_ns = int(time_ns[0])
+    time_ns = time_ns - first_ns
+    found = _own_grid(time_ns, period_ns)
+    native_hz = (len(time_ns) - 1) / (float(time_ns[-1]) * NS)
+    grid, k, wanted, notes = None, 1, rate_hz, []
+    if found is not None:
+        period_ns, index, rounded = found
+        even_hz = _plain(1.0 / (period_ns * NS))
+        time_ns = np.rint(index * period_ns).astype(np.int64)
+        if rounded:
+            notes.append(
+                f"Stamps are rounded to {rounded * NS:.3g} s; samples are taken as even, {period_ns * NS:.6g} s apart."
+            )
+        ratio = even_hz / (even_hz if rate_hz is None else rate_hz)
+        native_hz = (len(time_ns) - 1) / (float(time_ns[-1]) * NS)
+        if abs(ratio - round(ratio)) < 1e-4:
+            k, native_hz = round(ratio), even_hz
+            grid, wanted = Grid(period_ns, period_ns, fits=True), even_hz / k
+    if wanted is None:
+        wanted = float(np.floor(1.0 / (period_ns * NS) + 0.01))
+    if grid is None:
+        interval = np.diff(time_ns)
+        jitter = float(np.std(interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns))
+        fitted = found is None and native_hz >= MANY * wanted and jitter > UNEVEN * period_ns
+        if fitted:
+            period_ns = float(np.mean(interval))
+        k = fineness(1.0 / (period_ns * NS), wanted, fitted=fitted)
+        rows = fitted_rows(native_hz, wanted) if fitted else 0
+        grid = Grid(1.0 / (k * wanted) / NS, period_ns, fitted_rows=rows)
+        if found is None:
+            notes.append(
+                f"Stamps are uneven ({interval.min() * NS:.3g} to {interval.max() * NS:.3g} s apart); samples were "
+                f"interpolated at {wanted:g} Hz, and nothing above {0.2 * wanted:.3g} Hz is relied on."
+            )
+    out, lead = on_grid(time_ns, values, grid, k)
+    at_ns = (lead + np.arange(len(out))) / wanted / NS
+    usable = _between_samples(at_ns, time_ns, grid.period_ns)
+    if not usable.all():
+        notes.append(f"{np.sum(~usable)} of {len(out)} samples are bridged gaps and are left out.")
+    start_s = (first_ns + float(at_ns[0])) * NS
+    return _Even(start_s, wanted, out, usable, native_hz, not grid.fits or k > 1, values, tuple(notes))
+
+
+def _between_samples(at_ns: Array, time_ns: Stamps, period_ns: float) -> NDArray[np.bool_]:
+    """Whether instants are not inside a gap."""
+    after = np.clip(np.searchsorted(time_ns, at_ns), 1, len(time_ns) - 1)
+    left, right = time_ns[after - 1], time_ns[after]
+    margin = _INSIDE * period_ns
+    inside = (at_ns - left > margin) & (right - at_ns > margin)
+    return ~(inside & (right - left > _GAP * period_ns))
+
+
+def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int64], float] | None:
+    """If stamps are even: spacing [ns], each sample's number, and the step of rounded stamps, 0 for none [ns].
+
+    Stamps rounded to milliseconds or to a tick of a clock are even if no one is further off than the rounding.
+    """
+    interval = np.diff(time_ns)
+    step_ns = float(np.gcd.reduce(interval))
+    index = np.concatenate([[0], np.cumsum(np.rint(interval / period_ns))]).astype(np.int64)
+    if np.any(np.diff(index) < 1):
+        return None
+    spacing_ns, offset_ns = period_ns, 0.0
+    for _ in range(3):  # a spacing that is a little off loses count over a long log
+        spacing_ns, offset_ns = np.polyfit(index.astype(float), time_ns.astype(float), 1)
+        again = np.rint((time_ns - offset_ns) / spacing_ns).astype(np.int64)
+        again -= again[0]
+        if np.array_equal(again, index):
+            break
+        index = again
+    if np.any(np.diff(index) < 1):
+        return None
+    off_ns = np.abs(time_ns - offset_ns - index * spacing_ns).max()
+    coarse = step_ns if step_ns > 2.0 * TOLERANCE_NS and step_ns < 1.01 * period_ns else 0.0
+    if off_ns <= TOLERANCE_NS + 0.5:
+        return float(spacing_ns), index, 0.0
+    if coarse and off_ns <= 0.75 * coarse and coarse < 0.75 * period_ns:
+        return float(spacing_ns), index, coarse
+    return None
+
+
+def _period_ns(interval: Stamps) -> float:
+    """The usual interval; the slower one where a log's rate changes by less than twice.
+
+    Such a change shows in the mean of many intervals, in which jitter and single gaps do not.
+    """
+    median = float(np.median(interval))
+    blocks = interval[: len(interval) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).mean(axis=1)
+    if not len(blocks):
+        return median
+    slower = float(np.quantile(blocks, _SLOW_SHARE) / np.median(blocks))
+    return median * slower if _SLOW[0] < slower < _SLOW[1] else median
+
+
+def _plain(rate_hz: float) -> float:
+    """A rate without what rounding of stamps makes of it."""
+    whole = round(rate_hz)
+    return float(whole) if abs(rate_hz - whole) < 1e-5 * rate_hz else rate_hz
+
+
+def _check_values(name: str, channels: tuple[str, ...], values: Array) -> None:
+    if not len(values):
+        raise InputError(f"{name}: has no samples")
+    infinite = np.argwhere(np.isinf(values))
+    if len(infinite):
+        row, k = infinite[0]
+        raise InputError(
+            f"{name}: {channels[k]} is {values[row, k]} in row {row}; every value must be finite (a cell may be empty)"
+        )
+    blank = np.isnan(values).mean(axis=0)
+    k = int(np.argmax(blank))
+    if blank[k] > MOST_MISSING:
+        lost = f"{100 * blank[k]:.3g} % of the rows" if blank[k] < 1 else "any row"
+        raise InputError(
+            f"{name}: {channels[k]} has no value in {lost}; at most {100 * MOST_MISSING:g} % may lack one (a joint "
+            "without such a column says so in the map: CHANNEL = false)"
+        )
+
+
+def _notes(screen: Screen) -> list[str]:
+    notes = []
+    if screen.duplicates:
+        notes.append(f"{screen.duplicates} rows repeat the row before, stamp included, and were dropped.")
+    if screen.repeats:
+        notes.append(f"{repeated(screen.repeats)}.")
+    if screen.blank:
+        worst = max(screen.blank_channels, key=lambda channel: screen.blank_channels[channel])
+        notes.append(f"{screen.blank} rows lack a value ({worst} first) and count as missing.")
+    return notes
+
 
 TURN = 2.0 * np.pi
 LEAST_JUMP = 0.75
-"""Of a turn, between two samples, that no joint moves: at 20 Hz it would be 94 rad/s."""
+"""No joint moves by this share of a turn between two samples: at 20 Hz it would be 94 rad/s."""
 ONE_TURN = 1.01
 """Turns that the readings of an encoder which starts again cover at most."""
 
 
 def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
-    """Positions with their jumps by a full turn taken out, and sentences that say so.
-
-    Args:
-        values: columns of positions [rad], NaN where a row lacks one, shape (q, C).
-        names: of the columns.
-    """
+    """Positions [rad], shape (q, C), NaN where a row lacks one, without jumps by a full turn; and what to say of it."""
     out, notes = values, []
     for c, name in enumerate(names):
         known = np.flatnonzero(np.isfinite(values[:, c]))
@@ -71,14 +334,10 @@ switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty 
 
 
 def mean_supply(reading: Array, rate_hz: float) -> Array:
-    """A supply's reading, low-passed [V], shape (Q,).
+    """A supply's reading of at least 16 even samples, low-passed [V], shape (Q,).
 
     A bus that a drive switches rings, and a reading meets it at any instant of the drive's period: an XL330 at a steady
     duty of 0.7 reads 6.2, 7.3 and 8.2 V in turn, with about the mean of its idle supply. The winding has the mean.
-
-    Args:
-        reading: even samples [V], shape (Q,), at least 16.
-        rate_hz: of the samples [Hz].
     """
     # A filter goes through the first and the last reading of what it is given: means there are none by chance.
     end = round(rate_hz / SUPPLY_HZ)
@@ -93,12 +352,7 @@ _STEP_BLOCKS = 8
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Channels of one part of a log, by quantity and joint.
-
-    Attributes:
-        log_map: the map.
-        values: shape (Q, C) in the order of the map's channels.
-    """
+    """Channels of one part of a log, by quantity and joint; values have the shape (Q, C), in the map's order."""
 
     log_map: JointMap
     values: Array
@@ -122,18 +376,8 @@ class _Columns:
         return any(name in quantities for name, _ in self.log_map.channels)
 
 
-def assemble(part: Even, log_map: JointMap, name: str, control: Control) -> JointLog:
-    """One part of a log in the units and the order of the model's joints.
-
-    Args:
-        part: on its grid.
-        log_map: the map.
-        name: of the part, for messages.
-        control: how the robot was commanded in it.
-
-    Raises:
-        InputError: coupled drives of which only some are logged, or a supply that is not positive.
-    """
+def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, notes: Sequence[str]) -> JointLog:
+    """One part of a log, brought to the joints."""
     columns = _Columns(log_map, part.values)
     turns, zero = log_map.turns, log_map.zero
     where = f"map {log_map.name}"
@@ -183,7 +427,7 @@ def assemble(part: Even, log_map: JointMap, name: str, control: Control) -> Join
         start_s=part.start_s,
         enabled=None if flags is None else flags > 0.5,
         motor=motor,
-        notes=part.notes,
+        notes=(*notes, *part.notes),
     )
 
 
@@ -281,79 +525,22 @@ def _duty(columns: _Columns, supply_V: Array | None) -> Array | None:
     return duty
 
 
-def _position_step(part: Even, log_map: JointMap, turns: Array) -> Array:
+def _position_step(part: _Even, log_map: JointMap, turns: Array) -> Array:
     """Resolution of the positions [rad or m], shape (J,): noise of rounding adds up through coupled drives."""
     joints = log_map.joints
     at_joint, at_motor = np.zeros(len(joints)), np.zeros(len(joints))
     for k, ((name, joint), channel) in enumerate(log_map.channels.items()):
         if name in POSITIONS:
-            step = abs(channel.scale) if channel.counted else step_of(part.raw[:, k])
+            step = abs(channel.scale) if channel.counted else _step_of(part.raw[:, k])
             (at_joint if name == "q" else at_motor)[joints.index(joint)] = step
     from_motors = np.sqrt(np.linalg.inv(turns) ** 2 @ at_motor**2)
     own = np.array([("q", joint) in log_map.channels for joint in joints])
     return np.where(own, at_joint, from_motors)
 
 
-def step_of(values: Array) -> float:
+def _step_of(values: Array) -> float:
     """Step by which a reading repeats, 0 where none shows."""
     starts = np.linspace(0, max(len(values) - _STEP_ROWS, 0), _STEP_BLOCKS).astype(int)
     found = [rounding_step(values[first : first + _STEP_ROWS]) for first in dict.fromkeys(starts.tolist())]
     told = [step for step in found if step > 0]
     return float(np.median(told)) if told else 0.0
-
-
-def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = None) -> LogSource:
-    """A log that can be read by a map.
-
-    Args:
-        path: a file or a folder of any format that ``open_log`` knows.
-        log_map: where its channels are.
-        episode: of a LeRobot dataset that holds several.
-
-    Raises:
-        InputError: there is no such log, or the map does not suit it.
-    """
-    return open_log(path, log_map.of_source(), episode)
-
-
-def read_joint_log(
-    source: LogSource, log_map: JointMap, advance: Callable[[int], object] = lambda _: None
-) -> list[JointLog]:
-    """The parts of a log between long gaps, mostly one.
-
-    Args:
-        source: the log.
-        log_map: its map.
-        advance: takes the progress made, in the source's units.
-
-    Raises:
-        InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
-    """
-    return joint_logs_of(source.name, collect(source, advance).streams[0], log_map)
-
-
-def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointLog]:
-    """The parts of a log that is in memory.
-
-    Args:
-        name: of the log, whose last part may decide about gains.
-        samples: its rows, channels in the map's order.
-        log_map: its map.
-
-    Raises:
-        InputError: see ``read_joint_log``.
-    """
-    channels = tuple(label(*key) for key in log_map.channels)
-    at = [k for k, (quantity, _) in enumerate(log_map.channels) if QUANTITIES[quantity].kind == "position"]
-    positions, notes = unwrapped(samples.values[:, at], [channels[k] for k in at])
-    if notes:
-        values = samples.values.copy()
-        values[:, at] = positions
-        samples = replace(samples, values=values)
-    parts = even_parts(name, channels, samples, log_map.rate_hz)
-    parts = [replace(part, notes=(*notes, *part.notes)) for part in parts]
-    control = log_map.control_of(Path(name).name)
-    logs = [assemble(part, log_map, name, control) for part in parts]
-    if len(logs) == 1:
-        return logs
-    return [replace(log, name=f"{log.name} (part {number})") for number, log in enumerate(logs, 1)]

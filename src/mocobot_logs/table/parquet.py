@@ -1,10 +1,10 @@
-"""Parquet tables, mocobot's own recordings among them: read as they are, so that broken ones can be looked at.
+"""Parquet tables, mocobot's own recordings among them, and LeRobot datasets of version 3.
 
-LeRobot datasets, version 3: one episode of a folder with ``meta/info.json`` and Parquet files under ``data``.
-
-Features are columns of lists; ``meta/info.json`` names their numbers. Several episodes share a file, and time is
-``timestamp``, 32-bit seconds from the episode's start, by definition ``frame_index / fps``. (LeRobot's own writer,
-``lerobot/datasets/dataset_writer.py``, is where that is laid down.)
+Recordings are read as they are, so that broken ones can be looked at. A LeRobot dataset is a folder with
+``meta/info.json`` and Parquet files under ``data``; one episode of it is a table. Features are columns of lists whose
+numbers ``meta/info.json`` names. Several episodes share a file, and time is ``timestamp``, 32-bit seconds from the
+episode's start, by definition ``frame_index / fps`` (``lerobot/datasets/dataset_writer.py`` lays that down).
+Every refusal is an ``InputError`` that names the file and the column.
 """
 
 import json
@@ -27,8 +27,7 @@ from estimator.inputs import Unpacked, plain
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.parquet import METADATA_KEY
 from estimator.recording.parquet_claims import claimed_bytes
-from mocobot_logs.faults import detail_of, read_small, told_in_one_sentence
-from mocobot_logs.formats import DATASET_INFO, dataset_root
+from mocobot_logs.formats import DATASET_INFO, dataset_root, detail_of, read_small, told_in_one_sentence
 from mocobot_logs.log import Stamps
 from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
 from mocobot_logs.table.text import LARGEST_NS, from_numbers
@@ -44,11 +43,7 @@ class ParquetTable(Table):
     """
 
     def __init__(self, path: Path, name: str) -> None:
-        """Look at the file's footer.
-
-        Raises:
-            InputError: the file cannot be read.
-        """
+        """Look at the file's footer."""
         self._path = path
         with opened(path, name) as file:
             rows, schema = file.metadata.num_rows, file.schema_arrow
@@ -56,15 +51,7 @@ class ParquetTable(Table):
         self._set_up(name, schema, rows, rows, path.stat().st_size)
 
     def _set_up(self, name: str, schema: pa.Schema, size: int, rows: int, stored_bytes: int) -> None:
-        """Take the columns.
-
-        Args:
-            name: what to call the table in messages.
-            schema: its columns.
-            size: number of its rows.
-            rows: number of rows to go through for them.
-            stored_bytes: what these take.
-        """
+        """Take the columns; to read ``size`` rows, so many ``rows`` have to be gone through."""
         self.name, self.size = name, size
         self._schema, self._rows, self._stored_bytes = schema, rows, stored_bytes
         text = (schema.metadata or {}).get(METADATA_KEY)
@@ -88,7 +75,8 @@ class ParquetTable(Table):
         self._check(names, 8 * cells * self._rows)
         row = 0
         for batch in self._batches(names, rows_at_a_time(cells)):
-            yield self._block(batch, wanted, row)
+            clocks = {name: self._clock(batch, name, wanted.unit_ns, row) for name in wanted.clocks}
+            yield Block({name: self._numbers(batch, name) for name in wanted.columns}, clocks)
             row += batch.num_rows
             advance(batch.num_rows)
         pa.default_memory_pool().release_unused()
@@ -96,7 +84,9 @@ class ParquetTable(Table):
     def _check(self, names: list[str], claimed: int) -> None:
         """Refuse columns that unpack to too much by another claim, or by what the files say."""
         with told_in_one_sentence(self.name, KIND):
-            told = sum(claimed_bytes(path, _columns(schema), names) for path, schema in self._files())
+            told = 0
+            for path, schema in self._files():
+                told += claimed_bytes(path, [schema.column(k).path for k in range(len(schema))], names)
             Unpacked(self.name, self._stored_bytes).add(max(claimed, told))
 
     def _files(self) -> Iterator[tuple[Path, pq.ParquetSchema]]:
@@ -107,17 +97,17 @@ class ParquetTable(Table):
         with opened(self._path, self.name) as file:
             yield from file.iter_batches(rows, columns=names, use_threads=False)
 
-    def _block(self, batch: pa.RecordBatch, wanted: Wanted, row: int) -> Block:
-        def where(name: str) -> str:
-            return f"{self.name}: column {name!r}"
+    def _numbers(self, batch: pa.RecordBatch, name: str) -> NDArray:
+        return numbers(batch.column(name), self.shapes[name], f"{self.name}: column {name!r}")
 
-        return Block(
-            {name: numbers(batch.column(name), self.shapes[name], where(name)) for name in wanted.columns},
-            {
-                name: _clock(batch.column(name), self.shapes[name], wanted.unit_ns, where(name), row)
-                for name in wanted.clocks
-            },
-        )
+    def _clock(self, batch: pa.RecordBatch, name: str, unit_ns: int | None, row: int) -> Clock:
+        column = batch.column(name)
+        if pa.types.is_timestamp(column.type):
+            given = column.is_valid().to_numpy(zero_copy_only=False)
+            ns = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).fill_null(0)
+            return ns.to_numpy(zero_copy_only=False), given
+        values = self._numbers(batch, name).reshape(len(column))
+        return from_numbers(values, unit_ns, f"{self.name}: column {name!r}", row)
 
     def _check_type(self, name: str, *, time: bool) -> None:
         kind = _innermost(self._schema.field(name).type)
@@ -139,11 +129,7 @@ class ParquetTable(Table):
 
 @contextmanager
 def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
-    """A Parquet file, whose every failure inside the block becomes one sentence.
-
-    Raises:
-        InputError: the file is not Parquet, or damaged, or cannot be read.
-    """
+    """A Parquet file, whose every failure inside the block becomes one sentence."""
     # Not pre-buffered: that would hold a whole row group, which may be a whole log.
     with (
         told_in_one_sentence(name, KIND),
@@ -153,34 +139,15 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
 
 
 def check_names(schema: pa.Schema, name: str) -> None:
-    """Every column has a name of its own; they become text here, inside a block that tells damage in one sentence.
-
-    Raises:
-        InputError: a name is there twice.
-        UnicodeDecodeError: one is no text.
-    """
+    """Every column has a name of its own; they become text here, inside a block that tells damage in one sentence."""
     names = schema.names
     repeated = next((n for n in names if names.count(n) > 1), None)
     if repeated is not None:
         raise InputError(f"{name}: column {repeated!r:.80} appears more than once")
 
 
-def is_recording(path: Path) -> bool:
-    """Whether a Parquet file says that it is a recording.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    with opened(path, str(path)) as file:
-        return METADATA_KEY in (file.schema_arrow.metadata or {})
-
-
 def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:
-    """A column as an array (q, *shape) of whole numbers or floats, NaN where a row is empty.
-
-    Raises:
-        InputError: a row does not have that shape.
-    """
+    """A column as an array (q, *shape) of whole numbers or floats, NaN where a row is empty."""
     rows = len(column)
     given = column.is_valid().to_numpy(zero_copy_only=False)
     flat = column if given.all() else column.drop_null()
@@ -203,18 +170,6 @@ def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:
     return whole
 
 
-def _clock(column: pa.Array, shape: tuple[int, ...], unit_ns: int | None, where: str, row: int) -> Clock:
-    if pa.types.is_timestamp(column.type):
-        given = column.is_valid().to_numpy(zero_copy_only=False)
-        ns = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).fill_null(0)
-        return ns.to_numpy(zero_copy_only=False), given
-    return from_numbers(numbers(column, shape, where).reshape(len(column)), unit_ns, where, row)
-
-
-def _columns(schema: pq.ParquetSchema) -> list[str]:
-    return [schema.column(k).path for k in range(len(schema))]
-
-
 def _is_number(kind: pa.DataType) -> bool:
     return pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)
 
@@ -230,6 +185,7 @@ def _is_list(kind: pa.DataType) -> bool:
 
 
 def _fixed_shape(kind: pa.DataType) -> tuple[int, ...] | None:
+    """Shape of a row, None where lists may have any length."""
     shape: list[int] = []
     while _is_list(kind):
         if not pa.types.is_fixed_size_list(kind):
@@ -243,7 +199,7 @@ MAX_INFO_BYTES = 16 << 20
 EPISODE, FRAME, TIMESTAMP = "episode_index", "frame_index", "timestamp"
 NAME_COLUMNS = (EPISODE, "data/chunk_index", "data/file_index")
 CLOSE_FRAMES = 0.01
-"""Of a frame: so far a timestamp may be from ``frame_index / fps`` and still be its rounded value."""
+"""Share of a frame by which a timestamp may differ from ``frame_index / fps`` and still be its rounded value."""
 _DATA_PATH = re.compile(r"(?!/)([^{}]|\{(chunk_index|file_index)(:0[36]d)?\})+")
 _SCAN = ds.ParquetFragmentScanOptions(
     use_buffered_stream=True, pre_buffer=False, page_checksum_verification=True
@@ -263,16 +219,7 @@ class LeRobotTable(ParquetTable):
     time_column = TIMESTAMP
 
     def __init__(self, path: Path, name: str, episode: int | None) -> None:
-        """Look at the dataset's description and find the episode.
-
-        Args:
-            path: the dataset's folder, or one of its Parquet files.
-            name: what to call it in messages.
-            episode: which one; may be None if there is only one.
-
-        Raises:
-            InputError: it is no LeRobot dataset of version 3, or there is no such episode, or there are several.
-        """
+        """Find the episode, which may be None if there is only one, in a dataset's folder or one of its files."""
         root = dataset_root(path)
         if root is None:
             raise InputError(f"{name}: is not a LeRobot dataset, it has no {DATASET_INFO}")
@@ -397,11 +344,7 @@ def _episodes_in(paths: list[Path], name: str) -> set[int]:
 
 
 def _dataset(paths: list[Path], name: str) -> ds.Dataset:
-    """Files of the same columns as one.
-
-    Raises:
-        InputError: a file cannot be read, their columns differ, or they claim more than measured samples can take.
-    """
+    """Files of the same columns as one."""
     with told_in_one_sentence(name, KIND):
         data = ds.dataset(
             [str(path) for path in paths], format=ds.ParquetFileFormat(default_fragment_scan_options=_SCAN)

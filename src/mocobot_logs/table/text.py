@@ -1,8 +1,7 @@
-"""Time of a table in whole nanoseconds: exact for whole numbers and dates, rounded for floats and decimal text.
+"""Text tables: a header line, then one row per sample, cells of numbers; time may be dates of ISO 8601.
 
-Dates and times of ISO 8601 as stamps, exact to the nanosecond.
-
-Text tables: one header line, then one row per sample, cells of numbers; time may be dates.
+Time becomes whole nanoseconds: exactly from whole numbers and dates, rounded from floats and decimal text. Every
+refusal is an ``InputError`` that names the file, the column and the row or line.
 """
 
 import contextlib
@@ -20,7 +19,7 @@ import pyarrow.csv as pcsv
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_logs.faults import detail_of, readable
+from mocobot_logs.formats import detail_of, readable
 from mocobot_logs.log import Stamps
 from mocobot_logs.maps import CsvMap
 from mocobot_logs.table.table import Block, Table, Wanted
@@ -34,19 +33,15 @@ Given = NDArray[np.bool_]
 
 
 def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
-    """Stamps from numbers.
+    """Stamps from whole numbers or floats, NaN where there is none.
 
     Args:
-        values: times in any unit, whole numbers or floats, NaN where there is none, shape (q,).
+        values: times in any unit, shape (q,).
         unit_ns: nanoseconds in one unit; None where the map's unit is "iso".
-        where: file and column, for messages.
-        row: row of the first one, for messages.
+        where, row: file and column, and row of the first one, for messages.
 
     Returns:
         Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
-
-    Raises:
-        InputError: a time is infinite or beyond 292 years, or there is no unit.
     """
     unit_ns = _unit(unit_ns, where)
     if values.dtype.kind in "iu":
@@ -63,20 +58,7 @@ def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0)
 
 
 def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
-    """Stamps from decimal text, to the nearest nanosecond: a float of the Unix time resolves 0.24 us only.
-
-    Args:
-        values: decimal numbers, null where there is none, shape (q,).
-        unit_ns: nanoseconds in one unit, a power of ten; None where the map's unit is "iso".
-        where: file and column, for messages.
-        row: row of the first one, for messages.
-
-    Returns:
-        As ``from_numbers``.
-
-    Raises:
-        InputError: a time is not a number, or is beyond 292 years, or there is no unit.
-    """
+    """As ``from_numbers``, of decimal text, null where there is none: exact, where floats resolve 0.24 us only."""
     digits = _DIGITS[_unit(unit_ns, where)]
     exact = pa.decimal128(38, digits)
     try:
@@ -123,11 +105,10 @@ def _casts(values: pa.Array, kind: pa.DataType) -> bool:
 def _refuse(values: NDArray | pa.Array, beyond: Given, where: str, row: int) -> None:
     if beyond.any():
         first = int(np.flatnonzero(beyond)[0])
-        raise InputError(_range(where, row + first, values[first]))
-
-
-def _range(where: str, row: int, value: object) -> str:
-    return f"{where} is {value!s:.40} in row {row}; a time must be finite and within 292 years (is its unit right?)"
+        raise InputError(
+            f"{where} is {values[first]!s:.40} in row {row + first}; a time must be finite and within 292 years (is "
+            "its unit right?)"
+        )
 
 
 _DATE = r"[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8}"
@@ -158,15 +139,7 @@ class TextClock:
         self._form: str | None = None
 
     def read(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
-        """Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
-
-        Args:
-            values: text, null where there is none, shape (q,).
-            row: row of the first one, for messages.
-
-        Raises:
-            InputError: a time is neither a number nor a date, of another form than the first one, or out of range.
-        """
+        """As ``from_numbers``, of text, null where there is none; ``row`` is that of the first one."""
         values = pc.call_function("utf8_trim_whitespace", [values])
         if self._form is None and values.null_count < len(values):
             first = values.drop_null()[0].as_py()
@@ -256,11 +229,9 @@ _COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
 
 
 def line_blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
-    """Blocks of whole lines, none of them empty, without those whose first character but blanks is ``#``.
+    """Blocks of whole lines, about ``size`` bytes each, without those whose first character but blanks is ``#``.
 
-    Args:
-        file: read from where it is, where a line begins.
-        size: about how long blocks are [bytes]; a line of more than twice this is cut where it is so long.
+    The file is at the beginning of a line; a line of more than twice the size is cut where it is so long.
     """
     rest = b""
     while block := file.read(size):
@@ -302,11 +273,7 @@ class CsvTable(Table):
     """
 
     def __init__(self, path: Path, options: CsvMap, name: str) -> None:
-        """Read the header.
-
-        Raises:
-            InputError: the file cannot be read, is not text, or has no header.
-        """
+        """Read the header."""
         self.name, self._path, self._decimal = name, path, options.decimal
         header, first_row, self._lines_before, self._start = _first_lines(path, name, options.decimal)
         self._delimiter = options.delimiter or _find_delimiter(header, first_row, options.decimal)
@@ -373,9 +340,6 @@ class CsvTable(Table):
 
         Every block is a file to pyarrow. Its streaming reader reads ahead in a thread: left at a fault, or at the rows
         that are enough, it hangs or aborts the process when this ends (pyarrow 26).
-
-        Raises:
-            pa.ArrowException: a row does not fit the header, or a cell is no number.
         """
         table = pcsv.read_csv(
             pa.BufferReader(lines),
