@@ -17,17 +17,7 @@ from estimator.files import whole_file
 from estimator.recording.checks import check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot_logs.cut import (
-    SHORTEST_NS,
-    WHOLE,
-    Choice,
-    Omission,
-    Piece,
-    Span,
-    extent_of,
-    seconds,
-    split,
-)
+from mocobot_logs.cut import SHORTEST_NS, WHOLE, Choice, Omission, Piece, Span, extent_of, seconds, split
 from mocobot_logs.formats import output_kind
 from mocobot_logs.log import NS, Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording

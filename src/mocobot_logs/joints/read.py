@@ -35,13 +35,7 @@ from mocobot_logs.joints.joint_map import (
 from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated
 from mocobot_logs.open_log import open_log
 from mocobot_logs.resample import MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
-from mocobot_logs.resample_filter import (
-    TOLERANCE_NS,
-    Grid,
-    fineness,
-    fitted_rows,
-    on_grid,
-)
+from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, on_grid
 
 MAX_GAP_S = 0.05
 """Longest time without samples, beyond one period, that is bridged [s]."""
