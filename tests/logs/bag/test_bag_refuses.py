@@ -585,14 +585,15 @@ UNPACKED_TEAM = Team.draw(rows=60)
 MEGABYTE = "x" * 1_000_000
 
 
-@pytest.fixture(autouse=True)
-def _usual(monkeypatch: pytest.MonkeyPatch):
+@pytest.fixture
+def _little_is_free(monkeypatch: pytest.MonkeyPatch):
     """What is free is lowered, so that tests need no gigabytes."""
     monkeypatch.setattr(inputs, "FREE_BYTES", 50 << 20)
     yield
     set_max_unpacked(None)
 
 
+@pytest.mark.usefixtures("_little_is_free")
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_messages_that_are_compressed_one_by_one(tmp_path: Path, storage: str) -> None:
     """180 MB in some 100 kB."""
@@ -607,6 +608,7 @@ def test_messages_that_are_compressed_one_by_one(tmp_path: Path, storage: str) -
     tracemalloc.stop()
 
 
+@pytest.mark.usefixtures("_little_is_free")
 def test_chunks(tmp_path: Path) -> None:
     path = raw_mcap(
         tmp_path / "a.mcap",
@@ -619,6 +621,7 @@ def test_chunks(tmp_path: Path) -> None:
     assert_holds(path, UNPACKED_TEAM)  # the limit is for one reading, of which there are several here
 
 
+@pytest.mark.usefixtures("_little_is_free")
 def test_several_files_have_one_limit(tmp_path: Path) -> None:
     """Each would pass alone."""
     said = UNPACKED_TEAM.said(frame=MEGABYTE)
@@ -636,6 +639,7 @@ def test_several_files_have_one_limit(tmp_path: Path) -> None:
     refuses(path, assert_read)
 
 
+@pytest.mark.usefixtures("_little_is_free")
 def test_stored_bags_have_no_limit(tmp_path: Path) -> None:
     set_max_unpacked(1e-6)
     assert_holds(rosbags_bag(tmp_path / "bag", UNPACKED_TEAM.said(), "mcap"), UNPACKED_TEAM)
