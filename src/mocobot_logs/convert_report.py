@@ -1,6 +1,4 @@
-"""What happened to a log on its way to a recording, as text.
-
-The report of a conversion as JSON.
+"""What happened to a log on its way to a recording, as text and as JSON with these keys:
 
 format, version        "mocobot-conversion", 1
 log                    as the user named it

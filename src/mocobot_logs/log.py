@@ -3,8 +3,7 @@
 Readers are sources: they hand out a log in chunks, so that an hour of ten robots at 1 kHz never has to be in memory.
 What they hand out is in SI units and in mocobot's channels already; what is wrong with the samples (gaps, NaN, time
 running backwards) is still in it, for ``inspect`` to see and for the resampler to fill or refuse.
-
-A log's readings: rows that a logger wrote again are left out and counted.
+Only rows that a logger wrote again are left out (``Readings``), and counted.
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,17 +1,9 @@
-"""Rows of one robot whose channels come from several topics: the fastest topic sets the rows.
-
-At its stamps, messages of the other topics with the same stamp are taken bit for bit. Where there is none, a topic is
-interpolated by the cubic through two samples on either side: of a sine sampled at 100 Hz it misses 4e-7 of the
-amplitude at 1 Hz and 2.3e-4 at 5 Hz (3/128 of the fourth power of the phase from sample to sample). Nothing is thinned
-out here, so nothing aliases. There is no row where a topic has no samples: before its first, after its last, and where
-it has a gap.
-
-ROS 2 bags as logs, without ROS: rosbag2 folders or single files, MCAP or SQLite, CDR messages.
+"""ROS 2 bags as logs, without ROS: rosbag2 folders or single files, MCAP or SQLite, CDR messages.
 
 Channels are found by a map: a topic and a joint of its sensor_msgs/msg/JointState, or a dotted path in any other
 message. Time is the messages' ``header.stamp``, or when they were logged if the map says so. Where channels of one
-robot come from several topics, these are brought onto the stamps of the fastest (``align``); commands that a log
-may lack are left out if they are not stamped together with the samples. A joint that single messages lack gives NaN.
+robot come from several topics, ``RowAligner`` brings these onto the stamps of the fastest; commands that a log may
+lack are left out if they are not stamped together with the samples. A joint that single messages lack gives NaN.
 
 A bag is read once from front to back, a few MiB at a time, however long it is.
 """
@@ -54,7 +46,14 @@ _CROWDED = 0.25  # of a period: closer samples leave only noise in differences b
 
 
 class RowAligner:
-    """Brings several topics of one robot onto the stamps of one of them."""
+    """Brings several topics of one robot onto the stamps of one of them, the fastest.
+
+    At its stamps, messages of the other topics with the same stamp are taken bit for bit. Where there is none, a topic
+    is interpolated by the cubic through two samples on either side: it misses 4e-7 of a sine of 1 Hz that is sampled at
+    100 Hz, and 2.3e-4 at 5 Hz (3/128 of the fourth power of the phase from sample to sample). Nothing is thinned out
+    here, so nothing aliases. There is no row where a topic has no samples: before its first, after its last, and where
+    it has a gap.
+    """
 
     def __init__(
         self,
