@@ -529,6 +529,8 @@ def _team_channel(name: str, tables: Sequence[Values], where: str) -> ChannelMap
         values.pop("counts_per_turn", None)  # a default for counts does not bind channels in other units
     dimension = dimension_of(name)
     fields = Fields(values, ("unit",), where, _CHANNEL)
+    if "counts_per_turn" in fields:
+        fields.number("counts_per_turn", 1.0)
     found = parse_channel(fields, _PLACEHOLDERS, dimension, units_of(name), f"{dimension}s")
     optional = values.get("optional", False)
     if type(optional) is not bool or (optional and name not in REF):

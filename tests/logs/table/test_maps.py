@@ -210,7 +210,7 @@ SLIPS: list[tuple[dict[str, Any], list[str]]] = [
     (with_channel("tau1", unit="N"), ["unit is 'N'", "Nm, mNm"]),
     (with_channel(unit="counts"), ["channels.phi1: missing key 'counts_per_turn'"]),
     (with_channel(counts_per_turn=100), ["counts_per_turn does not go with angles in 'rad'; leave it out"]),
-    (with_channel(unit="counts", counts_per_turn=0), ["counts_per_turn is 0"]),
+    (with_channel(unit="counts", counts_per_turn=0.5), ["counts_per_turn is 0.5", "at least 1"]),
     (with_channel(unit="counts", counts_per_turn=math.nan), ["counts_per_turn is nan"]),
     (with_channel(sign=0), ["channels.phi1: sign is 0", "1 or -1"]),
     (with_channel(sign=1.0), ["sign is 1.0"]),
