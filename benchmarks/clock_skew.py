@@ -19,7 +19,7 @@ from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from mocobot_logs.log import CHANNELS, Level, Samples
 from mocobot_logs.one_clock import ClockReport, to_recording
-from mocobot_logs.resample.log import resample
+from mocobot_logs.resample import resample
 from mocobot_sim.paper.scoring import rotation_error_deg
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, measure

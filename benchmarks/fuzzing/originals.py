@@ -17,7 +17,7 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.map.files import MAPS, builtin_map_text
+from mocobot_logs.maps import MAPS, builtin_map_text
 
 DESIGN = Path(__file__).parents[2] / "models" / "omnid" / "design.toml"
 FORMATS = (

@@ -19,7 +19,7 @@ from estimator.errors import InputError
 from fuzzing.damage import damaged
 from fuzzing.of_commands import KINDS
 from mocobot_logs.log import collect
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 
 LONGEST_S = 20

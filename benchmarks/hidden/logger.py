@@ -17,7 +17,7 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from mocobot_logs.convert import Labels, convert
 from mocobot_logs.log import CHANNELS, REF, Level, Samples
-from mocobot_logs.resample.log import RATE_HZ as CONVERTED_HZ
+from mocobot_logs.resample import RATE_HZ as CONVERTED_HZ
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.trial_log import TrialLog
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from mocobot_logs.log import CHANNELS, Level, Samples
 from mocobot_logs.one_clock import to_recording
-from mocobot_logs.resample.log import resample
+from mocobot_logs.resample import resample
 from mocobot_sim.scene.models import omnid_design
 
 

@@ -29,8 +29,7 @@ from mocobot_inspect.joints.json import joint_inspection_dict
 from mocobot_inspect.joints.robot import Robot
 from mocobot_inspect.joints.text import format_joint_inspection, joint_ready_line
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.joints.joint_map import JointMap
-from mocobot_logs.joints.parse import read_joint_map
+from mocobot_logs.joints.joint_map import JointMap, read_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
 
 __all__ = ["JointInspection", "JointLog", "SerialModel", "diagnose", "inspect", "read_logs", "read_model"]

@@ -13,8 +13,7 @@ from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.check import Found
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit
 from mocobot_inspect.wiring.mistakes.base import listed
-from mocobot_logs.log import NS
-from mocobot_logs.readings import repeated
+from mocobot_logs.log import NS, repeated
 
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]
 

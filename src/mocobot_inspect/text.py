@@ -9,8 +9,7 @@ from mocobot_inspect.stream.channels import UNITS, Channel
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.mistakes import Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
-from mocobot_logs.resample.log import MAX_GAP_S
-from mocobot_logs.resample.tally import MOST_MISSING
+from mocobot_logs.resample import MAX_GAP_S, MOST_MISSING
 
 _HIDDEN = 6
 _AS_IT_IS = "nothing as it is; with "

@@ -3,27 +3,32 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pcsv
+
 from estimator.arm.design import OmnidDesign
+from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
+from estimator.files import whole_file
 from estimator.recording.checks import check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot_logs.cut.choice import WHOLE, Choice, Piece, Span, seconds
-from mocobot_logs.cut.extent import extent_of
-from mocobot_logs.cut.split import SHORTEST_NS, Omission, omissions, split
+from mocobot_logs.cut import SHORTEST_NS, WHOLE, Choice, Omission, Piece, Span, extent_of, seconds, split
 from mocobot_logs.formats import output_kind
 from mocobot_logs.log import NS, Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording
-from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ, resample
-from mocobot_logs.resample.report import StreamReport
-from mocobot_logs.table.write import write_csv, write_npz
+from mocobot_logs.resample import MAX_GAP_S, RATE_HZ, StreamReport, resample
+from mocobot_logs.table.arrays import METADATA_NAME
 
 UNKNOWN_TRIAL = "random"
 """Kind of trial where nothing says which; it labels reports only."""
 PERIOD_DOUBT = 0.05
 """So much of a period may the median of jittering intervals be off: 1.25 / sqrt(1024) of what they scatter by."""
+_CSV_ROWS = 10_000
 
 
 @dataclass(frozen=True)
@@ -91,13 +96,15 @@ def convert(
         InputError: the log is damaged, cannot be resampled, is not plausible (see ``check_recording``), or does not
             have what is chosen.
     """
-    how = _How(labels, standard, rate_hz, max_gap_s, correct)
+    how = partial(
+        _convert, labels=labels, standard=standard, rate_hz=rate_hz, max_gap_s=max_gap_s, correct=correct
+    )
     if not choice:
-        return _convert(source, how, advance)
+        return how(source, advance=advance)
     extent = extent_of(source, choice, max_gap_s, advance)
     span = extent.chosen if choice.crop is not None else None
-    converted = _convert(Piece(source, extent.origin_ns, span, choice.drops), how)
-    return replace(converted, span=span, left_out=tuple(omissions(extent, choice)))
+    converted = how(Piece(source, extent.origin_ns, span, choice.drops))
+    return replace(converted, span=span, left_out=extent.left_out)
 
 
 def convert_parts(
@@ -123,10 +130,9 @@ def convert_parts(
     Raises:
         InputError: the log is damaged, does not have what is chosen, or no part of it can be used.
     """
-    how = _How(labels, standard, rate_hz, max_gap_s, correct)
     extent = extent_of(source, choice, max_gap_s, advance)
     spans, out = split(extent)
-    out += omissions(extent, choice)
+    out += extent.left_out
     longest = max(spans, key=lambda span: span.length_ns, default=None)
     if longest is None or longest.length_ns < SHORTEST_NS:
         found = "" if longest is None else f"; the longest goes from {longest}"
@@ -135,14 +141,17 @@ def convert_parts(
             f"than {max_gap_s:g} s{found}"
         )
     # A part's own period may differ from the log's by what jitter does to a median.
-    how = replace(how, max_gap_s=max_gap_s + PERIOD_DOUBT * extent.period_ns * NS)
+    max_gap_s += PERIOD_DOUBT * extent.period_ns * NS
+    how = partial(
+        _convert, labels=labels, standard=standard, rate_hz=rate_hz, max_gap_s=max_gap_s, correct=correct
+    )
     done, errors = [], []
     for span in spans:
         if span.length_ns < SHORTEST_NS:
             out.append(Omission(span, None, None, f"shorter than {seconds(SHORTEST_NS)} s"))
             continue
         try:
-            converted = _convert(Piece(source, extent.origin_ns, span, choice.drops), how)
+            converted = how(Piece(source, extent.origin_ns, span, choice.drops))
         except InputError as error:
             errors.append(error)
             out.append(Omission(span, None, None, str(error).removeprefix(f"{source.name} ({span}): ")))
@@ -153,28 +162,25 @@ def convert_parts(
     return done, sorted(out, key=lambda each: each.span.first_ns)
 
 
-@dataclass(frozen=True)
-class _How:
-    """Options of a conversion, as in ``convert``."""
-
-    labels: Labels
-    standard: OmnidDesign
-    rate_hz: float
-    max_gap_s: float
-    correct: bool
-
-
-def _convert(source: LogSource, how: _How, advance: Callable[[int], object] = lambda _: None) -> Converted:
-    labels = how.labels
-    resampled = resample(source, how.rate_hz, how.max_gap_s, advance)
+def _convert(
+    source: LogSource,
+    *,
+    labels: Labels,
+    standard: OmnidDesign,
+    rate_hz: float,
+    max_gap_s: float,
+    correct: bool,
+    advance: Callable[[int], object] = lambda _: None,
+) -> Converted:
+    resampled = resample(source, rate_hz, max_gap_s, advance)
     silent = source.metadata is None
     recording, clocks = to_recording(
         resampled,
-        design=labels.design or (how.standard if silent else None),
+        design=labels.design or (standard if silent else None),
         trial=labels.trial or (UNKNOWN_TRIAL if silent else None),
         payload=labels.payload,
         source=f"log {os.path.basename(source.name)}" if silent else None,
-        correct=how.correct,
+        correct=correct,
         cut=isinstance(source, Piece) and source.span is not None,
     )
     recording = replace(recording, metadata=replace(recording.metadata, level=labels.level or source.level))
@@ -212,7 +218,54 @@ def write_converted(
     else:
         from mocobot_logs.bag.write import write_bag  # its library takes a third of a second to load
 
+        storage = "sqlite3" if kind == "sqlite3" else "mcap"
         write_bag(
-            recording, path, level=level, storage="sqlite3" if kind == "sqlite3" else "mcap", advance=advance,
-            replace_bag=replace_bag,
+            recording, path, level=level, storage=storage, advance=advance, replace_bag=replace_bag
         )  # fmt: skip
+
+
+def write_csv(recording: Recording, path: Path, level: Level = "joint") -> None:
+    """Write a recording as CSV: a header, commas, the columns of docs/recording.md, every number to its last bit.
+
+    A text table has no place for metadata; who reads it has to say trial, payload and design again.
+
+    Args:
+        recording: what to write.
+        path: target; an existing file is replaced once the new one is complete.
+        level: "joint" or "wrist".
+
+    Raises:
+        InputError: the target cannot be written, or some driven angles have no wrist position.
+    """
+    columns = replace(recording, metadata=replace(recording.metadata, level=level)).file_columns()
+    table = pa.table({name: np.ascontiguousarray(values) for name, values in columns.items()})
+    with whole_file(path) as temporary:
+        pcsv.write_csv(table, temporary, pcsv.WriteOptions(batch_size=_CSV_ROWS, quoting_style="none"))
+
+
+def write_npz(recording: Recording, path: Path, level: Level = "joint") -> None:
+    """Write a recording as NPZ: ``time`` (Q,), then ``phi``, ``theta``, ``tau`` and ``ref`` of shape (Q, N, 3).
+
+    At wrist level ``h`` and ``force`` take the place of phi and tau. ``mocobot`` holds the metadata as JSON text.
+
+    Args:
+        recording: what to write.
+        path: target; an existing file is replaced once the new one is complete.
+        level: "joint" or "wrist".
+
+    Raises:
+        InputError: as ``write_csv``.
+    """
+    arrays = {"time": recording.time, "phi": recording.phi, "theta": recording.theta, "tau": recording.tau}
+    if level == "wrist":
+        try:
+            h, force = wrist_of(recording.phi, recording.tau, recording.metadata.design)
+        except InputError as error:
+            raise InputError(f"{recording.name}: {error}") from error
+        arrays = {"time": recording.time, "h": h, "theta": recording.theta, "force": force}
+    if recording.ref is not None:
+        arrays["ref"] = recording.ref
+    rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}  # readers stream rows
+    rows[METADATA_NAME] = np.array(replace(recording.metadata, level=level).to_json())
+    with whole_file(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, allow_pickle=False, **rows)

@@ -1,10 +1,62 @@
-"""What a log is: told from its first bytes, or from what its folder holds, without the libraries that read it."""
+"""What a log is, told from its first bytes or from what its folder holds, and what to say of damaged ones.
 
+Libraries that read logs are not loaded here: it takes time.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
 from estimator.errors import InputError
-from mocobot_logs.faults import detail_of
+from estimator.files import system_errors
+from estimator.inputs import open_input, printable
+
+LONGEST = 200
+readable = partial(system_errors, done="read")
+"""A block in which what the operating system refuses becomes one sentence: that a file cannot be read."""
+
+
+def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
+    """All of a file that describes something.
+
+    Args:
+        path: the file.
+        most_bytes: more are not read.
+        where: what messages call the file.
+        kind: what it should be, for the message.
+    """
+    with readable(where), open_input(path) as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise InputError(f"{where}: is larger than {most_bytes >> 20} MiB, which no {kind} is")
+    return content
+
+
+def detail_of(error: BaseException) -> str:
+    """The first line of an error's message, or its type where there is none: printable and short."""
+    lines = str(error).splitlines()
+    return shown(lines[0].strip() if lines else "", LONGEST) or type(error).__name__
+
+
+def shown(text: str, longest: int = 60) -> str:
+    """Text of a file as a terminal may show it."""
+    return printable(text[:longest], keep="")[:longest]
+
+
+@contextmanager
+def told_in_one_sentence(where: str, kind: str) -> Iterator[None]:
+    """Whatever a library raises inside the block on a file of some kind, as one sentence."""
+    try:
+        yield
+    except InputError:
+        raise
+    except PermissionError as error:
+        raise InputError(f"{where}: cannot be read (permission denied)") from error
+    except Exception as error:  # on damaged bytes libraries raise many types, not all of them their own
+        raise InputError(f"{where}: not a readable {kind}, or a damaged one ({detail_of(error)})") from error
+
 
 OutputKind = Literal["parquet", "csv", "npz", "mcap", "sqlite3", "folder"]
 SUFFIXES: dict[str, OutputKind] = {
@@ -42,7 +94,7 @@ MCAP, SQLITE, ROS1 = b"\x89MCAP0\r\n", b"SQLite format 3\x00", b"#ROSBAG"
 BAG_METADATA = "metadata.yaml"
 BAG_SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 DATASET_INFO = Path("meta") / "info.json"
-"""Of a LeRobot dataset."""
+"""Description of a LeRobot dataset."""
 PARQUET = b"PAR1"
 """First and last bytes of every Parquet file (parquet.apache.org/docs/file-format)."""
 ZIP = b"PK\x03\x04", b"PK\x05\x06"
@@ -77,8 +129,6 @@ def log_kind(path: Path) -> Kind:
     if head == PARQUET:
         if dataset_root(path) is None:
             return "parquet"
-        from mocobot_logs.table.parquet import is_recording  # takes time
-
         return "parquet" if is_recording(path) else "lerobot"
     if head in ZIP:
         return "npz"
@@ -94,6 +144,20 @@ def log_kind(path: Path) -> Kind:
             f"{path}: is named {suffix}, but does not begin like one; it is damaged or something else"
         )
     raise InputError(f"{path}: is of no known format; a log is {FORMATS}")
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a Parquet file says that it is a recording.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    import pyarrow.parquet as pq
+
+    from estimator.recording.parquet import METADATA_KEY
+
+    with told_in_one_sentence(str(path), "Parquet file"), pq.ParquetFile(path) as file:
+        return METADATA_KEY in (file.schema_arrow.metadata or {})
 
 
 def is_bag(path: Path) -> bool:

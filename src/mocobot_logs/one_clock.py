@@ -21,7 +21,7 @@ from estimator.filtering import MIN_SAMPLES
 from estimator.recording.metadata import FREE, RecordingMetadata, Sampling
 from estimator.recording.model import Recording
 from mocobot_logs.log import CHANNELS, NS, REF, THETA, Array
-from mocobot_logs.resample.log import Resampled
+from mocobot_logs.resample import Resampled
 
 EARLY_S = 1.0
 """A robot's log that ends so much before another's is broken off."""
@@ -86,9 +86,15 @@ def to_recording(
         why = "the robots hold nothing, so they do not move together"
         estimate = unknown_clocks(resampled.robots, float(resampled.start_s[0]), why)
     else:
-        estimate = log_clocks(resampled)
-    if correct:
-        _check_determined(resampled.name, estimate)
+        start = CHANNELS[resampled.level].index(THETA[0])
+        theta = [values[:, start : start + 3] for values in resampled.values]
+        estimate = estimate_clocks(theta, resampled.start_s, resampled.rate_hz)
+    for i, why in enumerate(estimate.why_not if correct else ()):
+        if why is not None:
+            raise InputError(
+                f"{resampled.name}: the clock of robot {i + 1} cannot be told from the motion and so not be "
+                f"corrected: {why}"
+            )
     N, rate_hz = resampled.robots, resampled.rate_hz
     offset_s, drift = (estimate.offset_s, estimate.drift) if correct else (np.zeros(N), np.zeros(N))
     ends_s = resampled.start_s + (np.array([len(x) for x in resampled.values]) - 1) / rate_hz
@@ -141,30 +147,7 @@ def to_recording(
     return recording, ClockReport(estimate, correct, float(time_s[0]), lost_s, tuple(untouched))
 
 
-def log_clocks(resampled: Resampled) -> ClockEstimate:
-    """Offsets and drifts of the robots' clocks in a log; see ``estimate_clocks``."""
-    start = CHANNELS[resampled.level].index(THETA[0])
-    theta = [values[:, start : start + 3] for values in resampled.values]
-    return estimate_clocks(theta, resampled.start_s, resampled.rate_hz)
-
-
 def _metadata(
-    resampled: Resampled,
-    design: OmnidDesign | None,
-    trial: str | None,
-    payload: str | None,
-    source: str | None,
-) -> RecordingMetadata:
-    found = _said(resampled, design, trial, payload, source)
-    if found.trial == FREE and found.payload is not None:
-        raise InputError(
-            f"{resampled.name}: payload is {found.payload!r:.60}, but in a free trial the robots hold nothing; leave "
-            "the payload out, or give another trial"
-        )
-    return found
-
-
-def _said(
     resampled: Resampled,
     design: OmnidDesign | None,
     trial: str | None,
@@ -178,12 +161,19 @@ def _said(
     if known is not None:
         # Robots as they are, of another design, are other robots.
         units = known.units if given.get("design", known.design) == known.design else None
-        return replace(known, **fixed, **given, units=units)
-    for key in ("design", "trial"):
-        if key not in given:
-            raise InputError(f"{resampled.name}: says nothing about its {key}, which must be given")
-    rest = {"source": f"log {resampled.name}", "payload": None, "seed": None}
-    return RecordingMetadata(**(rest | given | fixed))
+        found = replace(known, **fixed, **given, units=units)
+    else:
+        for key in ("design", "trial"):
+            if key not in given:
+                raise InputError(f"{resampled.name}: says nothing about its {key}, which must be given")
+        rest = {"source": f"log {resampled.name}", "payload": None, "seed": None}
+        found = RecordingMetadata(**(rest | given | fixed))
+    if found.trial == FREE and found.payload is not None:
+        raise InputError(
+            f"{resampled.name}: payload is {found.payload!r:.60}, but in a free trial the robots hold nothing; leave "
+            "the payload out, or give another trial"
+        )
+    return found
 
 
 def _sampling(
@@ -205,8 +195,8 @@ def _sampling(
         untouched: whether each robot kept its samples as they were on its own grid.
         aligned: whether clocks were brought to that of robot 1 by the motion.
     """
-    known = None if resampled.metadata is None else resampled.metadata.sampling
-    if known is not None:  # what was converted before: the errors are still those of the first reading
+    if resampled.metadata is not None and (known := resampled.metadata.sampling) is not None:
+        # What was converted before: the errors are still those of the first reading.
         # Stamps of what was written as a recording are its time; this one may begin in the middle of it.
         later = [sampling.later(resampled.origin_ns * NS + start_s) for sampling in known]
         return tuple(replace(s, aligned=s.aligned or (aligned and i > 0)) for i, s in enumerate(later))
@@ -227,14 +217,6 @@ def _sampling(
         )
         for i, report in enumerate(reports)
     )
-
-
-def _check_determined(name: str, estimate: ClockEstimate) -> None:
-    for i, why in enumerate(estimate.why_not):
-        if why is not None:
-            raise InputError(
-                f"{name}: the clock of robot {i + 1} cannot be told from the motion and so not be corrected: {why}"
-            )
 
 
 def _check_ends(name: str, ends_s: Array, estimate: ClockEstimate, *, correct: bool) -> None:

@@ -9,16 +9,12 @@ from pathlib import Path
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.formats import Kind, log_kind
-from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import CsvMap, LogMap, builtin_map
-from mocobot_logs.map.parse import MAX_ROBOTS
-from mocobot_logs.readings import Readings
-from mocobot_logs.table.csv import CsvTable
-from mocobot_logs.table.lerobot import LeRobotTable
-from mocobot_logs.table.mat import MatTable
-from mocobot_logs.table.npz import NpzTable
-from mocobot_logs.table.parquet import ParquetTable
+from mocobot_logs.log import LogSource, Readings
+from mocobot_logs.maps import MAX_ROBOTS, CsvMap, LogMap, builtin_map
+from mocobot_logs.table.arrays import MatTable, NpzTable
+from mocobot_logs.table.parquet import LeRobotTable, ParquetTable
 from mocobot_logs.table.table import Table, TableSource
+from mocobot_logs.table.text import CsvTable
 
 
 def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | None = None) -> LogSource:
@@ -55,11 +51,7 @@ def _open(path: Path, log_map: LogMap | None, episode: int | None) -> LogSource:
 
 @contextmanager
 def draft_suggested(path: Path) -> Iterator[None]:
-    """A block in which a log is read without a map, and what is said if it cannot be.
-
-    Raises:
-        InputError: it cannot be.
-    """
+    """A block in which a log is read without a map, and what is said if it cannot be."""
     try:
         yield
     except InputError as error:

@@ -22,7 +22,7 @@ from estimator.errors import InputError
 from estimator.recording.parquet import write_recording
 from estimator.strict import parse_json, read_json, read_toml
 from invented_calibration import invented_calibration
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.calibration.plots import save_plots

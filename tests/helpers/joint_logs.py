@@ -12,8 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.joints.joint_map import JointMap
-from mocobot_logs.joints.parse import parse_joint_map
+from mocobot_logs.joints.joint_map import JointMap, parse_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
 
 JOINTS = ("hip", "knee", "lift")

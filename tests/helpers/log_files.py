@@ -13,7 +13,7 @@ import pytest
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from mocobot_logs.log import Log, collect
-from mocobot_logs.map.files import LogMap
+from mocobot_logs.maps import LogMap
 from mocobot_logs.open_log import open_log
 
 

@@ -14,7 +14,7 @@ FILES = {
     "discrepancy": "src/discrepancy/team/rig.py",
     "estimator": "src/estimator/so3.py",
     "mocobot": "src/mocobot/api/simulation.py",
-    "mocobot_logs": "src/mocobot_logs/resample/filter.py",
+    "mocobot_logs": "src/mocobot_logs/resample_filter.py",
     "mocobot_sim": "src/mocobot_sim/trial/trial.py",
     "a model": "models/omnid/omnid.xml",
     "a model's design": "models/omnid/design.toml",

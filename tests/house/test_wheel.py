@@ -72,7 +72,7 @@ def test_wheel_simulates_on_its_own(wheel: Path, tmp_path: Path) -> None:
         "import mocobot_sim.paper.scoring as t;"
         "print(m.models_dir());"
         "import mocobot_report.page as r; r.page_assets();"
-        "import mocobot_logs.map.files as l; [l.builtin_map(name) for name in l.MAPS];"
+        "import mocobot_logs.maps as l; [l.builtin_map(name) for name in l.MAPS];"
         "t.payload_truth('a'); mocobot.cli.main(['simulate', '--vias', '1', '--out', 'rec.parquet'])"
     )
     done = subprocess.run(

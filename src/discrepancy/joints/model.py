@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_logs.faults import shown
+from mocobot_logs.formats import shown
 from mocobot_sim.model_check import check_model
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}

@@ -9,13 +9,12 @@ from estimator.arm.design import OmnidDesign, load_design
 from estimator.recording.metadata import Level
 from mocobot.api.public import public
 from mocobot_logs import convert as below
-from mocobot_logs.convert_json import conversion_dict
-from mocobot_logs.convert_report import format_conversion
-from mocobot_logs.cut.choice import parse_choice
+from mocobot_logs.convert_report import conversion_dict, format_conversion
+from mocobot_logs.cut import parse_choice
 from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
-from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ
+from mocobot_logs.resample import MAX_GAP_S, RATE_HZ
 from mocobot_sim.scene.models import omnid_design
 
 
@@ -40,7 +39,7 @@ class Conversion(below.Converted):
         return format_conversion(self, str(self.log), Path(out))
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``mocobot_logs.convert_json`` for the keys."""
+        """Strict JSON with units in the keys; see ``mocobot_logs.convert_report`` for the keys."""
         return conversion_dict(str(self.log), [(self, None)], self.left_out)
 
     def write(self, path: Path | str, advance: Callable[[int], object] = lambda _: None) -> None:

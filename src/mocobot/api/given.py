@@ -13,12 +13,11 @@ from estimator.recording.model import Recording
 from mocobot.files.calibrations import read_calibration
 from mocobot.files.recordings import read
 from mocobot_logs.convert import Converted, Labels, convert
-from mocobot_logs.formats import log_kind
+from mocobot_logs.formats import is_recording, log_kind
 from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
-from mocobot_logs.resample.log import RATE_HZ
-from mocobot_logs.table.parquet import is_recording
+from mocobot_logs.resample import RATE_HZ
 
 GivenCalibration = Calibration | Path | str
 """A calibration, or the path of its file, or of the folder that ``mocobot calibrate --out`` wrote."""

@@ -12,7 +12,7 @@ from mocobot_inspect import inspection
 from mocobot_inspect.findings import findings
 from mocobot_inspect.json import inspection_dict
 from mocobot_inspect.text import format_inspection, ready_line
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 

@@ -10,11 +10,9 @@ from mocobot.checks import check_target, targets
 from mocobot.options import Convert
 from mocobot.progress import bar
 from mocobot_logs.convert import Converted, Labels, convert, convert_parts, write_converted
-from mocobot_logs.convert_json import conversion_dict
-from mocobot_logs.convert_report import format_conversion, format_omissions
-from mocobot_logs.cut.choice import parse_choice
-from mocobot_logs.cut.split import Omission
-from mocobot_logs.map.files import read_map
+from mocobot_logs.convert_report import conversion_dict, format_conversion, format_omissions
+from mocobot_logs.cut import Omission, parse_choice
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 

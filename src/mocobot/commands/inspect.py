@@ -11,7 +11,7 @@ from mocobot.strict import NotGood
 from mocobot_inspect.inspection import inspect_log
 from mocobot_inspect.json import inspection_dict
 from mocobot_inspect.text import format_inspection, ready_line
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from estimator.files import write_text
 from mocobot.options import Map
-from mocobot_logs.draft.draft import Draft
-from mocobot_logs.draft.of_log import draft_of
+from mocobot_logs.draft import Draft, draft_of
 
 
 def run(options: Map) -> None:
@@ -29,7 +28,7 @@ def run(options: Map) -> None:
 def _run_joints(options: Map, model: Path) -> None:
     """The map of a log of one robot's joints."""
     from discrepancy.joints.model import load_model
-    from mocobot_logs.joints.draft import draft_joint_map
+    from mocobot_logs.draft import draft_joint_map
 
     robot = load_model(model)
     draft = draft_joint_map(options.log, robot.joints, [bool(s) for s in robot.slides], options.episode)

@@ -31,8 +31,7 @@ from mocobot.files.targets import map_file
 from mocobot.options import Watch
 from mocobot.progress import stages
 from mocobot.strict import NotGood
-from mocobot_logs.formats import log_kind
-from mocobot_logs.table.parquet import is_recording
+from mocobot_logs.formats import is_recording, log_kind
 from mocobot_report.page import write_report
 
 WIDTH = 110

@@ -7,8 +7,7 @@ from pathlib import Path
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
-from mocobot_logs.formats import FORMATS, log_kind
-from mocobot_logs.table.parquet import is_recording
+from mocobot_logs.formats import FORMATS, is_recording, log_kind
 
 KINDS = {
     "bag": "a ROS 2 bag",

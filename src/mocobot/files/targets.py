@@ -105,7 +105,7 @@ def map_file(name: str | None) -> list[Path]:
     """The file that a map is read from, none for a built-in one."""
     if name is None or not Path(name).is_file():
         return []
-    from mocobot_logs.map.files import MAPS  # takes time, and files are seldom named like built-in maps
+    from mocobot_logs.maps import MAPS  # takes time, and files are seldom named like built-in maps
 
     return [] if name in MAPS else [Path(name)]
 

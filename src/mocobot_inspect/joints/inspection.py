@@ -25,8 +25,7 @@ from mocobot_inspect.stream.channels import Channel, ChannelTally, Stretch, seco
 from mocobot_inspect.stream.noise import wild
 from mocobot_inspect.stream.timing import Timing, TimingTally
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.joints.joint_map import JointMap, label
-from mocobot_logs.joints.quantities import COMMANDS, EFFORTS, POSITIONS, VELOCITIES
+from mocobot_logs.joints.joint_map import COMMANDS, EFFORTS, POSITIONS, VELOCITIES, JointMap, label
 from mocobot_logs.joints.read import joint_logs_of
 from mocobot_logs.log import LogSource, Samples, collect
 

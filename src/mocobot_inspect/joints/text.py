@@ -10,7 +10,7 @@ from mocobot_inspect.joints.lags import pooled
 from mocobot_inspect.joints.numbers import later, percent
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.wiring.mistakes.base import listed
-from mocobot_logs.joints.quantities import COMMANDS, QUANTITIES
+from mocobot_logs.joints.joint_map import COMMANDS, QUANTITIES
 
 _UNITS = {
     "position": ("rad", "m"),

@@ -4,27 +4,335 @@ Where a number lies in a CDR message depends on the lengths of the strings and a
 whose lengths never change, so one message is walked field by field to find where its numbers are (its layout), and all
 messages with the same lengths, and the same joint names, are read at those places at once. A message with other lengths
 gets a layout of its own.
+
+Encapsulation is that of OMG DDSI-RTPS 2.5, section 10; alignment is plain CDR (XCDR1), which is what ROS 2 writes.
+Every refusal is an ``InputError`` that names the bag and the topic.
 """
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc, Typesdict
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.msg import normalize_msgtype
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_logs.bag.messages import Messages, printable
-from mocobot_logs.bag.types import MessageType
-from mocobot_logs.bag.walk import CdrError, Walk
+from mocobot_logs.bag.messages import Messages, Topic, printable
 from mocobot_logs.log import Stamps
 
+JOINT_STATE = "sensor_msgs/msg/JointState"
+STRING = "std_msgs/msg/String"
+LARGEST_NESTED = 10_000
+"""Most strings and structures in one message; numbers in arrays do not count."""
+_SIZES = {
+    "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
+    "int64": 8, "uint64": 8, "float32": 4, "float64": 8,
+}  # fmt: skip
+"""Numbers of a message and their sizes [bytes]."""
+_SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
+_TIME = "builtin_interfaces/msg/Time"
+_DEEPEST = 32
+_IDL = "=" * 80 + "\n"
+_EMPTY: list[tuple[str, FieldDesc]] = [("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))]
+_REFUSED = {
+    **dict.fromkeys((2, 3), "PL_CDR"),
+    **dict.fromkeys((6, 7, 16, 17), "CDR2"),
+    **dict.fromkeys((8, 9, 20, 21), "delimited CDR2"),
+    **dict.fromkeys((10, 11, 18, 19), "PL_CDR2"),
+}  # numbers of RTPS and of older XTypes
+_TRAILING = 3  # bytes that bring a message to a multiple of four
 _NEW_LAYOUTS = 4
 """So many new layouts of one size are looked for among all messages of a block; beyond them, one by one."""
 _KEPT_LAYOUTS = 64
 _GROUP = 8192
 """So many messages are read at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class MessageType:
+    """A message type with all that it is made of.
+
+    Attributes:
+        name: such as ``sensor_msgs/msg/JointState``.
+        types: fields of this and of every type inside it.
+        where: what messages call it: the bag and the topic.
+    """
+
+    name: str
+    types: Typesdict
+    where: str
+
+    def fields(self, name: str) -> list[tuple[str, FieldDesc]]:
+        """Names and types of a type's fields; one byte where it has none, as ROS 2 does."""
+        if name not in self.types and name not in _known():
+            raise InputError(
+                f"{self.where}: its messages hold the type {printable(name)}, which the bag does not define"
+            )
+        return (self.types[name] if name in self.types else _known()[name])[1] or _EMPTY
+
+    def require(self, path: str) -> None:
+        """Refuse a dotted path that does not lead to a number, as ``point.x`` or ``data[2]`` may."""
+        here, walked = self.name, ""
+        parts = path.split(".")
+        for number, part in enumerate(parts):
+            found = re.fullmatch(r"(\w+)(?:\[(\d{1,6})\])?", part)
+            fields = dict(self.fields(here))
+            if found is None or found[1] not in fields:
+                names = ", ".join(map(printable, list(fields)[:20]))
+                at = f"{walked} " if walked else ""
+                raise InputError(
+                    f"{self.where}: {at}has no field {part!r:.60}; the fields of {here} are {names}"
+                )
+            walked = f"{walked}.{part}" if walked else part
+            kind, detail = fields[found[1]]
+            is_array, is_last = kind in (Nodetype.ARRAY, Nodetype.SEQUENCE), number == len(parts) - 1
+            what = None
+            if is_array != (found[2] is not None):
+                what = f"is an array; name one element, such as {part}[0]" if is_array else "is not an array"
+            elif is_array:
+                kind, detail = detail[0]  # type: ignore[misc]
+            if what is None and kind == Nodetype.NAME:
+                here = str(detail)
+                what = f"is a {printable(here)}, not a number" if is_last else None
+            elif what is None and str(detail[0]) not in _SIZES:
+                what = f"is a {detail[0]}, not a number"
+            elif what is None and not is_last:
+                what = "is a number and has no fields"
+            if what is not None:
+                raise InputError(f"{self.where}: field {walked!r:.80} {what}")
+
+    def require_stamp(self) -> None:
+        """Refuse messages without ``header.stamp``."""
+        if dict(self.fields(self.name)).get("header") != (Nodetype.NAME, "std_msgs/msg/Header"):
+            raise InputError(
+                f"{self.where}: {printable(self.name)} has no header and so no stamp of its own; "
+                "with clock = 'log' in the map's [time], the recorder's clock is taken"
+            )
+        stamp = dict(self.fields("std_msgs/msg/Header")).get("stamp")
+        if stamp != (Nodetype.NAME, _TIME) or dict(self.fields(_TIME)) != dict(_known()[_TIME][1]):
+            raise InputError(
+                f"{self.where}: the bag defines a header without the stamp that headers of ROS 2 have"
+            )
+
+    def require_joints(self, field: str) -> None:
+        """Refuse messages that are no joint states with such numbers."""
+        if self.name != JOINT_STATE:
+            raise InputError(
+                f"{self.where} holds {printable(self.name)}; a map's key joint goes with {JOINT_STATE}, and a dotted "
+                "path as field with other messages"
+            )
+        fields = dict(self.fields(self.name))
+        for wanted, base, text in (
+            ("name", "string", "string[] name"),
+            (field, "float64", f"float64[] {field}"),
+        ):
+            found = fields.get(wanted)
+            if found is None or found[0] != Nodetype.SEQUENCE or found[1][0][1] != (base, 0):
+                needed = ", which it must have" if base == "string" else ""
+                raise InputError(f"{self.where}: the bag defines {JOINT_STATE} without {text}{needed}")
+
+
+def message_type(topic: Topic, bag: str) -> MessageType:
+    """The type of a topic's messages, as the bag defines it, or as ROS 2 does where the bag does not say.
+
+    Raises:
+        InputError: messages are not CDR, or the type is neither defined in the bag nor known.
+    """
+    where = f"{bag}: topic {printable(topic.name)}"
+    if topic.encoding != "cdr":
+        raise InputError(
+            f"{where} is encoded as {topic.encoding!r:.40}; only cdr, as ROS 2 writes it, is read"
+        )
+    name = type_name(topic)
+    types = _parsed(topic, name, where) if topic.definition else {}
+    if name not in types and name not in _known():
+        raise InputError(f"{where} holds {name or 'messages'!s:.80}, a type that the bag does not define")
+    found = MessageType(name, types, where)
+    _check_depth(found, name, 0, set())
+    return found
+
+
+def type_name(topic: Topic) -> str:
+    """Name of a topic's type in full: some writers leave out ``/msg/``."""
+    name = topic.type
+    return normalize_msgtype(name) if re.fullmatch(r"\w+/\w+", name) else name
+
+
+def string_of(message: bytes, where: str) -> str:
+    """The text of a std_msgs/msg/String."""
+    try:
+        return get_typestore(Stores.LATEST).deserialize_cdr(message, STRING).data  # type: ignore[attr-defined]
+    except Exception as error:  # the library raises its own type, and others on damaged bytes
+        raise InputError(f"{where}: its message is not a readable {STRING}") from error
+
+
+def _parsed(topic: Topic, name: str, where: str) -> Typesdict:
+    text = topic.definition.replace("\r\n", "\n")
+    try:
+        if topic.definition_format in ("ros2idl", "omgidl"):
+            parts = [text]
+            if text.startswith(f"{_IDL}IDL: "):
+                parts = [part.partition("\n")[2] for part in text.split(_IDL)[1:]]
+            return {key: value for part in parts for key, value in get_types_from_idl(part).items()}
+        if topic.definition_format == "ros2msg":
+            return get_types_from_msg(text, name)
+    except Exception as error:  # the parser raises its own type, and others on damaged text
+        raise InputError(f"{where}: the definition of its type {printable(name)} is not readable") from error
+    raise InputError(
+        f"{where}: its type is defined by {topic.definition_format!r:.40}; ros2msg and ros2idl are read"
+    )
+
+
+def _check_depth(found: MessageType, name: str, depth: int, done: set[str]) -> None:
+    if depth > _DEEPEST:
+        raise InputError(
+            f"{found.where}: the definition of {printable(found.name)} holds itself, or is too deep"
+        )
+    for field, (kind, detail) in found.fields(name):
+        if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+            kind, detail = detail[0]  # type: ignore[misc]
+        if kind == Nodetype.NAME:
+            # Types seen at this depth need no second look: the work stays in proportion to the definition.
+            if (mark := f"{depth} {detail}") not in done:
+                done.add(mark)
+                _check_depth(found, str(detail), depth + 1, done)
+        elif str(detail[0]) not in _SIZES and detail[0] != "string":
+            raise InputError(
+                f"{found.where}: field {printable(field)} of {printable(name)} is a {detail[0]}, which is not read"
+            )
+
+
+@cache
+def _known() -> Typesdict:
+    """Types that come with ROS 2."""
+    return get_typestore(Stores.LATEST).fielddefs
+
+
+class CdrError(ValueError):
+    """A message is not what its type says; tells what is wrong, not where."""
+
+    def __init__(self, what: str, row: int = 0) -> None:
+        """What is wrong with which of the messages that are read together."""
+        super().__init__(what)
+        self.row = row
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """Numbers at ``offset`` in a message, one or an array, of a kind as NumPy has it."""
+
+    offset: int
+    kind: str
+    count: int
+
+
+class Walk:
+    """One message, walked.
+
+    Attributes:
+        leaves: the numbers and arrays of numbers that are wanted, by dotted path.
+        joints: the strings of its field ``name``, if wanted.
+        fixed: every byte on which the places of the numbers depend: encapsulation, lengths, and names if wanted.
+    """
+
+    def __init__(self, message: bytes, kind: MessageType, wanted: set[str], names: bool) -> None:
+        """Walk a message with its encapsulation.
+
+        Args:
+            message: the message.
+            kind: its type.
+            wanted: dotted paths of numbers or of arrays of numbers.
+            names: whether the strings of a field ``name`` are wanted.
+
+        Raises:
+            CdrError: the message is not what its type says, or is encapsulated in another way.
+        """
+        if len(message) < 4:
+            raise CdrError(f"it is cut off, at {len(message)} bytes")
+        scheme = int.from_bytes(message[:2], "big")
+        if scheme not in (0, 1):
+            known = _REFUSED.get(scheme, "an unknown one")
+            raise CdrError(
+                f"its encapsulation is {scheme:#06x} ({known}); plain CDR (0x0000, 0x0001) is read"
+            )
+        self._order = "<" if scheme else ">"
+        self._message, self._kind, self._wanted, self._names = message, kind, wanted, names
+        self._at, self._nested = 4, 0
+        self.leaves: dict[str, Leaf] = {}
+        self.joints: list[str] = []
+        self.fixed: list[int] = [0, 1]
+        self._structure(kind.name, "")
+        if self._at + _TRAILING < len(message):
+            raise CdrError(f"it has {len(message)} bytes, {len(message) - self._at} more than its type says")
+
+    def _structure(self, name: str, path: str) -> None:
+        for field, description in self._kind.fields(name):
+            self._field(description, f"{path}.{field}" if path else field)
+
+    def _field(self, description: FieldDesc, path: str) -> None:
+        kind, detail = description
+        if kind == Nodetype.NAME:
+            self._count(1)
+            self._structure(str(detail), path)
+        elif kind == Nodetype.BASE:
+            if str(detail[0]) == "string":
+                self._string(path)
+            else:
+                self._numbers(str(detail[0]), 1, path)
+        else:
+            (inner, what), count = detail  # type: ignore[misc]
+            if kind == Nodetype.SEQUENCE:
+                count = self._length()
+            if inner == Nodetype.BASE and (base := str(what[0])) != "string":
+                self._numbers(base, int(count), path)
+                return
+            self._count(int(count))
+            for number in range(int(count)):
+                self._field((inner, what), f"{path}[{number}]")  # type: ignore[arg-type]
+
+    def _string(self, path: str) -> None:
+        length = self._length()
+        begin = self._at
+        self._skip(length)
+        if self._names and path.startswith("name["):
+            self.fixed += range(begin, self._at)
+            self.joints.append(self._message[begin : self._at].rstrip(b"\0").decode(errors="replace"))
+
+    def _numbers(self, base: str, count: int, path: str) -> None:
+        size = _SIZES[base]
+        if count:
+            self._align(size)
+        if path in self._wanted:
+            letter = "f" if base.startswith("float") else "i" if base.startswith("int") else "u"
+            self.leaves[path] = Leaf(self._at, f"{self._order}{letter}{size}", count)
+        self._skip(size * count)
+
+    def _length(self) -> int:
+        self._align(4)
+        begin = self._at
+        self._skip(4)
+        self.fixed += range(begin, self._at)
+        return int.from_bytes(self._message[begin : self._at], "little" if self._order == "<" else "big")
+
+    def _align(self, size: int) -> None:
+        self._at += (4 - self._at) % size  # counted from behind the encapsulation
+
+    def _skip(self, length: int) -> None:
+        self._at += length
+        if self._at > len(self._message):
+            missing = self._at - len(self._message)
+            raise CdrError(f"it has {len(self._message)} bytes, {missing} less than its lengths say")
+
+    def _count(self, more: int) -> None:
+        self._nested += more
+        if self._nested > LARGEST_NESTED:
+            raise CdrError(f"it holds more than {LARGEST_NESTED} strings and structures")
 
 
 @dataclass(frozen=True)
@@ -56,15 +364,12 @@ class Layout:
         """
         names = any(selector.joint is not None for selector in selectors)
         arrays = {re.sub(r"\[\d+\]$", "", selector.field) for selector in selectors}
-        time = {"header.stamp.sec", "header.stamp.nanosec"} if stamp else set()
+        time = {_SEC, _NANOSEC} if stamp else set()
         walk = Walk(message, kind, arrays | time, names)
         self.joints = walk.joints
         self._at = np.array(walk.fixed, np.intp)
         self._fixed = np.frombuffer(message, np.uint8)[self._at]
-        places: dict[str, tuple[str, int]] = {}
-        for path in time:
-            leaf = walk.leaves[path]
-            places[path] = walk.order + leaf.kind, leaf.offset
+        places = {path: (walk.leaves[path].kind, walk.leaves[path].offset) for path in time}
         self.lacking: list[str | None] = []
         for number, selector in enumerate(selectors):
             place = self._place(selector, walk)
@@ -91,7 +396,7 @@ class Layout:
         leaf = walk.leaves.get(path)
         if leaf is None or index >= leaf.count:
             return f"has no {selector.field}" if selector.joint is not None else "is missing"
-        return walk.order + leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
+        return leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Which messages, one per row, have this layout."""
@@ -105,14 +410,14 @@ class Layout:
         """
         table = np.ascontiguousarray(rows).view(self._record)[:, 0]
         stamps = np.zeros(len(rows), np.int64)
-        if "header.stamp.sec" in (self._record.names or ()):
-            nanoseconds = table["header.stamp.nanosec"].astype(np.int64)
+        if _SEC in (self._record.names or ()):
+            nanoseconds = table[_NANOSEC].astype(np.int64)
             if (bad := nanoseconds >= 1_000_000_000).any():
                 row = int(np.argmax(bad))
                 raise CdrError(
                     f"the nanoseconds of its stamp are {nanoseconds[row]}; they must be below 1e9", row
                 )
-            stamps = table["header.stamp.sec"].astype(np.int64) * 1_000_000_000 + nanoseconds
+            stamps = table[_SEC].astype(np.int64) * 1_000_000_000 + nanoseconds
         values = np.full((len(rows), len(self.lacking)), np.nan)
         for number, lacking in enumerate(self.lacking):
             if lacking is None:
@@ -130,13 +435,7 @@ class CdrReader:
     """
 
     def __init__(self, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
-        """Prepare.
-
-        Args:
-            kind: type of the messages.
-            selectors: the numbers.
-            stamp: whether to read ``header.stamp``.
-        """
+        """Take the type of the messages, the numbers, and whether to read ``header.stamp``."""
         self._kind, self._selectors, self._stamp = kind, tuple(selectors), stamp
         self._layouts: dict[int, list[Layout]] = {}
         self._kept = 0
@@ -145,11 +444,7 @@ class CdrReader:
         self.count = 0
 
     def read(self, messages: Messages) -> tuple[Stamps, Array]:
-        """Stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where a message lacks one, shape (q, S).
-
-        Raises:
-            InputError: a message is not what its type says.
-        """
+        """Stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where a message lacks one, shape (q, S)."""
         stamps = np.zeros(len(messages), np.int64)
         values = np.empty((len(messages), len(self._selectors)))
         memory = np.frombuffer(messages.block, np.uint8)

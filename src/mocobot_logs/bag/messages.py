@@ -1,22 +1,28 @@
-"""What a bag's storage hands over: its topics, and serialised messages by the block."""
+"""What files of a bag hand over (topics, blocks of serialised messages), and decompression that is bounded."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from pathlib import Path
 
+import lz4.frame
 import numpy as np
+import zstandard
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_logs.faults import shown
+from estimator.inputs import Unpacked
+from mocobot_logs.formats import detail_of, shown
 from mocobot_logs.log import Stamps
 
 BLOCK_BYTES = 4 << 20
 """About so many bytes of messages are handed over at a time, unless a chunk of the file is larger."""
 MESSAGE_BYTES = 16 << 20
 """Largest message that is read [bytes]; one robot's joint states take some hundred."""
+CHUNK_BYTES = 256 << 20
+"""Largest chunk of a file that is unpacked in memory; recorders write chunks of about 1 MiB."""
 SHOWN = 20
 """So many topics or joints are listed in a message."""
+_STEP = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -66,60 +72,15 @@ class Messages:
         return self.block[start : start + int(self.size[index])]
 
 
-class Storage(Protocol):
-    """One file of a bag.
-
-    Attributes:
-        name: what messages call it.
-        size: bytes to read.
-        topics: by name.
-    """
-
-    name: str
-    size: int
-    topics: dict[str, Topic]
-
-    def blocks(
-        self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
-    ) -> Iterator[dict[str, Messages]]:
-        """Messages of some topics in the order of the file; topics without messages in a block are left out.
-
-        Args:
-            topics: names of the topics.
-            advance: takes the bytes read since the last call.
-            block_bytes: about so many bytes at a time, where the file leaves the choice.
-
-        Raises:
-            InputError: the file is damaged.
-        """
-        ...
-
-    def has_messages(self, topic: str) -> bool:
-        """Whether there is any message of a topic, as far as the file says.
-
-        Raises:
-            InputError: the file is damaged.
-        """
-        ...
-
-
 def joined(payloads: Sequence[bytes], log_ns: Stamps, where: str) -> Messages:
-    """Messages that come one by one, in one block of memory.
-
-    Raises:
-        InputError: one is larger than ``MESSAGE_BYTES``.
-    """
+    """Messages that come one by one, in one block of memory."""
     size = np.fromiter(map(len, payloads), np.int64, len(payloads))
     check_sizes(size, where)
     return Messages(b"".join(payloads), np.cumsum(size) - size, size, log_ns)
 
 
 def check_sizes(size: NDArray[np.int64], where: str) -> None:
-    """Refuse messages that are larger than ``MESSAGE_BYTES``.
-
-    Raises:
-        InputError: one is.
-    """
+    """Refuse messages that are larger than ``MESSAGE_BYTES``."""
     if len(size) and (largest := int(size.max())) > MESSAGE_BYTES:
         raise InputError(
             f"{where}: a message of {largest / 2**20:.1f} MiB; joint data are read from messages of at most "
@@ -128,11 +89,7 @@ def check_sizes(size: NDArray[np.int64], where: str) -> None:
 
 
 def merged(topics: Iterable[Topic], where: str) -> dict[str, Topic]:
-    """Topics by name: recorders list one once for each quality of service, and once in each file.
-
-    Raises:
-        InputError: a topic has one type or encoding here and another one there.
-    """
+    """Topics by name: recorders list one once for each quality of service, and once in each file."""
     found: dict[str, Topic] = {}
     for topic in topics:
         known = found.setdefault(topic.name, topic)
@@ -166,3 +123,94 @@ def listed_names(names: Sequence[str]) -> str:
 def printable(text: str) -> str:
     """Text of a file as a terminal may show it."""
     return shown(text, 80)
+
+
+class UnpackError(ValueError):
+    """What was to be unpacked is damaged, or larger than it may be; says what is wrong, not where."""
+
+
+def unpack(data: bytes, compression: str, size: int) -> bytes:
+    """Unpack a chunk that claims ``size`` bytes; the compression is "", "zstd" or "lz4", as MCAP names them.
+
+    Raises:
+        UnpackError: unknown compression, damaged data, or another size.
+    """
+    if size > CHUNK_BYTES:
+        raise UnpackError(f"claims {size} bytes; chunks of at most {CHUNK_BYTES >> 20} MiB are read")
+    try:
+        if compression == "":
+            unpacked = data
+        elif compression == "zstd":
+            unpacked = _zstd(data, size)
+        elif compression == "lz4":
+            stream = lz4.frame.LZ4FrameDecompressor()
+            unpacked = stream.decompress(data, max_length=size + 1)
+            if not stream.eof and len(unpacked) <= size:
+                raise UnpackError("is cut off")
+        else:
+            raise UnpackError(f"is compressed by {compression!r:.40}; it must be zstd, lz4 or not compressed")
+    except (zstandard.ZstdError, RuntimeError) as error:  # lz4 raises RuntimeError
+        raise UnpackError(f"does not unpack ({detail_of(error)})") from error
+    if len(unpacked) != size:
+        more = "more" if len(unpacked) > size else f"{len(unpacked)}"
+        raise UnpackError(f"claims {size} bytes unpacked, but holds {more}")
+    return unpacked
+
+
+def unpack_message(data: bytes) -> bytes:
+    """Unpack one message that was compressed by itself (zstd).
+
+    Raises:
+        UnpackError: damaged, or larger than ``MESSAGE_BYTES``.
+    """
+    try:
+        size = zstandard.frame_content_size(data)
+        unpacked = _zstd(data, MESSAGE_BYTES if size < 0 else min(size, MESSAGE_BYTES))
+    except zstandard.ZstdError as error:
+        raise UnpackError(f"does not unpack ({detail_of(error)})") from error
+    if max(size, len(unpacked)) > MESSAGE_BYTES:
+        raise UnpackError(f"unpacks to more than {MESSAGE_BYTES >> 20} MiB")
+    return unpacked
+
+
+def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], unpacked: Unpacked) -> None:
+    """Unpack a file of a bag that was compressed as a whole (zstd).
+
+    Args:
+        source: packed file.
+        target: where to unpack it.
+        heads: first bytes that the unpacked file may have.
+        unpacked: counts.
+
+    Raises:
+        InputError: damaged, not one of ``heads``, too much in all, or there is no room for it.
+    """
+    done = 0
+    try:
+        with (
+            source.open("rb") as packed,
+            target.open("wb") as out,
+            zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True) as stream,
+        ):
+            while block := stream.read(_STEP):
+                if not done and not block.startswith(heads):
+                    raise InputError(f"{source}: what it unpacks to is neither an MCAP nor an SQLite file")
+                done += len(block)
+                unpacked.add(len(block))
+                out.write(block)
+    except zstandard.ZstdError as error:
+        raise InputError(f"{source}: damaged, does not unpack ({detail_of(error)})") from error
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{source}: cannot be unpacked into {target.parent} ({reason})") from error
+    if not done:
+        raise InputError(f"{source}: unpacks to nothing, or is cut off")
+
+
+def _zstd(data: bytes, size: int) -> bytes:
+    """At most ``size`` bytes and one more."""
+    unpacker = zstandard.ZstdDecompressor()
+    if zstandard.frame_content_size(data) == size:  # three times as fast as a stream
+        return unpacker.decompress(data, max_output_size=size) if size else b""
+    with unpacker.stream_reader(data, read_across_frames=True) as stream:
+        return stream.read(size + 1)

@@ -43,10 +43,9 @@ from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
 from estimator.files import check_place, holds, scratch_folder, whole_file, whole_folder
 from estimator.recording.model import Recording
+from mocobot_logs.bag.cdr import JOINT_STATE, STRING, Walk, message_type
 from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC
-from mocobot_logs.bag.types import JOINT_STATE, STRING, message_type
-from mocobot_logs.bag.walk import Walk
 from mocobot_logs.log import Array, Level, Stamps
 
 
@@ -99,7 +98,7 @@ class ChecksummedMcap:
 Storage = Literal["mcap", "sqlite3"]
 
 SUFFIXES: dict[Storage, str] = {"mcap": ".mcap", "sqlite3": ".db3"}
-"""Of single files; any other path is a folder."""
+"""Suffixes of single files; any other path is a folder."""
 POINT = "geometry_msgs/msg/PointStamped"
 _ARM: dict[Level, tuple[str, ...]] = {"joint": ("phi1", "phi2", "phi3"), "wrist": ("x", "y", "z")}
 _GIMBAL = ("gimbal_z", "gimbal_y", "gimbal_x")

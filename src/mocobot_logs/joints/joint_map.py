@@ -1,39 +1,103 @@
-"""What a map of a joint log says, with every joint in the model's order."""
+"""Maps of one robot's joint logs: what each column is of which joint, and what lies between motors and joints."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import get_args
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from estimator.arrays import Array
+from estimator.errors import InputError
+from estimator.strict import Fields, check_known, is_number
+from mocobot_logs import units
 from mocobot_logs.joints.joint_log import Command, GainOf
-from mocobot_logs.map.log_map import ChannelMap, CsvMap, LogMap, TimeMap
+from mocobot_logs.maps import (
+    PLACES,
+    ChannelMap,
+    CsvMap,
+    LogMap,
+    TimeMap,
+    check_version,
+    parse_channel,
+    parse_csv,
+    parse_time,
+    read_toml_map,
+    table_of,
+)
 
-COMMANDS, GAINS = get_args(Command), get_args(GainOf)
+Kind = Literal["position", "velocity", "effort", "current", "duty", "voltage", "flag"]
 
 
 @dataclass(frozen=True)
-class JointChannel(ChannelMap):
-    """Where one channel of one joint is, and how to bring it to SI.
+class Quantity:
+    """One kind of column.
 
     Attributes:
-        bits: of a number that is signed but was logged without its sign (two's complement), or None.
-        counted: whether the raw numbers are counts, whose step is 1.
+        kind: what it measures.
+        motor: whether it is of the motor's side of the gear.
+        shared: whether it is one column of the robot, not one of each joint.
     """
 
-    bits: int | None = None
-    counted: bool = False
+    kind: Kind
+    motor: bool = False
+    shared: bool = False
 
-    def apply(self, raw: Array) -> Array:
-        """Raw samples in SI."""
-        if self.bits is not None:
-            half = 2.0 ** (self.bits - 1)
-            raw = np.mod(raw + half, 2.0 * half) - half
-        return super().apply(raw)
+
+QUANTITIES: dict[str, Quantity] = {
+    "q": Quantity("position"),
+    "motor_position": Quantity("position", motor=True),
+    "dq": Quantity("velocity"),
+    "motor_velocity": Quantity("velocity", motor=True),
+    "torque": Quantity("effort"),
+    "link_torque": Quantity("effort"),
+    "motor_torque": Quantity("effort", motor=True),
+    "current": Quantity("current", motor=True),
+    "command": Quantity("position"),
+    "motor_command": Quantity("position", motor=True),
+    "duty": Quantity("duty", motor=True),
+    "motor_voltage": Quantity("voltage", motor=True),
+    "supply": Quantity("voltage", shared=True),
+    "enabled": Quantity("flag", shared=True),
+}
+"""By the name of its channel in a map; a command is of the kind that ``[control] command`` says."""
+POSITIONS = ("q", "motor_position")
+VELOCITIES = ("dq", "motor_velocity")
+EFFORTS = ("torque", "link_torque", "motor_torque", "current")
+COMMANDS = ("command", "motor_command")
+DUTIES = ("duty", "motor_voltage")
+KEYS = (*PLACES, "unit", "sign", "offset", "bits", *units.NUMBERED)
+"""Keys of a channel."""
+MOST_BITS = 53
+LEAST_HZ, MOST_HZ = 20.0, 20e3
+_DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
+    "position": ("positions", "angle", "length"),
+    "velocity": ("velocities", "angular velocity", "speed"),
+    "effort": ("torques", "torque", "force"),
+    "current": ("currents", "current", "current"),
+    "duty": ("duties", "duty", "duty"),
+    "voltage": ("voltages", "voltage", "voltage"),
+    "flag": ("flags", "flag", "flag"),
+}
+"""Plural, and dimension of a turning and of a sliding joint."""
+_COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
+_PLACEHOLDERS = ("joint", "number", "index")
+_OPTIONAL = ("version", "time", "csv", "defaults", "drive", "control", "joint", "log")
+_DRIVE = ("gear", "zero", "torque_constant")
+_GAIN = ("position_gain", "velocity_gain", "limit")
+_OF_JOINT = (*_DRIVE, *_GAIN, "channels")
+_OF_LOG = ("match", *_GAIN, "supply_V")
+_LEAST_RECIPROCAL_CONDITION = 1e-9
+_UNKNOWN = float("nan")
+
+
+def units_of(kind: Kind, *, slides: bool) -> tuple[str, ...]:
+    """Units that a kind of column may come in, for a joint that slides or turns."""
+    return units.units_of(_DIMENSIONS[kind][1 + slides])
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +120,7 @@ class Control:
     supply_V: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class Override:
-    """What differs in some logs.
-
-    Attributes:
-        match: pattern of file names, as a shell has it.
-        control: entries of ``Control`` that differ.
-    """
-
-    match: str
-    control: Mapping[str, object]
+Channels = dict[tuple[str, str], ChannelMap]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +138,7 @@ class JointMap:
         zero: added to positions behind the gear [rad or m], shape (J,).
         torque_constant: [N m/A], NaN where it is free, shape (J,).
         control: how the robot is commanded.
-        overrides: what differs in some logs; later ones override.
+        overrides: patterns of file names, and the entries of ``control`` that differ there; later ones override.
     """
 
     name: str
@@ -92,25 +146,25 @@ class JointMap:
     time: TimeMap
     rate_hz: float | None
     csv: CsvMap
-    channels: Mapping[tuple[str, str], JointChannel]
+    channels: Mapping[tuple[str, str], ChannelMap]
     turns: Array
     zero: Array
     torque_constant: Array
     control: Control
-    overrides: tuple[Override, ...] = ()
+    overrides: tuple[tuple[str, Mapping[str, Any]], ...] = ()
 
     def control_of(self, file_name: str) -> Control:
         """How the robot is commanded in a log of some name."""
         control = self.control
-        for override in self.overrides:
-            if fnmatchcase(file_name, override.match):
-                control = replace(control, **override.control)  # type: ignore[arg-type]
+        for pattern, differs in self.overrides:
+            if fnmatchcase(file_name, pattern):
+                control = replace(control, **differs)
         return control
 
     def of_source(self) -> LogMap:
         """The map as readers of logs take it: one robot, one channel after the other."""
         mapped = {label(*key): channel for key, channel in self.channels.items()}
-        return _SourceMap(self.name, "joint", 1, None, self.time, self.csv, mapped)
+        return LogMap(self.name, "joint", 1, None, self.time, self.csv, mapped, required=tuple(mapped))
 
 
 def label(quantity: str, joint: str) -> str:
@@ -118,32 +172,350 @@ def label(quantity: str, joint: str) -> str:
     return f"{quantity} of {joint}" if joint else quantity
 
 
+def read_joint_map(path: Path | str, joints: Sequence[str], slides: Sequence[bool]) -> JointMap:
+    """A map from its file, for a model's joints, of which some slide.
+
+    Raises:
+        InputError: there is no such file, it is not TOML, or not such a map.
+    """
+    return parse_joint_map(read_toml_map(Path(path)), str(path), joints, slides)
+
+
+def parse_joint_map(
+    values: Mapping[str, Any], name: str, joints: Sequence[str], slides: Sequence[bool]
+) -> JointMap:
+    """Check a map and bring it into shape.
+
+    Args:
+        values: the parsed TOML.
+        name: what to call the map in messages.
+        joints: the model's joints.
+        slides: whether each of them slides.
+
+    Raises:
+        InputError: a key is unknown or missing, a value is not allowed, or the joints are not the model's.
+    """
+    where = f"map {name}"
+    check_version(values, where)
+    top = Fields(values, ("joints", "channels"), where, _OPTIONAL)
+    named = _joint_names(top, joints)
+    tables = table_of(values, "joint", where)
+    check_known(tables, named, f"{where}: joint", "joint")
+    own = {joint: table_of(tables, joint, f"{where}: joint") for joint in tables}
+    for joint, table in own.items():
+        check_known(table, _OF_JOINT, f"{where}: joint.{joint}")
+    per_joint = _PerJoint(where, named, tuple(joints), own)
+    control, overrides = _control(values, per_joint)
+    turns, zero, constant = _gears(values, per_joint)
+    slide = dict(zip(joints, map(bool, slides), strict=True))
+    channels = _channels(values, per_joint, slide, control.command)
+    _check_together(channels, control, where)
+    time = dict(table_of(values, "time", where))
+    rate_hz = time.pop("rate_hz", None)
+    if rate_hz is not None:
+        rate_hz = Fields({"rate_hz": rate_hz}, ("rate_hz",), f"{where}: time").number("rate_hz", LEAST_HZ)
+        if rate_hz > MOST_HZ:
+            raise InputError(f"{where}: time: rate_hz is {rate_hz:g}; it must be at most {MOST_HZ:g}")
+    found = JointMap(
+        name=name,
+        joints=tuple(joints),
+        time=parse_time(time, f"{where}: time"),
+        rate_hz=rate_hz,
+        csv=parse_csv(table_of(values, "csv", where), f"{where}: csv"),
+        channels=channels,
+        turns=turns,
+        zero=zero,
+        torque_constant=constant,
+        control=control,
+        overrides=overrides,
+    )
+    if found.time.column is not None and "{" in found.time.column:
+        raise InputError(f"{where}: time: column holds a placeholder; all joints share one column of time")
+    return found
+
+
+def _joint_names(top: Fields, model: Sequence[str]) -> tuple[str, ...]:
+    """Names in the order of the log."""
+    names = top.list("joints")
+    if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
+        top.refuse("joints", "a list of distinct names of the model's joints")
+    check_known(names, tuple(model), f"{top.where}: joints", "joint")
+    missing = [joint for joint in model if joint not in names]
+    if missing:
+        raise InputError(
+            f"{top.where}: joints lacks {', '.join(map(repr, missing[:8]))}; a map names every joint of the model "
+            "(lock the others in the model by removing their joints)"
+        )
+    return tuple(names)
+
+
+# Channels.
+
+
+def _channels(
+    values: Mapping[str, Any], joints: _PerJoint, slides: Mapping[str, bool], command: str
+) -> Channels:
+    """Every channel of every joint in the map's order, then what the robot has one of."""
+    where = joints.where
+    defaults = table_of(values, "defaults", where)
+    check_known(defaults, KEYS, f"{where}: defaults")
+    common = _channel_tables(table_of(values, "channels", where), f"{where}: channels")
+    found: Channels = {}
+    for index, joint in enumerate(joints.named):
+        inside = f"{where}: joint.{joint}"
+        own = _channel_tables(table_of(joints.own.get(joint, {}), "channels", inside), f"{inside}.channels")
+        fill = {"joint": joint, "number": f"{index + 1}", "index": f"{index}"}
+        for name in dict.fromkeys([*common, *own]):
+            if QUANTITIES[name].shared:
+                if name in own:
+                    raise InputError(
+                        f"{inside}.channels: {name} is one column of the whole robot; put it in [channels]"
+                    )
+                continue
+            table = own.get(name, {})
+            if table is None or (common.get(name, {}) is None and name not in own):
+                continue
+            fields = Fields(
+                _with_unit(name, defaults | (common.get(name) or {}) | table),
+                (),
+                f"{inside}.channels.{name}" if table else f"{where}: channels.{name}",
+                KEYS,
+            )
+            channel = _joint_channel(name, fields, _PLACEHOLDERS, slides[joint], command)
+            found[name, joint] = channel.filled(
+                lambda text, fill=fill: re.sub(r"\{(\w+)\}", lambda at: fill[at[1]], text)
+            )
+    for name, table in common.items():
+        if QUANTITIES[name].shared and table is not None:
+            fields = Fields(_with_unit(name, defaults | table), (), f"{where}: channels.{name}", KEYS)
+            found[name, ""] = _joint_channel(name, fields, (), False, command)
+    for joint in joints.named:
+        _check_joint([name for name, of in found if of == joint], joint, where)
+    return found
+
+
+def _channel_tables(tables: Mapping[str, Any], where: str) -> dict[str, dict[str, Any] | None]:
+    """Tables by quantity; None for what is switched off with ``false``."""
+    check_known(tables, tuple(QUANTITIES), where, "channel")
+    for name, table in tables.items():
+        if isinstance(table, dict):
+            check_known(table, KEYS, f"{where}.{name}")
+        elif table is not False:
+            raise InputError(
+                f"{where}: {name} is {table!r:.40}; it must be a table, or false where a joint has none"
+            )
+    return {name: None if table is False else table for name, table in tables.items()}
+
+
+def _with_unit(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    return {"unit": "1", **table} if QUANTITIES[name].kind == "flag" else dict(table)
+
+
+def _joint_channel(
+    name: str, fields: Fields, placeholders: Sequence[str], slides: bool, command: str
+) -> ChannelMap:
+    quantity = QUANTITIES[name]
+    kind: Kind = _COMMAND_KINDS.get(command, "position") if name in COMMANDS else quantity.kind
+    if "unit" not in fields:
+        raise InputError(
+            f"{fields.where}: missing key 'unit'; it is one of {', '.join(units_of(kind, slides=slides))}"
+        )
+    # A motor turns or slides, whatever its joint does.
+    slides = slides and not (quantity.motor and fields.text("unit") in units_of(kind, slides=False))
+    plural, *dimensions = _DIMENSIONS[kind]
+    is_of = f" of a {'sliding' if slides else 'turning'} joint" if dimensions[0] != dimensions[1] else ""
+    allowed = units_of(kind, slides=slides)
+    channel = parse_channel(fields, placeholders, dimensions[slides], allowed, f"{plural}{is_of}")
+    bits = fields.values.get("bits")
+    if bits is not None and (type(bits) is not int or not 2 <= bits <= MOST_BITS):
+        fields.refuse("bits", f"a whole number from 2 to {MOST_BITS}")
+    return replace(channel, bits=bits)
+
+
+def _check_joint(names: Sequence[str], joint: str, where: str) -> None:
+    """One position at least, and one of all else at most."""
+    groups = {"torque": EFFORTS, "velocity": VELOCITIES, "command": COMMANDS, "duty": DUTIES}
+    for what, group in groups.items():
+        given = [name for name in names if name in group]
+        if len(given) > 1:
+            raise InputError(
+                f"{where}: joint {joint} has {' and '.join(given)}; one {what} of a joint is used, so leave out "
+                f"the others (joint.{joint}.channels.{given[-1]} = false)"
+            )
+    if not any(name in POSITIONS for name in names):
+        raise InputError(
+            f"{where}: joint {joint} has no position; it needs a channel {' or '.join(POSITIONS)}"
+        )
+
+
+def _check_together(channels: Channels, control: Control, where: str) -> None:
+    """What only makes sense with something else."""
+    names = {name for name, _ in channels}
+    commands = names & set(COMMANDS)
+    if commands and control.command == "none":
+        raise InputError(
+            f"{where}: control: missing key 'command', which says what the channel {next(iter(commands))} is: "
+            "position, velocity or torque"
+        )
+    if commands and control.command == "duty":
+        raise InputError(
+            f"{where}: control: command is 'duty', whose channel is duty or motor_voltage, not {next(iter(commands))}"
+        )
+    if control.command in _COMMAND_KINDS and not commands:
+        raise InputError(
+            f"{where}: control: command is {control.command!r}, but there is no channel command or motor_command"
+        )
+    if "motor_voltage" in names and control.supply_V is None and "supply" not in names:
+        raise InputError(
+            f"{where}: channels: motor_voltage needs the supply, a channel supply or control's key supply_V"
+        )
+    if not names & {*EFFORTS, *COMMANDS, *DUTIES}:
+        listed = ", ".join((*EFFORTS, *COMMANDS, *DUTIES))
+        raise InputError(
+            f"{where}: no joint has a torque, a current, a command or a duty; without one there is nothing to compare "
+            f"the model with (channels {listed})"
+        )
+
+
+# Gears, coupled drives, torque constants and the loop.
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if is_number(value) else None
+
+
+def _nonzero(value: Any) -> float | None:
+    return _number(value) or None
+
+
+def _positive(value: Any) -> float | None:
+    number = _number(value)
+    return number if number is not None and number > 0 else None
+
+
+def _constant(value: Any) -> float | None:
+    return _UNKNOWN if value == "free" else _positive(value)
+
+
+_RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
+    "gear": (1.0, _nonzero, "a number of motor turns per joint turn, not 0"),
+    "zero": (0.0, _number, "a finite number"),
+    "torque_constant": (1.0, _constant, 'a positive number of newton metres per ampere, or "free"'),
+    **dict.fromkeys(_GAIN, (_UNKNOWN, _positive, "a positive number")),
+}
+"""Numbers of a joint: default, what takes a value or refuses it by None, and what is allowed."""
+
+
 @dataclass(frozen=True)
-class _SourceMap(LogMap):
-    """A map of any channels of one robot."""
+class _PerJoint:
+    """Reads numbers of the joints.
 
-    own: Mapping[int, Mapping[str, ChannelMap]] = field(default_factory=dict)
+    Attributes:
+        where: what messages call the map.
+        named: the joints in the map's order.
+        model: the joints in the model's order.
+        own: tables of single joints.
+    """
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.required
+    where: str
+    named: tuple[str, ...]
+    model: tuple[str, ...]
+    own: Mapping[str, Mapping[str, Any]]
 
-    @property
-    def required(self) -> tuple[str, ...]:
-        return tuple(self.common)
+    def read(self, table: Mapping[str, Any], key: str, inside: str) -> Array:
+        """One number for all joints, or a list in the map's order; single joints may have their own. Shape (J,)."""
+        default, convert, allowed = _RULES[key]
+        given = table.get(key, default)
+        count = len(self.named)
+        listed = given if isinstance(given, list) else [given] * count
+        if len(listed) != count:
+            raise InputError(
+                f"{inside}: {key} has {len(listed)} entries; it must have {count}, one for each joint, or be one number"
+            )
+        found = {}
+        for joint, value in zip(self.named, listed, strict=True):
+            own = self.own.get(joint, {})
+            value = own.get(key, value)
+            number = default if value is default else convert(value)
+            if number is None:
+                here = f"{self.where}: joint.{joint}" if key in own else inside
+                raise InputError(f"{here}: {key} is {value!r:.60}; it must be {allowed}")
+            found[joint] = number
+        return np.array([found[joint] for joint in self.model], dtype=float)
 
-    def meaning(self, name: str, robot: int) -> str:
-        del robot
-        return name
 
-    def channels(self, robot: int) -> dict[str, ChannelMap]:
-        del robot
-        return dict(self.common)
+def _gears(values: Mapping[str, Any], joints: _PerJoint) -> tuple[Array, Array, Array]:
+    """Motor positions from joint positions (J, J), zeros [rad or m] (J,), torque constants [N m/A] (J,)."""
+    inside = f"{joints.where}: drive"
+    drive = table_of(values, "drive", joints.where)
+    check_known(drive, (*_DRIVE, "coupling"), inside)
+    gear, zero, constant = (joints.read(drive, key, inside) for key in _DRIVE)
+    coupling = drive.get("coupling", {})
+    if isinstance(coupling, list):
+        if "gear" in drive:
+            raise InputError(f"{inside}: coupling is a matrix, which has the gears in it; leave out gear")
+        n = len(joints.named)
+        matrix = Fields(drive, (), inside, tuple(drive)).array("coupling", (n, n))
+        order = [joints.named.index(joint) for joint in joints.model]
+        turns = matrix[np.ix_(order, order)]
+    else:
+        turns = np.diag(gear) + _coupled(coupling, joints, f"{inside}: coupling")
+    condition = np.linalg.cond(turns)
+    if not np.isfinite(condition) or 1.0 / condition < _LEAST_RECIPROCAL_CONDITION:
+        raise InputError(
+            f"{inside}: coupling is singular; where the motors are must tell where the joints are"
+        )
+    return turns, zero, constant
 
-    def time_column(self, robot: int) -> str | None:
-        del robot
-        return self.time.column
 
-    def has_commands(self, robots: int, is_there: Callable[[ChannelMap], bool]) -> bool:
-        del robots, is_there
-        return False
+def _coupled(coupling: Any, joints: _PerJoint, where: str) -> Array:
+    """Motor turns per turn of other joints than their own, in the model's order, shape (J, J)."""
+    if not isinstance(coupling, dict):
+        raise InputError(
+            f"{where} is {coupling!r:.40}; it must be a matrix (motors by joints) or tables such as "
+            "joint_6 = { joint_5 = 32.0 }"
+        )
+    model = joints.model
+    found = np.zeros((len(model), len(model)))
+    check_known(coupling, joints.named, where, "joint")
+    for motor, row in coupling.items():
+        if not isinstance(row, dict):
+            raise InputError(
+                f"{where}: {motor} is {row!r:.40}; it must be a table, motor turns by turn of a joint"
+            )
+        check_known(row, [joint for joint in joints.named if joint != motor], f"{where}.{motor}", "joint")
+        for joint, ratio in row.items():
+            if not is_number(ratio):
+                raise InputError(f"{where}.{motor}: {joint} is {ratio!r:.40}; it must be a finite number")
+            found[model.index(motor), model.index(joint)] = ratio
+    return found
+
+
+def _control(
+    values: Mapping[str, Any], joints: _PerJoint
+) -> tuple[Control, tuple[tuple[str, Mapping[str, Any]], ...]]:
+    """How the robot is commanded, and what differs in single logs."""
+    inside = f"{joints.where}: control"
+    table = table_of(values, "control", joints.where)
+    fields = Fields(table, (), inside, ("command", "gain_of", "supply_V", *_GAIN))
+    control = Control(
+        **{key: joints.read(table, key, inside) for key in _GAIN},
+        command=fields.one_of("command", get_args(Command)) if "command" in fields else "none",
+        gain_of=fields.one_of("gain_of", get_args(GainOf)) if "gain_of" in fields else "torque",
+        supply_V=fields.number("supply_V", above=0.0) if "supply_V" in fields else None,
+    )
+    logs = values.get("log", [])
+    if not isinstance(logs, list) or not all(isinstance(log, dict) for log in logs):
+        raise InputError(f"{joints.where}: log is {logs!r:.40}; it must be tables, [[log]]")
+    alike = replace(joints, own={})
+    found = []
+    for number, log in enumerate(logs, 1):
+        where = f"{joints.where}: log {number}"
+        fields = Fields(log, ("match",), where, _OF_LOG)
+        differs: dict[str, Any] = {key: alike.read(log, key, where) for key in _GAIN if key in log}
+        if "supply_V" in fields:
+            differs["supply_V"] = fields.number("supply_V", above=0.0)
+        if not differs:
+            raise InputError(f"{where}: says nothing; give it one of {', '.join(_OF_LOG[1:])}")
+        found.append((fields.text("match"), differs))
+    return control, tuple(found)

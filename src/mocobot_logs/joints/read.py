@@ -1,28 +1,54 @@
-"""Read logs of one robot's joints, of any format, by a map."""
+"""Logs of one robot's joints, of any format, by a map: on an even grid, in the units and order of the model's joints.
+
+A log is taken at its own rate where its stamps are even, else interpolated and low-passed. The parts between long gaps
+are logs of their own. Stamps that are not even are treated as those of a team (``resample``): gaps are bridged by
+polynomials, a quintic spline leads onto a finer grid, and a known low-pass back to the log's rate, so that noise of
+samples a moment apart is averaged and nothing folds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
-from mocobot_logs.joints.assemble import assemble
-from mocobot_logs.joints.even import even_parts
-from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.joints.joint_map import JointMap, label
-from mocobot_logs.joints.quantities import QUANTITIES
-from mocobot_logs.joints.turns import unwrapped
-from mocobot_logs.log import LogSource, Samples, collect
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arrays import Array
+from estimator.errors import InputError
+from estimator.filtering import low_pass
+from estimator.quantisation import rounding_step
+from mocobot_logs.joints.joint_log import Drive, JointLog
+from mocobot_logs.joints.joint_map import (
+    COMMANDS,
+    DUTIES,
+    EFFORTS,
+    POSITIONS,
+    QUANTITIES,
+    VELOCITIES,
+    Control,
+    JointMap,
+    label,
+)
+from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated
 from mocobot_logs.open_log import open_log
+from mocobot_logs.resample import MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
+from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, on_grid
+
+MAX_GAP_S = 0.05
+"""Longest time without samples, beyond one period, that is bridged [s]."""
+SHORTEST_S, LEAST_ROWS = 1.0, 32
+"""Parts between gaps that are shorter are left out."""
+LEAST_HZ, MOST_HZ = 20.0, 20e3
+_BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; of the blocks; times the usual one
+_GAP = 1.75  # periods: jitter alone makes no longer intervals
+_INSIDE = 0.1  # of a period: nearer to a sample than that, a bridged gap does not show
 
 
 def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = None) -> LogSource:
-    """A log that can be read by a map.
-
-    Args:
-        path: a file or a folder of any format that ``open_log`` knows.
-        log_map: where its channels are.
-        episode: of a LeRobot dataset that holds several.
+    """A log of any format that ``open_log`` knows, as a map reads it; ``episode`` is of a LeRobot dataset.
 
     Raises:
         InputError: there is no such log, or the map does not suit it.
@@ -33,12 +59,7 @@ def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = No
 def read_joint_log(
     source: LogSource, log_map: JointMap, advance: Callable[[int], object] = lambda _: None
 ) -> list[JointLog]:
-    """The parts of a log between long gaps, mostly one.
-
-    Args:
-        source: the log.
-        log_map: its map.
-        advance: takes the progress made, in the source's units.
+    """The parts of a log between long gaps, mostly one; ``advance`` takes the progress made, in the source's units.
 
     Raises:
         InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
@@ -64,10 +85,456 @@ def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointL
         values = samples.values.copy()
         values[:, at] = positions
         samples = replace(samples, values=values)
-    parts = even_parts(name, channels, samples, log_map.rate_hz)
-    parts = [replace(part, notes=(*notes, *part.notes)) for part in parts]
     control = log_map.control_of(Path(name).name)
-    logs = [assemble(part, log_map, name, control) for part in parts]
+    logs = [
+        _joint_log(part, log_map, name, control, notes)
+        for part in _even_parts(name, channels, samples, log_map.rate_hz)
+    ]
     if len(logs) == 1:
         return logs
     return [replace(log, name=f"{log.name} (part {number})") for number, log in enumerate(logs, 1)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Even:
+    """A part of a log on an even grid.
+
+    Attributes:
+        start_s: of the first sample, after the log's first stamp [s].
+        rate_hz: of the grid [Hz].
+        values: channels [SI], shape (Q, C).
+        usable: False where a gap was bridged, shape (Q,).
+        native_hz: rate of the samples [Hz].
+        resampled: whether they were interpolated and low-passed.
+        raw: samples as they came, shape (q, C).
+        notes: what was done, in sentences.
+    """
+
+    start_s: float
+    rate_hz: float
+    values: Array
+    usable: NDArray[np.bool_]
+    native_hz: float
+    resampled: bool
+    raw: Array
+    notes: tuple[str, ...]
+
+
+def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz: float | None) -> list[_Even]:
+    """Parts of a log between gaps too long to be bridged, at ``rate_hz`` [Hz] or the log's own rate."""
+    _check_values(name, channels, samples.values)
+    screen = Screen(name, channels)
+    time_ns, values = screen.keep(samples)
+    if len(time_ns) < LEAST_ROWS:
+        again = f" ({repeated(screen.repeats)})" if screen.repeats else ""
+        raise InputError(f"{name}: has {len(time_ns)} samples{again}; at least {LEAST_ROWS} are needed")
+    period_ns = _period_ns(np.diff(time_ns))
+    native_hz = 1.0 / (period_ns * NS)
+    if not LEAST_HZ <= native_hz <= MOST_HZ:
+        raise InputError(
+            f"{name}: samples come {period_ns * NS:.6g} s apart, at {native_hz:.6g} Hz; {LEAST_HZ:g} to {MOST_HZ:g} Hz "
+            "are allowed (is the unit of time right?)"
+        )
+    if rate_hz is not None and rate_hz > 1.01 * native_hz:
+        raise InputError(
+            f"{name}: the map's rate_hz is {rate_hz:g}, but the log has {native_hz:.6g} samples a second; it must be "
+            "at most that"
+        )
+    notes = _notes(screen)
+    holes = np.flatnonzero(beyond_s(np.diff(time_ns), period_ns) > MAX_GAP_S)
+    edges = np.concatenate([[0], holes + 1, [len(time_ns)]])
+    parts, lost_s = [], 0.0
+    for first, end in pairwise(edges):
+        length_s = float(time_ns[end - 1] - time_ns[first]) * NS
+        if length_s < SHORTEST_S or end - first < LEAST_ROWS:
+            lost_s += length_s
+            continue
+        parts.append(_even(time_ns[first:end], values[first:end], period_ns, rate_hz))
+    if not parts:
+        raise InputError(
+            f"{name}: no part of it has samples for {SHORTEST_S:g} s without a gap of more than {MAX_GAP_S:g} s"
+        )
+    if len(holes):
+        longest = float(np.diff(time_ns)[holes].max()) * NS
+        notes.append(
+            f"{len(holes)} gap{'s' * (len(holes) > 1)} of up to {longest:.3g} s cut the log into {len(parts)} part"
+            f"{'s' * (len(parts) > 1)}{f'; {lost_s:.3g} s are in none of them' if lost_s else ''}."
+        )
+    return [replace(part, notes=(*notes, *part.notes)) for part in parts]
+
+
+def _even(time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | None) -> _Even:
+    """One part without long gaps."""
+    first_ns = int(time_ns[0])
+    time_ns = time_ns - first_ns
+    found = _own_grid(time_ns, period_ns)
+    native_hz = (len(time_ns) - 1) / (float(time_ns[-1]) * NS)
+    grid, k, wanted, notes = None, 1, rate_hz, []
+    if found is not None:
+        period_ns, index, rounded = found
+        even_hz = _plain(1.0 / (period_ns * NS))
+        time_ns = np.rint(index * period_ns).astype(np.int64)
+        if rounded:
+            notes.append(
+                f"Stamps are rounded to {rounded * NS:.3g} s; samples are taken as even, {period_ns * NS:.6g} s apart."
+            )
+        ratio = even_hz / (even_hz if rate_hz is None else rate_hz)
+        native_hz = (len(time_ns) - 1) / (float(time_ns[-1]) * NS)
+        if abs(ratio - round(ratio)) < 1e-4:
+            k, native_hz = round(ratio), even_hz
+            grid, wanted = Grid(period_ns, period_ns, fits=True), even_hz / k
+    if wanted is None:
+        wanted = float(np.floor(1.0 / (period_ns * NS) + 0.01))
+    if grid is None:
+        interval = np.diff(time_ns)
+        jitter = float(np.std(interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns))
+        fitted = found is None and native_hz >= MANY * wanted and jitter > UNEVEN * period_ns
+        if fitted:
+            period_ns = float(np.mean(interval))
+        k = fineness(1.0 / (period_ns * NS), wanted, fitted=fitted)
+        rows = fitted_rows(native_hz, wanted) if fitted else 0
+        grid = Grid(1.0 / (k * wanted) / NS, period_ns, fitted_rows=rows)
+        if found is None:
+            notes.append(
+                f"Stamps are uneven ({interval.min() * NS:.3g} to {interval.max() * NS:.3g} s apart); samples were "
+                f"interpolated at {wanted:g} Hz, and nothing above {0.2 * wanted:.3g} Hz is relied on."
+            )
+    out, lead = on_grid(time_ns, values, grid, k)
+    at_ns = (lead + np.arange(len(out))) / wanted / NS
+    usable = _between_samples(at_ns, time_ns, grid.period_ns)
+    if not usable.all():
+        notes.append(f"{np.sum(~usable)} of {len(out)} samples are bridged gaps and are left out.")
+    start_s = (first_ns + float(at_ns[0])) * NS
+    return _Even(start_s, wanted, out, usable, native_hz, not grid.fits or k > 1, values, tuple(notes))
+
+
+def _between_samples(at_ns: Array, time_ns: Stamps, period_ns: float) -> NDArray[np.bool_]:
+    """Whether instants are not inside a gap."""
+    after = np.clip(np.searchsorted(time_ns, at_ns), 1, len(time_ns) - 1)
+    left, right = time_ns[after - 1], time_ns[after]
+    margin = _INSIDE * period_ns
+    inside = (at_ns - left > margin) & (right - at_ns > margin)
+    return ~(inside & (right - left > _GAP * period_ns))
+
+
+def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int64], float] | None:
+    """If stamps are even: spacing [ns], each sample's number, and the step of rounded stamps, 0 for none [ns].
+
+    Stamps rounded to milliseconds or to a tick of a clock are even if no one is further off than the rounding.
+    """
+    interval = np.diff(time_ns)
+    step_ns = float(np.gcd.reduce(interval))
+    index = np.concatenate([[0], np.cumsum(np.rint(interval / period_ns))]).astype(np.int64)
+    if np.any(np.diff(index) < 1):
+        return None
+    spacing_ns, offset_ns = period_ns, 0.0
+    for _ in range(3):  # a spacing that is a little off loses count over a long log
+        spacing_ns, offset_ns = np.polyfit(index.astype(float), time_ns.astype(float), 1)
+        again = np.rint((time_ns - offset_ns) / spacing_ns).astype(np.int64)
+        again -= again[0]
+        if np.array_equal(again, index):
+            break
+        index = again
+    if np.any(np.diff(index) < 1):
+        return None
+    off_ns = np.abs(time_ns - offset_ns - index * spacing_ns).max()
+    coarse = step_ns if step_ns > 2.0 * TOLERANCE_NS and step_ns < 1.01 * period_ns else 0.0
+    if off_ns <= TOLERANCE_NS + 0.5:
+        return float(spacing_ns), index, 0.0
+    if coarse and off_ns <= 0.75 * coarse and coarse < 0.75 * period_ns:
+        return float(spacing_ns), index, coarse
+    return None
+
+
+def _period_ns(interval: Stamps) -> float:
+    """The usual interval; the slower one where a log's rate changes by less than twice.
+
+    Such a change shows in the mean of many intervals, in which jitter and single gaps do not.
+    """
+    median = float(np.median(interval))
+    blocks = interval[: len(interval) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).mean(axis=1)
+    if not len(blocks):
+        return median
+    slower = float(np.quantile(blocks, _SLOW_SHARE) / np.median(blocks))
+    return median * slower if _SLOW[0] < slower < _SLOW[1] else median
+
+
+def _plain(rate_hz: float) -> float:
+    """A rate without what rounding of stamps makes of it."""
+    whole = round(rate_hz)
+    return float(whole) if abs(rate_hz - whole) < 1e-5 * rate_hz else rate_hz
+
+
+def _check_values(name: str, channels: tuple[str, ...], values: Array) -> None:
+    if not len(values):
+        raise InputError(f"{name}: has no samples")
+    infinite = np.argwhere(np.isinf(values))
+    if len(infinite):
+        row, k = infinite[0]
+        raise InputError(
+            f"{name}: {channels[k]} is {values[row, k]} in row {row}; every value must be finite (a cell may be empty)"
+        )
+    blank = np.isnan(values).mean(axis=0)
+    k = int(np.argmax(blank))
+    if blank[k] > MOST_MISSING:
+        lost = f"{100 * blank[k]:.3g} % of the rows" if blank[k] < 1 else "any row"
+        raise InputError(
+            f"{name}: {channels[k]} has no value in {lost}; at most {100 * MOST_MISSING:g} % may lack one (a joint "
+            "without such a column says so in the map: CHANNEL = false)"
+        )
+
+
+def _notes(screen: Screen) -> list[str]:
+    notes = []
+    if screen.duplicates:
+        notes.append(f"{screen.duplicates} rows repeat the row before, stamp included, and were dropped.")
+    if screen.repeats:
+        notes.append(f"{repeated(screen.repeats)}.")
+    if screen.blank:
+        worst = max(screen.blank_channels, key=lambda channel: screen.blank_channels[channel])
+        notes.append(f"{screen.blank} rows lack a value ({worst} first) and count as missing.")
+    return notes
+
+
+TURN = 2.0 * np.pi
+LEAST_JUMP = 0.75
+"""No joint moves by this share of a turn between two samples: at 20 Hz it would be 94 rad/s."""
+ONE_TURN = 1.01
+"""Turns that the readings of an encoder which starts again cover at most."""
+
+
+def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
+    """Positions [rad], shape (q, C), NaN where a row lacks one, without jumps by a full turn; and what to say of it."""
+    out, notes = values, []
+    for c, name in enumerate(names):
+        known = np.flatnonzero(np.isfinite(values[:, c]))
+        x = values[known, c]
+        if not len(x) or np.ptp(x) > ONE_TURN * TURN:
+            continue
+        jumps = int(np.sum(np.abs(np.diff(x)) > LEAST_JUMP * TURN))
+        if jumps:
+            out = out.copy() if out is values else out
+            out[known, c] = np.unwrap(x)
+            times = "once" if jumps == 1 else f"{jumps} times"
+            notes.append(
+                f"{name} is told within one turn; {times} it jumps by a full turn, which is taken out."
+            )
+    return out, notes
+
+
+SUPPLY_HZ = 1.0
+"""Cut-off of a supply's reading. Chosen: batteries and their cables sag in seconds; faster is how a bus rings that is
+switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty of 7.0 to 7.4 V)."""
+
+
+def mean_supply(reading: Array, rate_hz: float) -> Array:
+    """A supply's reading of at least 16 even samples, low-passed [V], shape (Q,).
+
+    A bus that a drive switches rings, and a reading meets it at any instant of the drive's period: an XL330 at a steady
+    duty of 0.7 reads 6.2, 7.3 and 8.2 V in turn, with about the mean of its idle supply. The winding has the mean.
+    """
+    # A filter goes through the first and the last reading of what it is given: means there are none by chance.
+    end = round(rate_hz / SUPPLY_HZ)
+    wide = np.concatenate([np.full(end, reading[:end].mean()), reading, np.full(end, reading[-end:].mean())])
+    return low_pass(wide, rate_hz, SUPPLY_HZ)[end : end + len(reading)]
+
+
+_STEP_ROWS = 1024
+"""Rows of a block in which the step of a reading is looked for."""
+_STEP_BLOCKS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Channels of one part of a log, by quantity and joint; values have the shape (Q, C), in the map's order."""
+
+    log_map: JointMap
+    values: Array
+
+    def of(self, quantity: str) -> Array:
+        """A quantity of all joints, NaN where a joint has none, shape (Q, J)."""
+        keys, joints = list(self.log_map.channels), self.log_map.joints
+        found = np.full((len(self.values), len(joints)), np.nan)
+        for k, (name, joint) in enumerate(keys):
+            if name == quantity:
+                found[:, joints.index(joint)] = self.values[:, k]
+        return found
+
+    def shared(self, quantity: str) -> Array | None:
+        """A quantity that the robot has one of, shape (Q,)."""
+        keys = list(self.log_map.channels)
+        return self.values[:, keys.index((quantity, ""))] if (quantity, "") in keys else None
+
+    def has(self, *quantities: str) -> bool:
+        """Whether any joint has one of some quantities."""
+        return any(name in quantities for name, _ in self.log_map.channels)
+
+
+def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, notes: Sequence[str]) -> JointLog:
+    """One part of a log, brought to the joints."""
+    columns = _Columns(log_map, part.values)
+    turns, zero = log_map.turns, log_map.zero
+    where = f"map {log_map.name}"
+    joint_side = columns.of("q")
+    motor_side = columns.of("motor_position")
+    # A joint that is read on both sides of its gear follows the link; the motor's reading is kept beside it.
+    both = _given(joint_side) & _given(motor_side)
+    q = _joints_from_motors(joint_side, np.where(both, np.nan, motor_side), turns, where, "motor_position")
+    motor = None
+    if both.any():
+        seen = np.where(_given(motor_side), motor_side, (q @ turns.T))
+        motor = np.where(both, seen @ np.linalg.inv(turns).T + zero, np.nan)
+    dq = None
+    if columns.has(*VELOCITIES):
+        dq = _joints_from_motors(
+            columns.of("dq"), columns.of("motor_velocity"), turns, where, "motor_velocity"
+        )
+    supply_V = _supply(columns, control, name, part.rate_hz)
+    drive = Drive(
+        gear=np.diag(turns).copy(),
+        coupling=np.asarray(np.linalg.inv(turns), dtype=np.float64),
+        torque_constant=_constants(columns, log_map, where),
+        link_side=_given(columns.of("link_torque")),
+        command=control.command,
+        position_gain=control.position_gain,
+        velocity_gain=control.velocity_gain,
+        gain_of=control.gain_of,
+        limit=control.limit,
+        supply_V=supply_V,
+        duty=_duty(columns, supply_V),
+    )
+    flags = columns.shared("enabled")
+    return JointLog(
+        name=name,
+        time=np.arange(len(part.values)) / part.rate_hz,
+        rate_hz=part.rate_hz,
+        q=q + zero,
+        torque=_torque(columns, drive, turns, where),
+        dq=dq,
+        command=_command(columns, control, turns, zero, where),
+        joints=log_map.joints,
+        drive=drive,
+        position_step=_position_step(part, log_map, turns),
+        usable=part.usable,
+        native_hz=part.native_hz,
+        resampled=part.resampled,
+        start_s=part.start_s,
+        enabled=None if flags is None else flags > 0.5,
+        motor=motor,
+        notes=(*notes, *part.notes),
+    )
+
+
+def _given(values: Array) -> NDArray[np.bool_]:
+    """Which joints have a column, shape (J,)."""
+    return np.asarray(~np.isnan(values).all(axis=0))
+
+
+def _joints_from_motors(joint: Array, motor: Array, turns: Array, where: str, channel: str) -> Array:
+    """Positions or velocities of all joints from those of some joints and the motors of the others, shape (Q, J)."""
+    at_joint, at_motor = _given(joint), _given(motor)
+    out = joint.copy()
+    solved = at_motor & ~at_joint
+    if not solved.any():
+        return out
+    lacking = ~at_joint & ~at_motor
+    needed = (turns[np.ix_(solved, lacking)] != 0).any(axis=0)
+    if needed.any():
+        raise InputError(
+            f"{where}: drive: coupling: a drive is coupled with a joint that has no {channel}; log it or leave the "
+            "coupling out"
+        )
+    rest = motor[:, solved] - joint[:, at_joint] @ turns[np.ix_(solved, at_joint)].T
+    out[:, solved] = np.linalg.solve(turns[np.ix_(solved, solved)], rest.T).T
+    return out
+
+
+def _at_joints(motor: Array, turns: Array, where: str, channel: str) -> Array:
+    """Torques of the joints from those of the motors, NaN where a joint has none, shape (Q, J)."""
+    given = _given(motor)
+    out = np.full(motor.shape, np.nan)
+    for j in np.flatnonzero(given):
+        motors = np.flatnonzero(turns[:, j])
+        if not given[motors].all():
+            raise InputError(
+                f"{where}: drive: coupling: the drive of joint {j + 1} is coupled with one that has no {channel}; log "
+                "it or leave the coupling out"
+            )
+        out[:, j] = motor[:, motors] @ turns[motors, j]
+    return out
+
+
+def _constants(columns: _Columns, log_map: JointMap, where: str) -> Array:
+    """Torque constants of the joints that have currents; 1 of the others."""
+    constants = np.where(_given(columns.of("current")), log_map.torque_constant, 1.0)
+    coupled = (log_map.turns - np.diag(np.diag(log_map.turns)) != 0).any(axis=1)
+    coupled |= (log_map.turns - np.diag(np.diag(log_map.turns)) != 0).any(axis=0)
+    if (np.isnan(constants) & coupled).any():
+        raise InputError(
+            f"{where}: drive: torque_constant is 'free' for coupled drives; it must be known there, for their torques "
+            "add up in one joint"
+        )
+    return constants
+
+
+def _torque(columns: _Columns, drive: Drive, turns: Array, where: str) -> Array | None:
+    if not columns.has(*EFFORTS):
+        return None
+    constants = np.where(np.isnan(drive.torque_constant), 1.0, drive.torque_constant)
+    current = columns.of("current") * constants
+    motor = columns.of("motor_torque")
+    motor = np.where(_given(motor), motor, current)
+    torque = columns.of("torque")
+    for other in (columns.of("link_torque"), _at_joints(motor, turns, where, "motor_torque or current")):
+        torque = np.where(_given(torque), torque, other)
+    return torque
+
+
+def _command(columns: _Columns, control: Control, turns: Array, zero: Array, where: str) -> Array | None:
+    if not columns.has(*COMMANDS):
+        return None
+    joint, motor = columns.of("command"), columns.of("motor_command")
+    if control.command == "torque":
+        return np.where(_given(joint), joint, _at_joints(motor, turns, where, "motor_command"))
+    at_joints = _joints_from_motors(joint, motor, turns, where, "motor_command")
+    return at_joints + zero if control.command == "position" else at_joints
+
+
+def _supply(columns: _Columns, control: Control, name: str, rate_hz: float) -> Array | None:
+    supply_V = columns.shared("supply")
+    if supply_V is None:
+        return None if control.supply_V is None else np.full(len(columns.values), control.supply_V)
+    if (supply_V <= 0).any():
+        row = int(np.argmax(supply_V <= 0))
+        raise InputError(f"{name}: supply is {supply_V[row]:.4g} V in sample {row}; it must be positive")
+    return mean_supply(supply_V, rate_hz)
+
+
+def _duty(columns: _Columns, supply_V: Array | None) -> Array | None:
+    if not columns.has(*DUTIES):
+        return None
+    duty, voltage = columns.of("duty"), columns.of("motor_voltage")
+    if supply_V is not None:
+        duty = np.where(_given(duty), duty, voltage / supply_V[:, None])
+    return duty
+
+
+def _position_step(part: _Even, log_map: JointMap, turns: Array) -> Array:
+    """Resolution of the positions [rad or m], shape (J,): noise of rounding adds up through coupled drives."""
+    joints = log_map.joints
+    at_joint, at_motor = np.zeros(len(joints)), np.zeros(len(joints))
+    for k, ((name, joint), channel) in enumerate(log_map.channels.items()):
+        if name in POSITIONS:
+            step = abs(channel.scale) if channel.counted else _step_of(part.raw[:, k])
+            (at_joint if name == "q" else at_motor)[joints.index(joint)] = step
+    from_motors = np.sqrt(np.linalg.inv(turns) ** 2 @ at_motor**2)
+    own = np.array([("q", joint) in log_map.channels for joint in joints])
+    return np.where(own, at_joint, from_motors)
+
+
+def _step_of(values: Array) -> float:
+    """Step by which a reading repeats, 0 where none shows."""
+    starts = np.linspace(0, max(len(values) - _STEP_ROWS, 0), _STEP_BLOCKS).astype(int)
+    found = [rounding_step(values[first : first + _STEP_ROWS]) for first in dict.fromkeys(starts.tolist())]
+    told = [step for step in found if step > 0]
+    return float(np.median(told)) if told else 0.0

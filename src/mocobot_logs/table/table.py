@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
-from mocobot_logs.faults import shown
+from mocobot_logs.formats import shown
 from mocobot_logs.log import REF, Level, Samples, Stamps
-from mocobot_logs.map.log_map import ChannelMap, LogMap
+from mocobot_logs.maps import ChannelMap, LogMap
 
 SHOWN_COLUMNS = 12
 """So many columns are listed in a message."""
@@ -95,11 +95,7 @@ class TableSource:
     """A table as a ``LogSource``."""
 
     def __init__(self, table: Table, log_map: LogMap) -> None:
-        """Find every channel of every robot.
-
-        Raises:
-            InputError: the map does not suit the table.
-        """
+        """Find every channel of every robot."""
         log_map.require("column", "tables")
         self._table, self._map = table, log_map
         self.name, self.size, self.metadata = table.name, table.size, table.metadata

@@ -9,16 +9,19 @@ from scipy.interpolate import CubicSpline
 import bags
 from bags import EPOCH_NS, raw_mcap, said
 from estimator.errors import InputError
-from mocobot_logs.bag.align import MAX_GAP_NS, Part, RowAligner
-from mocobot_logs.bag.read import open_bag
+from mocobot_logs.bag.read import MAX_GAP_NS, RowAligner, open_bag
 from mocobot_logs.log import CHANNELS, REF, Samples, collect
-from mocobot_logs.map.parse import parse_map
+from mocobot_logs.maps import parse_map
 
 
 def part(stamps, values, columns):
     stamps = np.asarray(stamps, np.int64)
     values = np.asarray(values, float).reshape(len(stamps), len(columns))
-    return Part(stamps, stamps + 5, np.array(columns), values)
+    return Samples(stamps, values, stamps + 5)
+
+
+def aligner_of(periods, *columns):
+    return RowAligner("bag: robot 2", ("/a", "/b"), periods, [np.array(each) for each in columns])
 
 
 def all_of(joiner, blocks):
@@ -51,7 +54,7 @@ def test_equal_stamps_are_taken_bit_by_bit(data):
                 block[t] = part(stamps[mine], values[mine][:, columns], columns)
         if block:
             blocks.append(block)
-    rows = all_of(RowAligner("r", ("a", "b"), (1e7, 1e7), 3), blocks)
+    rows = all_of(aligner_of((1e7, 1e7), [0, 2], [1]), blocks)
     # What lacks for more than 60 ms has no row; all else is there.
     alone = np.isin(stamps, rows.stamp_ns)
     assert alone[kept].all()
@@ -68,7 +71,7 @@ def test_what_is_not_a_number_does_not_spread():
     values = np.zeros((100, 1))
     values[50] = np.nan
     rows = all_of(
-        RowAligner("r", ("a", "b"), (1e7, 1e7), 2),
+        aligner_of((1e7, 1e7), [0], [1]),
         [{0: part(stamps, values, [0]), 1: part(stamps, values, [1])}],
     )
     assert np.flatnonzero(np.isnan(rows.values).any(axis=1)).tolist() == [50]
@@ -106,7 +109,7 @@ def test_interpolation_is_as_good_as_stated(hz, bound):
     """A slow topic at the stamps of a fast one, worst error against the sine itself."""
     fast, slow = uniform(1000, 12), uniform(100, 12, 0.0037)
     streams = [(slow, wave(slow, hz, 2), [0, 1]), (fast, wave(fast, hz, 1), [2])]
-    rows = all_of(RowAligner("r", ("a", "b"), (1e7, 1e6), 3), blocks_of(streams))
+    rows = all_of(aligner_of((1e7, 1e6), [0, 1], [2]), blocks_of(streams))
     # The fast topic sets the rows, from the slow one's first sample to its last.
     inside = fast[(fast >= slow[0]) & (fast <= slow[-1])]
     np.testing.assert_array_equal(rows.stamp_ns, inside)
@@ -123,7 +126,7 @@ def test_interpolation_against_a_spline_with_jitter():
     rng = np.random.default_rng(1)
     fast, slow = uniform(500, 5), uniform(100, 5, 0.001) + rng.integers(-2_000_000, 2_000_000, 500)
     streams = [(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 2), [1, 2])]
-    rows = all_of(RowAligner("r", ("a", "b"), (2e6, 1e7), 3), blocks_of(streams, 37))
+    rows = all_of(aligner_of((2e6, 1e7), [0], [1, 2]), blocks_of(streams, 37))
     spline = CubicSpline((slow - EPOCH_NS) * 1e-9, wave(slow, 1.0, 2))
     middle = slice(20, -20)
     np.testing.assert_allclose(
@@ -137,7 +140,7 @@ def test_there_are_no_rows_where_a_topic_has_a_gap():
     short = np.isin(np.arange(400), [250, 251])
     kept = slow[~gap & ~short]
     streams = [(fast, wave(fast, 1.0, 1), [0]), (kept, wave(kept, 1.0, 1), [1])]
-    rows = all_of(RowAligner("r", ("a", "b"), (1e6, 1e7), 2), blocks_of(streams))
+    rows = all_of(aligner_of((1e6, 1e7), [0], [1]), blocks_of(streams))
     steps = np.diff(rows.stamp_ns)
     assert np.sum(steps > 1_000_000) == 1
     assert 100_000_000 < steps.max() < 115_000_000
@@ -149,13 +152,13 @@ def test_a_topic_that_falls_silent_holds_nothing_up():
     """Rows end where a topic ends, and what waits for it stays bounded."""
     fast = uniform(1000, 200)
     slow = uniform(100, 20)
-    aligner = RowAligner("r", ("a", "b"), (1e6, 1e7), 2)
+    aligner = aligner_of((1e6, 1e7), [0], [1])
     count = held = 0
     for block in blocks_of([(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 1), [1])], 1000):
         if (samples := aligner.push(block)) is not None:
             count += len(samples.stamp_ns)
             assert not np.isnan(samples.values).any()
-        held = max(held, *map(len, aligner._topics))
+        held = max(held, *(len(topic.stamp_ns) for topic in aligner._topics))
     assert aligner.finish() is None
     assert count == np.sum(fast <= slow[-1])
     assert held < 70_000
@@ -164,7 +167,7 @@ def test_a_topic_that_falls_silent_holds_nothing_up():
 def test_repeated_stamps_of_a_slow_topic():
     fast, slow = uniform(1000, 2), np.repeat(uniform(100, 2), 2)
     streams = [(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 1), [1])]
-    rows = all_of(RowAligner("r", ("a", "b"), (1e6, 1e7), 2), blocks_of(streams))
+    rows = all_of(aligner_of((1e6, 1e7), [0], [1]), blocks_of(streams))
     assert np.abs(rows.values[20:-20, 1] - wave(rows.stamp_ns, 1.0, 1)[20:-20, 0]).max() < 1e-6
 
 
@@ -174,14 +177,14 @@ def test_crowded_samples_do_not_swing():
     slow = np.sort(np.concatenate([uniform(100, 2), uniform(100, 2)[50:60] + 1000]))
     noise = np.random.default_rng(2).normal(scale=0.01, size=(len(slow), 1))
     streams = [(fast, np.zeros((len(fast), 1)), [0]), (slow, noise, [1])]
-    rows = all_of(RowAligner("r", ("a", "b"), (1e6, 1e7), 2), blocks_of(streams))
+    rows = all_of(aligner_of((1e6, 1e7), [0], [1]), blocks_of(streams))
     assert np.abs(rows.values[:, 1]).max() < 1.3 * np.abs(noise).max()
 
 
 def test_stamps_that_run_back_cannot_be_aligned():
     slow = uniform(100, 2)
     slow[70] -= 35_000_000
-    aligner = RowAligner("bag: robot 2", ("/a", "/b"), (1e6, 1e7), 2)
+    aligner = aligner_of((1e6, 1e7), [0], [1])
     aligner.push({1: part(slow[:70], np.zeros(70), [1])})
     with pytest.raises(
         InputError, match=r"bag: robot 2: the stamps of topic /b run back by 0.025 s; topics can be"

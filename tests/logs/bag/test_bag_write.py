@@ -24,8 +24,8 @@ from estimator.recording.model import Recording
 from mocobot_logs.bag.read import METADATA_TOPIC, open_bag
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import CHANNELS, REF, collect
-from mocobot_logs.map.files import builtin_map
-from mocobot_logs.resample.log import resample
+from mocobot_logs.maps import builtin_map
+from mocobot_logs.resample import resample
 from omnid_design import DESIGN
 from recordings import metadata, small_recording
 

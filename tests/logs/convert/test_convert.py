@@ -17,7 +17,7 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_lerobot, write_text
 from mocobot.cli import main
-from mocobot_logs.table.write import write_csv, write_npz
+from mocobot_logs.convert import write_csv, write_npz
 from omnid_design import DESIGN
 from recorded_team import Sines, carry
 from recordings import metadata, small_recording

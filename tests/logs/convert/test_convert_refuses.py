@@ -17,7 +17,7 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from log_files import write_lerobot, write_text
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.map.files import builtin_map_text
+from mocobot_logs.maps import builtin_map_text
 from recordings import small_recording
 
 Columns = dict[str, np.ndarray]

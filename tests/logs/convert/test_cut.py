@@ -18,7 +18,7 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_text
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.cut.choice import LATEST_NS, Drop, Span, parse_choice
+from mocobot_logs.cut import LATEST_NS, Drop, Span, parse_choice
 from recordings import small_recording
 
 ROWS = 4000

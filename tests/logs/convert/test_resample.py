@@ -1,21 +1,26 @@
-"""Resampling against closed forms, and against the same done on the whole signal at once."""
+"""Resampling: against signals that are known, whatever pieces come; gaps, uneven stamps, and what is refused."""
 
 from __future__ import annotations
 
 import tracemalloc
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
 from scipy.interpolate import make_interp_spline
 from scipy.signal import firwin
 
+import mocobot
 from array_log import ArrayLog, stream, tones
+from estimator.errors import InputError
+from mocobot.options import Convert
 from mocobot_logs.log import Samples
-from mocobot_logs.resample.filter import low_pass_taps
-from mocobot_logs.resample.log import Resampled, resample
+from mocobot_logs.resample import MAX_GAP_S, Resampled, resample
+from mocobot_logs.resample_filter import Grid, Interpolator, Merger, fill_gaps, low_pass_taps
 
 EPOCH_NS = 1_700_000_000_123_456_789
 BAND_HZ = (0.7, 3.0, 5.0, 19.0)
@@ -306,3 +311,333 @@ def test_low_pass_is_what_it_says(k):
     np.testing.assert_array_equal(taps, taps[::-1])
     assert np.abs(gain[frequency <= 0.2] - 1.0).max() < 5e-6
     assert np.abs(gain[frequency >= 0.5]).max() < 10 ** (-108 / 20)
+
+
+EVERY_M = [1, 2, 3, 5, 12, 49]
+
+
+def with_gap(missing: int, around: int = 120, jitter: float = 0.0, seed: int = 0):
+    """Times of samples one unit apart with one gap in the middle; the gap's length per interval."""
+    rng = np.random.default_rng(seed)
+    time = np.r_[np.arange(around), np.arange(around, 2 * around) + missing].astype(float)
+    time += jitter * rng.uniform(-1, 1, len(time))
+    holes = np.zeros(len(time) - 1, np.int64)
+    holes[around - 1] = missing
+    return time, holes
+
+
+def filled_part(time, values, holes, missing):
+    at, out = fill_gaps(time, values, holes)
+    assert np.all(np.diff(at) > 0)
+    inside = ~np.isin(at, time)
+    assert inside.sum() == missing
+    np.testing.assert_array_equal(out[~inside], values)
+    return at[inside], out[inside]
+
+
+@pytest.mark.parametrize("missing", EVERY_M)
+def test_polynomials_of_degree_seven_are_met(missing):
+    time, holes = with_gap(missing, jitter=0.2)
+    curves = [Polynomial(np.random.default_rng(k).normal(size=8), domain=[0, time[-1]]) for k in range(3)]
+    at, out = filled_part(time, np.stack([c(time) for c in curves], axis=1), holes, missing)
+    np.testing.assert_allclose(out, np.stack([c(at) for c in curves], axis=1), rtol=0, atol=1e-9)
+    edges = time[119:121]
+    np.testing.assert_allclose(at, np.linspace(*edges, missing + 2)[1:-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("missing", "hertz", "most"), [(1, 1.0, 5e-12), (5, 1.0, 1e-8), (1, 5.0, 1.5e-6), (5, 5.0, 3.5e-3)]
+)
+def test_sines_at_100_hz(missing, hertz, most):
+    time, holes = with_gap(missing)
+    wave = np.exp(2j * np.pi * hertz / 100 * time)
+    at, out = filled_part(time, np.stack([wave.real, wave.imag], axis=1), holes, missing)
+    error = np.abs(out @ [1, 1j] - np.exp(2j * np.pi * hertz / 100 * at))
+    assert 0.1 * most < error.max() < most
+
+
+@pytest.mark.parametrize("missing", EVERY_M)
+def test_noise_does_not_grow_with_the_gap(missing):
+    """Unit impulses at every sample give the weights, whose root sum of squares is the gain of white noise."""
+    time, holes = with_gap(missing)
+    weights = filled_part(time, np.eye(len(time)), holes, missing)[1]
+    gain = np.sqrt(np.sum(weights**2, axis=1)).max()
+    assert 0.5 < gain < 1.9
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-9)
+
+
+def test_gaps_at_the_ends_and_of_many_lengths_at_once():
+    rng = np.random.default_rng(1)
+    full = np.arange(400.0)
+    gone = np.r_[1, 5:7, 100:103, 110, 200:206, 397:399]
+    time = np.delete(full, gone)
+    signal = np.sin(0.06 * full[:, None] + rng.uniform(0, 6, 4))
+    at, out = fill_gaps(time, np.delete(signal, gone, axis=0), np.diff(time).astype(np.int64) - 1)
+    np.testing.assert_allclose(at, full, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(out, signal, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("cuts", [[], [3], [2, 3, 4, 5, 6, 7], [6]])
+def test_crowding_rows_become_their_mean(cuts):
+    time = np.array([0, 100, 190, 210, 225, 300, 400, 401], np.int64)
+    values = np.arange(16.0).reshape(8, 2) ** 2
+    merger = Merger(period_ns=100.0)
+    parts = [merger.push(t, v) for t, v in zip(np.split(time, cuts), np.split(values, cuts), strict=True)]
+    at, out = (np.concatenate(x) for x in zip(*parts, merger.finish(), strict=True))
+    np.testing.assert_array_equal(at, [0, 100, 208, 300, 400])  # whole nanoseconds, rounded down
+    expected = [values[0], values[1], values[2:5].mean(axis=0), values[5], values[6:].mean(axis=0)]
+    np.testing.assert_allclose(out, expected, rtol=1e-15)
+    assert merger.merged == 3
+
+
+def test_four_in_a_row_lost_at_50_hz_are_filled_within_the_sensors_noise():
+    """Coarse encoders (12 bits) err by 0.44 mrad, good ones (17 bits) by 14 urad; torques by 3 mN m and more."""
+    trial = mocobot.simulate(payload="c", vias=12, preset="ideal", seed=5)
+    time, robot = trial.time[::2], 1
+    values = np.concatenate([trial.phi[::2, robot], trial.theta[::2, robot], trial.tau[::2, robot]], axis=1)
+    first = np.arange(60, len(time) - 60, 90)
+    gone = (first[:, None] + np.arange(4)).ravel()
+    log = ArrayLog([stream(np.delete(time, gone), np.delete(values, gone, axis=0))])
+    found = resample(log, rate_hz=50.0)
+    assert found.reports[0].filled == len(gone) > 8
+    error = (found.values[0] - values)[gone]
+    assert np.sqrt(np.mean(error[:, :6] ** 2)) < 14e-6
+    assert np.sqrt(np.mean(error[:, 6:] ** 2)) < 10e-3
+    assert np.abs(error).max() > 0.0
+
+
+def test_the_command_has_the_same_limit():
+    assert Convert.__dataclass_fields__["max_gap"].default == MAX_GAP_S
+
+
+RATE_HZ = 1000.0
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(11)
+
+
+def poisson(rng, duration_s: float = 20.0) -> np.ndarray:
+    """Times in order that know nothing of each other, RATE_HZ of them a second, none less than 20 us apart."""
+    time = np.sort(rng.uniform(0.0, duration_s, round(RATE_HZ * duration_s)))
+    return time[np.concatenate([[True], np.diff(time) > 2e-5])]
+
+
+def test_values_are_those_of_the_polynomial_nearest_to_the_nearest_rows(rng):
+    time, spacing = poisson(rng), 0.8e-3
+    time -= time[0]
+    values = rng.standard_normal((len(time), 2))
+    interpolator = Interpolator(Grid(spacing * 1e9, 1e9 / RATE_HZ, fitted_rows=12), 0.05)
+    stamps = np.rint(time * 1e9).astype(np.int64)
+    blocks = [
+        b
+        for part in np.array_split(np.arange(len(time)), 7)
+        for b in interpolator.push(stamps[part], values[part])
+    ]
+    found = np.concatenate([*blocks, interpolator.finish()])
+    for k in rng.integers(50, len(found) - 50, 40):
+        first = np.searchsorted(stamps * 1e-9, k * spacing) - 6
+        near = slice(first, first + 12)
+        expected = [Polynomial.fit(time[near], y, 5)(k * spacing) for y in values[near].T]
+        np.testing.assert_allclose(found[k], expected, rtol=1e-5, atol=1e-5)
+
+
+def test_tones_of_the_payload_pass(rng):
+    time = poisson(rng)
+    result = resample(ArrayLog([stream(time, tones(time, (0.7, 3.0, 5.0)))]))
+    report = result.reports[0]
+    assert (report.method, report.filled, report.gaps, report.merged) == ("fitted", 0, 0, 0)
+    assert report.native_hz == pytest.approx(RATE_HZ, rel=0.03)
+    at = result.start_s[0] + time[0] + np.arange(len(result.values[0])) / 100.0
+    np.testing.assert_allclose(result.values[0], tones(at, (0.7, 3.0, 5.0)), rtol=0, atol=2e-5)
+
+
+def test_noise_is_averaged_nearly_as_over_even_samples(rng):
+    """A quarter more at instants that know nothing of each other; polynomials through 12 leave twice as much."""
+    time = poisson(rng, 60.0)
+    noise = rng.standard_normal((len(time), 9))
+    low = resample(ArrayLog([stream(time, noise)])).values[0]
+    below_5_hz = np.abs(np.fft.rfft(low, axis=0)[1:300]) ** 2
+    spectrum = np.mean(below_5_hz) / len(low) / 100.0
+    assert 0.9 < spectrum * RATE_HZ < 1.35
+
+
+def test_a_hole_is_still_refused(rng):
+    time = poisson(rng)
+    time = time[(time < 9.0) | (time > 9.2)]
+    with pytest.raises(InputError, match=r"robot 1: no samples for 0\.2"):
+        resample(ArrayLog([stream(time, tones(time, (1.0,)))]))
+
+
+TIME = np.arange(3000) / 100.0
+VALUES = tones(TIME, [1.0])
+GOOD = stream(TIME, VALUES)
+
+
+def refusal(*streams: Samples, rows: int = 700, **options) -> str:
+    with pytest.raises(InputError) as error:
+        resample(ArrayLog(streams, rows), **options)
+    message = str(error.value)
+    assert message.startswith("made.log: ")
+    assert "\n" not in message
+    return message
+
+
+def changed(row: int, column: int, value: float) -> Samples:
+    values = VALUES.copy()
+    values[row, column] = value
+    return stream(TIME, values)
+
+
+def retimed(row: int, time_s: float) -> Samples:
+    time = TIME.copy()
+    time[row] = time_s
+    return stream(time, VALUES)
+
+
+def at_rate(rate_hz: float, count: int) -> Samples:
+    time = np.arange(count) / rate_hz
+    return stream(time, tones(time, [1.0]))
+
+
+def without(rows: Sequence[int]) -> Samples:
+    return stream(np.delete(TIME, rows), np.delete(VALUES, rows, axis=0))
+
+
+def infinite(row: int, *, back: bool = False, blank: Sequence[int] = ()) -> Samples:
+    bad = changed(row, 5, np.inf)
+    bad.values[list(blank), 2] = np.nan
+    bad.stamp_ns[1999] -= 10**9 * back
+    return bad
+
+
+def slower_first() -> Samples:
+    """100 Hz first, then 1 kHz: its own filter would not hold for the second part."""
+    slow = np.arange(2000) / 100.0 + 1e-4 * (np.arange(2000) % 7)
+    time = np.concatenate([slow, 20 + np.arange(20000) / 1000.0])
+    return stream(time, tones(time, [1.0]))
+
+
+def crowding() -> Samples:
+    time = np.repeat(np.arange(8) / 100.0, 2)
+    time[1::2] += 1e-6
+    return stream(time, VALUES[:16])
+
+
+def at_the_ends_of_the_range() -> Samples:
+    """Differences of such stamps overflow."""
+    ends = GOOD.stamp_ns[:100] + np.iinfo(np.int64).min, GOOD.stamp_ns[:100] + 2**62
+    return Samples(np.concatenate(ends), VALUES[:200])
+
+
+UNIT = "25 to 20000 Hz are allowed (is the unit of time right?)"
+THIRD = np.sort(np.random.default_rng(1).permutation(3000)[2100:])
+ROW = "row 1234, 12.34 s after its first sample"
+FAULTS: dict[str, tuple[Samples, dict[str, float], list[str]]] = {
+    "infinite": (changed(1234, 5, np.inf), {}, [f"robot 2: theta_x is inf in {ROW}; every value must be a finite"]),
+    "minus infinite": (changed(1234, 5, -np.inf), {}, [f"robot 2: theta_x is -inf in {ROW}"]),
+    "huge": (changed(1234, 5, 1e300), {}, [f"robot 2: theta_x is 1e+300 in {ROW}"]),
+    "rows that lack a value count": (infinite(1234, blank=(3, 800, 801, 1235)), {}, [f"theta_x is inf in {ROW}"]),
+    "nothing but such rows": (
+        stream(TIME, np.where(np.arange(9) == 4, np.nan, VALUES)), {},
+        ["robot 2 has 0 samples (3000 rows lack a value); at least 16"],
+    ),
+    "time before value": (infinite(2000, back=True), {}, ["runs back by 0.99 s in row 1999"]),
+    "value before time": (infinite(1500, back=True), {}, ["row 1500"]),
+    "time runs back": (
+        retimed(1000, TIME[1000] - 0.5), {},
+        ["robot 2: time runs back by 0.49 s in row 1000, 9.5 s after its first sample; stamps must increase"],
+    ),
+    "time runs back where the rate is known": (retimed(1024, TIME[1024] - 0.5), {}, ["by 0.49 s in row 1024, 9.74 s"]),
+    "one time with two values": (
+        retimed(1000, TIME[999]), {},
+        [f"phi1 is {VALUES[999, 0]:.9g} and {VALUES[1000, 0]:.9g} at one time, in row 1000, 9.99 s after"],
+    ),
+    "one time with two values, later": (retimed(1024, TIME[1023]), {}, ["at one time, in row 1024, 10.23 s after"]),
+    "a gap": (
+        without(range(500, 509)), {},
+        ["robot 2: no samples for 0.1 s, from 4.99 s after its first sample on",
+         "0.01 s apart, and at most 0.08 s more may pass"],
+    ),
+    "a third missing": (without(THIRD), {"max_gap_s": 1.0}, ["samples are missing (30", "at most 10 % may be"]),
+    "a rate that changes": (slower_first(), {"max_gap_s": 100.0}, ["within a quarter of the usual"]),
+    "slow": (at_rate(20.0, 2000), {}, ["25 to 20000 Hz are needed, so this log allows a rate of at most 80 Hz"]),
+    "too slow": (at_rate(0.1, 2000), {}, [f"at 0.1 Hz; {UNIT}"]),
+    "too fast": (at_rate(1e5, 2000), {}, [f"at 100000 Hz; {UNIT}"]),
+    **{
+        f"{n} samples": (stream(TIME[:n], VALUES[:n]), {}, [f"robot 2 has {n} samples; at least 16"])
+        for n in (0, 1, 2, 15)
+    },
+    "repeats": (stream(np.append(TIME[:15], TIME[14]), VALUES[[*range(15), 14]]), {}, ["has 15 samples"]),
+    "too short for the filter": (at_rate(1000.0, 300), {}, ["leaves 6 at 100 Hz; at least 16"]),
+    "another epoch": (
+        stream(TIME, VALUES, start_ns=10**18), {},
+        ["robot 1 has 0.000 to 29.990 s and robot 2 has 1000000000.000 to 1000000029.990 s, no time in common; "
+         "all stamps must come from one clock"],
+    ),
+    "stamps of all ages": (at_the_ends_of_the_range(), {}, ["leaps by 1.38350581e+10 s in row 100"]),
+    "crowding": (crowding(), {}, ["20000 Hz are allowed"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("rows", [1, 700, 1024])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_cannot_be_resampled(fault: str, rows: int) -> None:
+    """Whatever the chunks, it is named with its row."""
+    bad, options, words = FAULTS[fault]
+    message = refusal(GOOD, bad, rows=rows, **options)
+    for word in words:
+        assert word in message
+
+
+def test_a_longer_gap_may_be_allowed() -> None:
+    assert resample(ArrayLog([without(range(500, 509))]), max_gap_s=0.09).reports[0].filled == 9
+
+
+def test_uneven_stamps_are_no_loss():
+    """125 Hz, a third of the period of jitter: one interval in nine is long, and as many are short."""
+    time = np.sort(np.arange(6000) / 125.0 + 2.4e-3 * np.random.default_rng(2).standard_normal(6000))
+    uneven = stream(time - time[0], tones(time, [1.0]))
+    report = resample(ArrayLog([uneven]), 100.0).reports[0]
+    assert report.filled > 660  # by intervals, more than a tenth
+
+
+def test_the_recorders_time_is_suggested_where_it_helps():
+    log_ns = GOOD.stamp_ns + 5
+    one = Samples(GOOD.stamp_ns, VALUES, log_ns)
+    for moved, is_hinted in ((0, True), (10**12, False)):
+        far = Samples(GOOD.stamp_ns + 10**12, VALUES, log_ns + moved)
+        assert ('clock = "log"' in refusal(one, far)) == is_hinted
+    assert "log" not in refusal(GOOD, stream(TIME, VALUES, start_ns=10**18)).removeprefix("made.log")
+
+
+STEPS_NS = st.sampled_from(
+    [10**7] * 12 + [10**7 + 300_000, 10**7 - 700_000, 2 * 10**7, 10**6, 1, 0, -1, 6 * 10**7, 10**12, 2**61]
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    steps=st.lists(st.lists(STEPS_NS, min_size=0, max_size=60), min_size=1, max_size=3),
+    spoil=st.sampled_from([0.0, 0.0, 0.0, np.nan, 1e99]),
+    repeat=st.booleans(),
+    rows=st.integers(1, 70),
+)
+def test_whatever_comes_ends_in_numbers_or_one_sentence(steps, spoil, repeat, rows):
+    streams = []
+    for robot in steps:
+        stamp = np.cumsum(np.array([0, *robot], np.int64))  # may wrap around
+        values = np.outer(np.ones(9) if repeat else np.arange(9.0), np.ones(len(stamp))).T
+        values[len(stamp) // 2, 3] += spoil
+        streams.append(Samples(stamp, values))
+    message, result = "", None
+    try:
+        result = resample(ArrayLog(streams, rows))
+    except InputError as error:
+        message = str(error)
+    if result is None:
+        assert message.startswith("made.log: ")
+        assert len(message) < 400
+    else:
+        assert all(np.isfinite(values).all() and len(values) >= 16 for values in result.values)

@@ -21,10 +21,9 @@ from estimator.errors import InputError
 from fuzzing.originals import FORMATS, write_original
 from fuzzing.trial import check_original, try_damaged
 from mocobot_logs.log import CHANNELS, REF, collect
-from mocobot_logs.map.parse import parse_map
-from mocobot_logs.map.units import TIME_UNITS
+from mocobot_logs.maps import TIME_UNITS, parse_map
 from mocobot_logs.open_log import open_log
-from mocobot_logs.table.stamps import from_numbers, from_text
+from mocobot_logs.table.text import from_numbers, from_text
 
 BOUNDED = settings(max_examples=150, deadline=None, derandomize=True, database=None)
 

@@ -1,4 +1,4 @@
-"""Maps of measured logs: units against their definitions, and every slip named with what is allowed."""
+"""Maps of measured logs: units against their definitions, robots by name, and every slip named with what is allowed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from estimator.errors import InputError
+from log_files import assert_same, read_log, write_text
+from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import CHANNELS, REF
-from mocobot_logs.map import parse as map_parse
-from mocobot_logs.map.files import MAPS, builtin_map, builtin_map_text, read_map
-from mocobot_logs.map.parse import parse_map
-from mocobot_logs.map.units import units_of
+from mocobot_logs.maps import KEYS, MAPS, builtin_map, builtin_map_text, parse_map, read_map, units_of
+from recordings import small_recording
 
 ROOT = Path(__file__).resolve().parents[3]
 UNITS = {"phi": "rad", "theta": "rad", "tau": "Nm", "h": "m", "force": "N", "ref": "m"}
@@ -200,17 +200,17 @@ SLIPS: list[tuple[dict[str, Any], list[str]]] = [
     (with_channel(unit=...), ["channels.phi1: missing key 'unit'", "rad, deg, counts"]),
     (
         with_channel(unit="grad"),
-        ["channels.phi1: unit is 'grad'", "angles are logged in rad, deg, counts"],
+        ["channels.phi1: unit is 'grad'", "angles come in rad, deg, counts"],
     ),
     (with_channel(unit=1), ["channels.phi1: unit is 1", "rad"]),
     (
         with_channel("tau1", unit="counts", counts_per_turn=10),
-        ["unit is 'counts'", "torques are logged in Nm"],
+        ["unit is 'counts'", "torques come in Nm"],
     ),
     (with_channel("tau1", unit="N"), ["unit is 'N'", "Nm, mNm"]),
     (with_channel(unit="counts"), ["channels.phi1: missing key 'counts_per_turn'"]),
-    (with_channel(counts_per_turn=100), ["counts_per_turn goes with unit 'counts' only"]),
-    (with_channel(unit="counts", counts_per_turn=0), ["counts_per_turn is 0"]),
+    (with_channel(counts_per_turn=100), ["counts_per_turn does not go with angles in 'rad'; leave it out"]),
+    (with_channel(unit="counts", counts_per_turn=0.5), ["counts_per_turn is 0.5", "at least 1"]),
     (with_channel(unit="counts", counts_per_turn=math.nan), ["counts_per_turn is nan"]),
     (with_channel(sign=0), ["channels.phi1: sign is 0", "1 or -1"]),
     (with_channel(sign=1.0), ["sign is 1.0"]),
@@ -313,7 +313,7 @@ def test_documented_maps_are_allowed(block: str) -> None:
 def test_the_docs_name_every_key_unit_and_map() -> None:
     text = (ROOT / "docs" / "measured-data.md").read_text()
     for word in [
-        *map_parse.KEYS,
+        *KEYS,
         *MAPS,
         *(u for name in CHANNELS["joint"] for u in units_of(name) if " " not in u),
     ]:
@@ -324,3 +324,92 @@ def test_a_map_may_start_from_a_builtin_one(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(builtin_map_text("omnid-ros2").replace('unit = "N"', 'unit = "mN"'))
     assert read_map(path).channels(1)["force_x"].scale == 1e-3
+
+
+RECORDING = small_recording(rows=60, ref=False)
+NAMED = builtin_map_text("mocobot").replace("omnid{robot}.", "{name}/")
+
+
+def values(head: str = 'names = ["alice", "bob", "carol"]', text: str = NAMED) -> dict[str, Any]:
+    return tomllib.loads(f"{head}\n{text}")
+
+
+def complaint_of_map_names(given: dict[str, Any]) -> str:
+    with pytest.raises(InputError) as caught:
+        parse_map(given, "my.toml")
+    return str(caught.value)
+
+
+def named(order: tuple[str, ...] = ("alice", "bob", "carol")) -> dict[str, np.ndarray]:
+    return {
+        key if key == "time" else f"{order[int(key[5]) - 1]}/{key[7:]}": value
+        for key, value in RECORDING.columns().items()
+    }
+
+
+def test_columns_by_name(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "log.csv", named())
+    assert_same(read_log(path, parse_map(values(), "m")), RECORDING)
+    two = read_log(path, parse_map(values('names = ["carol", "alice"]'), "m"))
+    assert two.robots == 2
+    np.testing.assert_array_equal(two.streams[0].values[:, :3], RECORDING.phi[:, 2])
+
+
+def test_overrides_and_time_by_name(tmp_path: Path) -> None:
+    """Robot 2 turns theta_z the other way, by name or by number; every robot has a clock of its own."""
+    columns = named()
+    time = columns.pop("time")
+    columns |= {f"{name}/t": time + k for k, name in enumerate(("alice", "bob", "carol"))}
+    text = NAMED.replace('[time]\nunit = "s"', '[time]\ncolumn = "{name}/t"\nunit = "s"')
+    for key in ("bob", "2"):
+        log_map = parse_map(values(text=f"{text}\n[robot.{key}.channels.theta_z]\nsign = -1\n"), "m")
+        log = read_log(write_text(tmp_path / "log.csv", columns), log_map)
+        np.testing.assert_array_equal(log.streams[1].values[:, 3], -RECORDING.theta[:, 1, 0])
+        np.testing.assert_array_equal(log.streams[0].values[:, 3], RECORDING.theta[:, 0, 0])
+        assert [s.stamp_ns[0] for s in log.streams] == [0, 10**9, 2 * 10**9]
+
+
+def test_topics_by_name(tmp_path: Path) -> None:
+    write_bag(RECORDING, tmp_path / "log.mcap")
+    text = builtin_map_text("mocobot-ros2").replace("omnid{robot}", "{name}")
+    log = read_log(
+        tmp_path / "log.mcap", parse_map(values('names = ["omnid3", "omnid1", "omnid2"]', text), "m")
+    )
+    np.testing.assert_array_equal(log.streams[0].values[:, :3], RECORDING.phi[:, 2])
+    np.testing.assert_array_equal(log.streams[1].values[:, :3], RECORDING.phi[:, 0])
+
+
+def test_a_name_that_the_log_lacks(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "log.csv", named())
+    with pytest.raises(InputError, match=r"missing column 'dave/phi1' for phi1 of robot 3"):
+        read_log(path, parse_map(values('names = ["alice", "bob", "dave"]'), "m"))
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        ("", "missing key 'names', which goes with the placeholder '{name}'"),
+        ("robots = 2\nnames = ['a', 'b', 'c']", "robots is 2, but names has 3"),
+        ("names = []", "it must be a list of distinct names"),
+        ("names = ['a', 'a']", "it must be a list of distinct names"),
+        ("names = ['a', '']", "it must be a list of distinct names"),
+        ("names = ['a', 3]", "it must be a list of distinct names"),
+        ("names = 'alice'", "it must be a list of distinct names"),
+    ],
+)
+def test_slips(head: str, words: str) -> None:
+    assert words in complaint_of_map_names(values(head))
+
+
+def test_slips_of_tables() -> None:
+    without = builtin_map_text("mocobot")
+    assert "names is given, but neither a channel nor time holds" in complaint_of_map_names(
+        values(text=without)
+    )
+    override = f"{NAMED}\n[robot.dave.channels.theta_z]\nsign = -1\n"
+    assert (
+        "robot.dave: there is no such robot; robots are counted from 1 to 3, or called alice, bob, carol"
+        in complaint_of_map_names(values(text=override))
+    )
+    twice = f"{NAMED}\n[robot.bob.channels.theta_z]\nsign = -1\n[robot.2.channels.theta_x]\nsign = -1\n"
+    assert "robot 2 has a table already" in complaint_of_map_names(values(text=twice))

@@ -1,1 +1,0 @@
-"""Files of a bag: MCAP and SQLite, compressed or not, hostile or not."""

@@ -1,1 +1,0 @@
-"""Parts of a log: crop, drop, split at gaps."""

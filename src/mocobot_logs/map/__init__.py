@@ -1,1 +1,0 @@
-"""Maps: which column is what."""

@@ -1,1 +1,0 @@
-"""Onto one even grid."""

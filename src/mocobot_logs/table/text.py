@@ -1,0 +1,478 @@
+"""Text tables: a header line, then one row per sample, cells of numbers; time may be dates of ISO 8601.
+
+Time becomes whole nanoseconds: exactly from whole numbers and dates, rounded from floats and decimal text. Every
+refusal is an ``InputError`` that names the file, the column and the row or line.
+"""
+
+import contextlib
+import csv
+import re
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv as pcsv
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_logs.formats import detail_of, readable
+from mocobot_logs.log import Stamps
+from mocobot_logs.maps import CsvMap
+from mocobot_logs.table.table import Block, Table, Wanted
+
+LARGEST_NS = (1 << 63) - 1
+_DIGITS = {10**exponent: exponent for exponent in range(10)}
+_BELOW_NS = 6
+"""Decimals below the nanosecond that are looked at, to round: programs write 32439.999999999996 ms for 32.44 s."""
+
+Given = NDArray[np.bool_]
+
+
+def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
+    """Stamps from whole numbers or floats, NaN where there is none.
+
+    Args:
+        values: times in any unit, shape (q,).
+        unit_ns: nanoseconds in one unit; None where the map's unit is "iso".
+        where, row: file and column, and row of the first one, for messages.
+
+    Returns:
+        Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
+    """
+    unit_ns = _unit(unit_ns, where)
+    if values.dtype.kind in "iu":
+        limit = LARGEST_NS // unit_ns
+        beyond = (values > limit) | (values < -limit)
+        _refuse(values, beyond, where, row)
+        return values.astype(np.int64) * unit_ns, np.ones(len(values), bool)
+    given = ~np.isnan(values)
+    with np.errstate(over="ignore"):
+        scaled = np.where(given, values, 0.0).astype(np.float64) * unit_ns
+    # One below 2**63: the next float down from it is whole and fits.
+    _refuse(values, np.abs(scaled) >= float(LARGEST_NS), where, row)
+    return np.rint(scaled).astype(np.int64), given
+
+
+def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
+    """As ``from_numbers``, of decimal text, null where there is none: exact, where floats resolve 0.24 us only."""
+    digits = _DIGITS[_unit(unit_ns, where)]
+    exact = pa.decimal128(38, digits)
+    try:
+        cut = pc.cast(values, exact, safe=False)
+    except pa.ArrowInvalid:
+        # The first count of texts that do not cast ends with the one that is no number.
+        bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
+        text = values[bad].as_py()
+        or_date = "" if row + bad else " or a date of ISO 8601, such as 2026-03-01T12:00:00.5Z"
+        raise InputError(
+            f"{where} is {text!r:.60} in row {row + bad}; a time must be a number{or_date}"
+        ) from None
+    _in_ns(cut, values, where, row)
+    finer = pc.cast(values, pa.decimal256(76, digits + _BELOW_NS), safe=False)
+    rounded = pc.cast(pc.call_function("round", [finer], pc.RoundOptions(digits)), exact)
+    ns = _in_ns(rounded, values, where, row)
+    given = ns.is_valid().to_numpy(zero_copy_only=False)
+    return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given
+
+
+def _in_ns(decimals: pa.Array, values: pa.Array, where: str, row: int) -> pa.Array:
+    """Decimals with nanoseconds as their last digits as these; refused beyond 292 years."""
+    ns = decimals.view(pa.decimal128(38, 0))  # the digits without the point are the nanoseconds
+    size = pc.call_function("abs", [ns])
+    beyond = pc.fill_null(pc.call_function("greater", [size, pa.scalar(LARGEST_NS)]), False)
+    _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
+    return ns
+
+
+def _unit(unit_ns: int | None, where: str) -> int:
+    if unit_ns is None:
+        raise InputError(f"{where} holds numbers, but the map's unit of time is 'iso', which is for dates")
+    return unit_ns
+
+
+def _casts(values: pa.Array, kind: pa.DataType) -> bool:
+    try:
+        pc.cast(values, kind, safe=False)
+    except pa.ArrowInvalid:
+        return False
+    return True
+
+
+def _refuse(values: NDArray | pa.Array, beyond: Given, where: str, row: int) -> None:
+    if beyond.any():
+        first = int(np.flatnonzero(beyond)[0])
+        raise InputError(
+            f"{where} is {values[first]!s:.40} in row {row + first}; a time must be finite and within 292 years (is "
+            "its unit right?)"
+        )
+
+
+_DATE = r"[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8}"
+_TIME = r"[0-9]{2}(?::[0-9]{2}(?::[0-9]{2})?|[0-9]{2}(?:[0-9]{2})?)"
+_ZONE = r"[Zz]|UTC|[+-][0-9]{2}(?::?[0-9]{2})?"
+_PATTERN = rf"(?P<date>{_DATE})[Tt ](?P<time>{_TIME})(?:[.,](?P<fraction>[0-9]{{1,18}}))? ?(?P<zone>{_ZONE})?"
+_ISO = re.compile(_PATTERN)
+_S = 1_000_000_000
+EXAMPLE = "2026-03-01T12:00:00.000000001Z"
+_MUST = f"a time must be a date like {EXAMPLE}"
+
+
+def is_date(text: str) -> bool:
+    """Whether a cell holds date and time."""
+    return _ISO.fullmatch(text.strip()) is not None
+
+
+class TextClock:
+    """A column of time as text, block by block: numbers or dates, but not both.
+
+    Dates with and without a zone do not mix either: nobody knows what separates them. Dates without one count as UTC;
+    digits beyond nanoseconds are cut off.
+    """
+
+    def __init__(self, unit_ns: int | None, where: str) -> None:
+        """Take the unit of numbers [ns], None for dates only, and what messages call the column."""
+        self._unit_ns, self._where = unit_ns, where
+        self._form: str | None = None
+
+    def read(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
+        """As ``from_numbers``, of text, null where there is none; ``row`` is that of the first one."""
+        values = pc.call_function("utf8_trim_whitespace", [values])
+        if self._form is None and values.null_count < len(values):
+            first = values.drop_null()[0].as_py()
+            self._form = _form(first)
+            if self._unit_ns is None and self._form == "number" and not _is_float(first):
+                self._refuse(values, values.is_valid().to_numpy(zero_copy_only=False), row, _MUST)
+        if self._form in (None, "number"):
+            return from_text(values, self._unit_ns, self._where, row)
+        return self._dates(values, row)
+
+    def _dates(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
+        given = values.is_valid().to_numpy(zero_copy_only=False)
+        parts = pc.call_function("extract_regex", [values], pc.ExtractRegexOptions(f"^(?:{_PATTERN})$"))
+        no_date = given & ~parts.is_valid().to_numpy(zero_copy_only=False)
+        if no_date.any():
+            self._refuse(values, no_date, row, f"{_MUST}, as the first one is")
+        zone = _part(parts, "zone", "")
+        zoned = pc.call_function("not_equal", [zone, pa.scalar("")]).to_numpy(zero_copy_only=False)
+        if (other := given & (zoned != (self._form == "zone"))).any():
+            which = "with a time zone" if self._form == "zone" else "without a time zone"
+            self._refuse(values, other, row, f"all times must be {which}, as the first one is")
+        date, clock = _digits(_part(parts, "date", "19700101")), _digits(_part(parts, "time", "00"))
+        moment = _padded(date, 8) * 10**6 + _padded(clock, 6)
+        below = _padded(_part(parts, "fraction", ""), 9)
+        seconds = self._seconds(values, moment, row) - _zone_s(zone)
+        beyond = np.abs(seconds) >= LARGEST_NS // _S
+        if beyond.any():
+            self._refuse(values, beyond, row, "it must be within 292 years of 1970")
+        return np.where(given, seconds * _S + below, 0), given
+
+    def _seconds(self, values: pa.Array, number: Stamps, row: int) -> Stamps:
+        """Seconds of UTC from numbers of 14 digits each: year, month, day, hour, minute, second."""
+        months, days, hours, minutes, seconds = (number // 10**k % 100 for k in (8, 6, 4, 2, 0))
+        first = ((number // 10**10 - 1970) * 12 + months - 1).astype("datetime64[M]").astype("datetime64[D]")
+        date = first + (days - 1)
+        wrong = (months < 1) | (months > 12) | (date.astype("datetime64[M]") != first.astype("datetime64[M]"))
+        wrong |= (hours > 23) | (minutes > 59) | (seconds > 59)
+        if wrong.any():
+            self._refuse(values, wrong, row, "there is no such date or time of day")
+        return date.astype(np.int64) * 86_400 + hours * 3600 + minutes * 60 + seconds
+
+    def _refuse(self, values: pa.Array, bad: Given, row: int, why: str) -> None:
+        first = int(np.flatnonzero(bad)[0])
+        raise InputError(f"{self._where} is {values[first].as_py()!r:.60} in row {row + first}; {why}")
+
+
+def _form(text: str) -> str:
+    """Whether a time is a number, or a date with or without a zone."""
+    found = _ISO.fullmatch(text.strip())
+    return "number" if found is None else "zone" if found["zone"] else "local"
+
+
+def _is_float(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _part(parts: pa.Array, name: str, default: str) -> pa.Array:
+    """One group of the pattern, the default where there is none."""
+    return pc.fill_null(pc.call_function("struct_field", [parts], pc.StructFieldOptions([name])), default)
+
+
+def _digits(text: pa.Array) -> pa.Array:
+    options = pc.ReplaceSubstringOptions("[^0-9]", "")
+    return pc.call_function("replace_substring_regex", [text], options)
+
+
+def _padded(digits: pa.Array, width: int) -> Stamps:
+    """Digits as numbers, zeros added behind or digits left out there so that each has as many."""
+    padded = pc.call_function("utf8_rpad", [digits], pc.PadOptions(width, "0"))
+    cut = pc.call_function("utf8_slice_codeunits", [padded], pc.SliceOptions(0, width))
+    return cut.cast(pa.int64()).to_numpy(zero_copy_only=False)
+
+
+def _zone_s(zone: pa.Array) -> Stamps:
+    """Seconds that clocks of each zone are ahead of UTC."""
+    number = _padded(_digits(zone), 4)
+    behind = pc.call_function("starts_with", [zone], pc.MatchSubstringOptions("-"))
+    sign = np.where(behind.to_numpy(zero_copy_only=False), -1, 1)
+    return sign * (number // 100 * 3600 + number % 100 * 60)
+
+
+_COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
+
+
+def line_blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
+    """Blocks of whole lines, about ``size`` bytes each, without those whose first character but blanks is ``#``.
+
+    The file is at the beginning of a line; a line of more than twice the size is cut where it is so long.
+    """
+    rest = b""
+    while block := file.read(size):
+        lines = rest + block
+        end = lines.rfind(b"\n") + 1
+        if not end and len(lines) > 2 * size:
+            end = len(lines)
+        if ready := _without_comments(lines[:end]):
+            yield ready
+        rest = lines[end:]
+    if ready := _without_comments(rest):
+        yield ready
+
+
+def _without_comments(lines: bytes) -> bytes:
+    return _COMMENT.sub(b"", lines) if b"#" in lines else lines
+
+
+BLOCK_BYTES = 4 << 20
+MAX_LINE_BYTES = 1 << 20
+DELIMITERS = (",", ";", "\t", "|", " ")
+EMPTY = ["", " ", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
+"""Cells that stand for no value."""
+_NUMBER = re.compile(
+    r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE
+)
+"""As pyarrow reads them."""
+
+
+class BrokenRowsError(InputError):
+    """Rows that do not fit the header: nothing can be read, whatever the column."""
+
+
+class CsvTable(Table):
+    """A CSV file as a ``Table``: UTF-8, a header line, any of ``DELIMITERS``.
+
+    Blank lines, and lines that begin with ``#``, are skipped. The header is the first line that is left, or, where
+    that is a row of samples, the last one with ``#`` before it, as numpy writes it.
+    """
+
+    def __init__(self, path: Path, options: CsvMap, name: str) -> None:
+        """Read the header."""
+        self.name, self._path, self._decimal = name, path, options.decimal
+        header, first_row, self._lines_before, self._start = _first_lines(path, name, options.decimal)
+        self._delimiter = options.delimiter or _find_delimiter(header, first_row, options.decimal)
+        self._names = _cut(header, self._delimiter)
+        if not self._names:
+            raise InputError(f"{name}: its header {header!r:.60} has an unmatched quotation mark")
+        if all(_is_number(cell, options.decimal) for cell in self._names):
+            raise InputError(
+                f"{name}: the first line holds numbers ({header.strip()!r:.60}); it must name the columns"
+            )
+        self._empty = not first_row
+        self.size = path.stat().st_size
+        self.shapes: Mapping[str, tuple[int, ...]] = dict.fromkeys(self._names, ())
+
+    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
+        """Rows in the order of the file, see ``Table.blocks``.
+
+        Raises:
+            InputError: a row has too few or too many cells, or a cell is not a number.
+        """
+        columns, clocks = wanted.columns, wanted.clocks
+        index = {name: self._index(name) for name in (*columns, *clocks)}
+        types = {f"{index[name]}": pa.float64() for name in columns}
+        types |= {f"{index[name]}": pa.string() for name in clocks}
+        clash = set(columns) & set(clocks)
+        if clash:
+            raise InputError(f"{self.name}: column {clash.pop()!r} is both time and a channel")
+        if self._empty:
+            return
+        read = {name: TextClock(wanted.unit_ns, f"{self.name}: column {name!r}") for name in clocks}
+        row = before = 0
+        for batch, end in self._batches(types):
+            yield Block(
+                {
+                    # A cell without a value is NaN.
+                    name: pc.fill_null(batch.column(f"{index[name]}"), float("nan")).to_numpy(
+                        zero_copy_only=False
+                    )
+                    for name in columns
+                },
+                {name: read[name].read(self._point(batch.column(f"{index[name]}")), row) for name in clocks},
+            )
+            row += batch.num_rows
+            advance(end - before)
+            before = end
+
+    def _batches(self, types: Mapping[str, pa.DataType]) -> Iterator[tuple[pa.RecordBatch, int]]:
+        """Rows of some columns, and how far in the file they end."""
+        rows = 0
+        try:
+            with self._path.open("rb") as source:
+                source.seek(self._start)
+                for lines in line_blocks(source, BLOCK_BYTES):
+                    if (batch := self._parsed(lines, types)).num_rows:
+                        yield batch, source.tell()
+                        rows += batch.num_rows
+        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+            numbers = [int(column) for column, kind in types.items() if kind == pa.float64()]
+            self._refuse_first_fault(numbers, rows)
+            raise InputError(f"{self.name}: {_plain(error)}") from error
+
+    def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
+        """Some columns of whole lines.
+
+        Every block is a file to pyarrow. Its streaming reader reads ahead in a thread: left at a fault, or at the rows
+        that are enough, it hangs or aborts the process when this ends (pyarrow 26).
+        """
+        table = pcsv.read_csv(
+            pa.BufferReader(lines),
+            read_options=pcsv.ReadOptions(
+                use_threads=False,
+                block_size=len(lines) + 1,
+                column_names=[f"{k}" for k in range(len(self._names))],
+            ),
+            parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
+            convert_options=pcsv.ConvertOptions(
+                column_types=types,
+                include_columns=list(types),
+                null_values=EMPTY,
+                strings_can_be_null=True,
+                quoted_strings_can_be_null=True,
+                decimal_point=self._decimal,
+            ),
+        )
+        columns = [column.combine_chunks() for column in table.columns]
+        return pa.RecordBatch.from_arrays(columns, names=table.column_names)
+
+    def _refuse_first_fault(self, numbers: list[int], good: int) -> None:
+        """Refuse the first row that does not fit the header or lacks a number, after so many good rows."""
+        with contextlib.suppress(OSError), self._path.open("rb") as file:
+            for line, content in enumerate(iter(lambda: file.readline(BLOCK_BYTES + 1), b""), 1):
+                if len(content) > BLOCK_BYTES:
+                    longest = f"{BLOCK_BYTES >> 20} MiB"
+                    raise BrokenRowsError(
+                        f"{self.name}: a row is longer than {longest}; this is no table of samples"
+                    )
+                text = content.decode(errors="replace").strip("\r\n")
+                if line <= self._lines_before or not text or text.lstrip().startswith("#"):
+                    continue
+                good -= 1
+                cells = _cut(text, self._delimiter, strict=False) if good < 0 else self._names
+                if len(cells) != (count := len(self._names)):
+                    raise BrokenRowsError(
+                        f"{self.name}: {len(cells)} cell{'s' * (len(cells) != 1)} in line {line}; every row must "
+                        f"have {count}, like the header"
+                    )
+                for k in numbers if good < 0 else ():
+                    if cells[k] not in EMPTY and not _is_number(cells[k], self._decimal):
+                        comma = self._decimal == "." and _is_number(cells[k], ",")
+                        hint = ' (for a decimal comma, decimal = "," in the map\'s [csv])' if comma else ""
+                        raise InputError(
+                            f"{self.name}: column {self._names[k]!r:.80} holds {cells[k]!r:.60} in line {line}; "
+                            f"it must hold numbers{hint}"
+                        )
+
+    def _index(self, name: str) -> int:
+        if (count := self._names.count(name)) > 1:
+            raise InputError(f"{self.name}: column {name!r:.80} appears {count} times")
+        return self._names.index(name)
+
+    def _point(self, text: pa.Array) -> pa.Array:
+        """Decimal points in the place of commas."""
+        if self._decimal == ".":
+            return text
+        return pc.call_function("replace_substring", [text], pc.ReplaceSubstringOptions(self._decimal, "."))
+
+
+def _first_lines(path: Path, name: str, decimal: str) -> tuple[str, str, int, int]:
+    """The header line, the first row (empty if there is none), and the lines and bytes up to and with the header."""
+    header, lines, size = None, 0, 0
+    comment, at = None, 0
+    try:
+        with readable(name), path.open("rb") as file:
+            for count, line in enumerate(iter(lambda: file.readline(MAX_LINE_BYTES + 1), b""), 1):
+                if len(line) > MAX_LINE_BYTES:
+                    raise InputError(
+                        f"{name}: line {count} is longer than {MAX_LINE_BYTES >> 20} MiB; this is no table of samples"
+                    )
+                if b"\0" in line:
+                    raise InputError(f"{name}: holds binary data; a CSV file is text in UTF-8")
+                at += len(line)
+                text = line.decode("utf-8-sig" if count == 1 else "utf-8").strip("\r\n")
+                if text.lstrip().startswith("#"):
+                    if header is None:
+                        comment = text.lstrip().removeprefix("#").lstrip(), count, at
+                elif not text.strip():
+                    continue
+                elif header is not None:
+                    return header, text, lines, size
+                elif comment is not None and _is_row(text, decimal):
+                    header, lines, size = comment
+                    return header, text, lines, size
+                else:
+                    header, lines, size = text, count, at
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name}: is not text in UTF-8 ({error.reason})") from error
+    if header is None and comment is not None:
+        header, lines, size = comment
+    if header is None or not header:
+        raise InputError(f"{name}: has no header; the first line must name the columns")
+    return header, "", lines, size
+
+
+def _is_row(text: str, decimal: str) -> bool:
+    """Whether a line holds samples, and no names."""
+    for delimiter in DELIMITERS:
+        cells = _cut(text, delimiter) if delimiter != decimal else []
+        if cells and all(_is_cell(cell, decimal) for cell in cells):
+            return True
+    return False
+
+
+def _find_delimiter(header: str, row: str, decimal: str) -> str:
+    """The delimiter that cuts most numbers out of the first row.
+
+    Where none does, because a row is no row of numbers, the one that cuts the header at all, for what is said then.
+    """
+    best, most = "", 1
+    for delimiter in DELIMITERS:
+        cells = _cut(row, delimiter) if delimiter != decimal else []
+        if len(cells) > most and all(_is_cell(cell, decimal) for cell in cells):
+            best, most = delimiter, len(cells)
+    return best or next((d for d in DELIMITERS if d != decimal and len(_cut(header, d)) > 1), ",")
+
+
+def _cut(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=strict), [])]
+    except csv.Error:  # such as an unmatched quotation mark
+        return []
+
+
+def _is_cell(cell: str, decimal: str) -> bool:
+    return cell in EMPTY or _is_number(cell, decimal) or is_date(cell)
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    return _NUMBER.fullmatch(cell.replace(decimal, "\0").replace(".", "?").replace("\0", ".")) is not None
+
+
+def _plain(error: Exception) -> str:
+    return f"cannot be read as CSV ({detail_of(error)!r})"
