@@ -6,6 +6,7 @@ from estimator.errors import InputError
 from estimator.files import system_errors
 
 NAME, SUFFIX = "report.html", ".html"
+CAMPAIGN_FORMAT = "mocobot-campaign"
 SOUGHT = (
     "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of "
     "`mocobot calibrate --out`, campaign.json of `mocobot campaign --out`, or JSON files of `mocobot estimate --out`"

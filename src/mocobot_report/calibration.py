@@ -1,6 +1,6 @@
 """One calibration: whether to trust it, the robots as they are, what was carried, what stays open."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ from estimator.arm.unit import AT
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.calibrate.outcome.text import DEG, MASSES, SHOWN, alike, frames_sentence, shown_groups
-from mocobot_report.charts import Chart, Key, axis, bars, dots, log_axis, rows_chart
+from mocobot_report.charts import Axis, Chart, Key, axis, bars, dots, log_axis, row_layout
 from mocobot_report.numbers import NONE, counted, kinds_of, percent, plain, short_names, with_error
 from mocobot_report.tables import Entry, Num, component, measurement, quantity, table
 
@@ -162,54 +162,50 @@ def _deviations(calibration: Calibration, robot: int) -> Iterator[Deviation]:
                 )
 
 
-def _robot_keys(robots: int) -> list[Key]:
-    return [Key(f"r{k + 1}", f"robot {k + 1}", COLOURS[k % len(COLOURS)], "circle") for k in range(robots)]
-
-
-def _beside(row: int, robot: int, robots: int) -> float:
-    """Where a robot's dot of a row stands."""
-    return row + APART * (robot - 0.5 * (robots - 1)) * min(1.0, 3.0 / robots)
-
-
-def _deviation_chart(calibration: Calibration) -> Chart:
-    """Every deviation in prior standard deviations, with bars of two standard errors."""
-    keys, data, most = _robot_keys(calibration.robots), [], 2.0
+def _of_robots(
+    c: Calibration, words: tuple[str, str, str], across: Axis, rules: Sequence[float], of: "Of"
+) -> Chart:
+    """A row for each kind of deviation with a dot for each of every robot; ``of`` gives x, half a bar, and a text."""
+    names, data = kind_names([group.name for group in shown_groups(c)]), []
+    keys = [Key(f"r{k + 1}", f"robot {k + 1}", COLOURS[k % len(COLOURS)], "circle") for k in range(c.robots)]
     for robot, key in enumerate(keys):
-        found = list(_deviations(calibration, robot))
-        x, y = [d.value / d.prior for d in found], [_beside(d.row, robot, len(keys)) for d in found]
-        measured = [with_error(d.scale * d.value, d.scale * d.se, d.unit) for d in found]
-        text = [f"{key.label}, {d.name}: {said}" for d, said in zip(found, measured, strict=True)]
-        error_x = {"array": [2.0 * d.se / d.prior for d in found], "thickness": 1.3, "width": 3}
-        most = max([most, *map(abs, x)])
-        data.append(dots(x, y, key, text, size=7, error_x=error_x))
-    return rows_chart(
-        "How far the robots are off",
-        "Every deviation of every robot in prior standard deviations, grouped by kind; values are in the tables.",
-        data, kind_names([group.name for group in shown_groups(calibration)]),
-        axis("deviation over prior sd", range=[-1.08 * most, 1.08 * most], zerolinewidth=1.5),
-        rules=(-1.0, 1.0), row_px=52, left_px=178, most=30, keys=[*keys, ASSUMED],
-        note="bars: two standard errors either way",
+        found = list(_deviations(c, robot))
+        aside = APART * (robot - 0.5 * (c.robots - 1)) * min(1.0, 3.0 / c.robots)
+        x, half, said = zip(*map(of, found), strict=True) if found else ((), (), ())
+        text = [f"{key.label}, {d.name}: {words}" for d, words in zip(found, said, strict=True)]
+        data.append(dots(x, [d.row + aside for d in found], key, text, size=7))
+        if any(half):
+            data[-1]["error_x"] = {"array": list(half), "thickness": 1.3, "width": 3}
+    layout = row_layout(names, across, rules=rules, row_px=50, left_px=178, most=30)
+    title, label, note = words
+    return Chart(title, label, data, keys=[*keys, ASSUMED], note=note, **layout)
+
+
+Of = Callable[[Deviation], tuple[float, float, str]]
+
+
+def _deviation_chart(c: Calibration) -> Chart:
+    """Every deviation in prior standard deviations, with bars of two standard errors."""
+    every = [d.value / d.prior for robot in range(c.robots) for d in _deviations(c, robot)]
+    most = 1.08 * max([2.0, *map(abs, every)])
+    across = axis("deviation over prior sd", range=[-most, most], zerolinewidth=1.5)
+    label = "Every deviation of every robot in prior standard deviations, grouped by kind; values are in the tables."
+    words = ("How far the robots are off", label, "bars: two standard errors either way")
+    return _of_robots(
+        c, words, across, (-1.0, 1.0),
+        lambda d: (d.value / d.prior, 2.0 * d.se / d.prior, with_error(d.scale * d.value, d.scale * d.se, d.unit)),
     )  # fmt: skip
 
 
-def _certainty_chart(calibration: Calibration) -> Chart:
+def _certainty_chart(c: Calibration) -> Chart:
     """Standard errors over prior standard deviations."""
-    keys, data, seen = _robot_keys(calibration.robots), [], [1.0]
-    for robot, key in enumerate(keys):
-        found = list(_deviations(calibration, robot))
-        x, y = [d.se / d.prior for d in found], [_beside(d.row, robot, len(keys)) for d in found]
-        text = [
-            f"{key.label}, {d.name}: from {plain(d.scale * d.prior, 2)} to {plain(d.scale * d.se, 2)} {d.unit}"
-            for d in found
-        ]
-        seen += x
-        data.append(dots(x, y, key, text, size=7))
-    return rows_chart(
-        "How much better they are known than before",
-        "Standard error of every deviation over its prior standard deviation; at 1 the data said nothing.",
-        data, kind_names([group.name for group in shown_groups(calibration)]),
-        log_axis("standard error over prior sd", seen), rules=[1.0], row_px=46, left_px=178, most=30,
-        keys=[*keys, ASSUMED], note="at 1 the recordings said nothing",
+    every = [d.se / d.prior for robot in range(c.robots) for d in _deviations(c, robot)]
+    across = log_axis("standard error over prior sd", [1.0, *every])
+    label = "Standard error of every deviation over its prior standard deviation; at 1 the data said nothing."
+    words = ("How much better they are known than before", label, "at 1 the recordings said nothing")
+    return _of_robots(
+        c, words, across, (1.0,),
+        lambda d: (d.se / d.prior, 0.0, f"from {plain(d.scale * d.prior, 2)} to {plain(d.scale * d.se, 2)} {d.unit}"),
     )  # fmt: skip
 
 
@@ -235,10 +231,8 @@ def _fit_charts(calibration: Calibration) -> list[Chart]:
             data.append(dots([number for number, _ in found], [row for _, row in found], key, text))
             seen += [number for number, _ in found]
         label = f"{title}: chi-square per number of every recording as designed, calibrated and left out."
-        charts.append(
-            rows_chart(title, label, data, names, log_axis("chi²/n", seen), rules=[1.0], row_px=34, most=20,
-                       keys=[*FITS, NOISE])
-        )  # fmt: skip
+        layout = row_layout(names, log_axis("chi²/n", seen), rules=[1.0], row_px=34, most=20)
+        charts.append(Chart(title, label, data, keys=[*FITS, NOISE], **layout))
     return charts
 
 
@@ -258,11 +252,12 @@ def _share_chart(calibration: Calibration) -> Chart | None:
         bars(shares, key, [f"{name}: {percent(share)}" for share in shares], 0.66, textposition="none")
         for key, (name, shares) in zip(keys, series, strict=True)
     ]
-    return rows_chart(
+    across = axis("share [%]", range=[0, 100], nticks=6)
+    return Chart(
         "What each recording contributes",
         "Share of every recording in what is known of each kind of parameter; the rest is the prior's.",
-        data, kind_names(kinds), axis("share [%]", range=[0, 100], nticks=6), row_px=34, left_px=190, most=32,
-        keys=keys, note="share of the information, averaged over the parameters of a kind", barmode="stack",
+        data, keys=keys, note="share of the information, averaged over the parameters of a kind",
+        **row_layout(kind_names(kinds), across, row_px=34, left_px=190, most=32),
     )  # fmt: skip
 
 
@@ -280,7 +275,10 @@ def shares_of(calibration: Calibration) -> tuple[list[str], list[tuple[str, list
 
 def kind_names(kinds: list[str]) -> list[str]:
     """Deviations, grasps and inertial parameters in words."""
-    from estimator.calibrate.outcome.shares import GRASPS, INERTIAL  # with parts of scipy that tables do not need
+    from estimator.calibrate.outcome.shares import (
+        GRASPS,
+        INERTIAL,
+    )  # with parts of scipy that tables do not need
 
     names = {GRASPS: "grasps", INERTIAL: "mass, centre of mass, inertia"}
     return [names.get(kind) or SHOWN[kind].name for kind in kinds]

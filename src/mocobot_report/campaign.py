@@ -8,7 +8,6 @@ from mocobot_report.charts import Axis, Chart, Key, Trace, axis, dots, log_axis
 if TYPE_CHECKING:
     from mocobot_report.folder import Result
 
-FORMAT = "mocobot-campaign"
 BACKGROUNDS = {
     "calibrated": "Calibrated robots",
     "uncalibrated": "Uncalibrated robots",

@@ -23,44 +23,28 @@ Trace = dict[str, Any]
 
 @dataclass(frozen=True)
 class Key:
-    """One entry of a legend.
+    """One entry of a legend."""
 
-    Attributes:
-        group: the lines it shows and hides; empty for what cannot be hidden.
-        label: what they are.
-        colour: name in the palette.
-        symbol: ``line``, ``dash``, ``band`` or the name of a marker.
-    """
-
-    group: str
+    group: str  # the lines it shows and hides; empty for what cannot be hidden
     label: str
-    colour: str
-    symbol: str = "line"
+    colour: str  # name in the palette
+    symbol: str = "line"  # or "dash", "band", or the name of a marker
 
 
 @dataclass(frozen=True)
 class Chart:
-    """A plot with caption and legend.
+    """A plot with caption and legend."""
 
-    Attributes:
-        title: of the caption; a bracketed unit is printed with superscripts.
-        label: what it shows, for those who do not see it.
-        data: traces.
-        layout: properties of plotly's ``layout``.
-        height: of the plot [px].
-        keys: the legend.
-        note: below the title.
-        narrow: what changes in the layout on phones, by dotted path.
-    """
-
-    title: str
-    label: str
+    title: str  # a bracketed unit is printed with superscripts
+    label: str  # what it shows, for those who do not see it
     data: Sequence[Trace]
-    layout: Mapping[str, Any]
-    height: int
+    layout: Mapping[str, Any]  # properties of plotly's layout
+    height: int  # [px]
     keys: Sequence[Key] = ()
-    note: str = ""
-    narrow: Mapping[str, float] = field(default_factory=dict)
+    note: str = ""  # below the title
+    narrow: Mapping[str, float] = field(
+        default_factory=dict
+    )  # what changes in the layout on phones, by dotted path
 
     def to_json(self) -> dict[str, Any]:
         """For the page's script; arrays that traces share as ``x`` stand in ``arrays``, once."""
@@ -161,16 +145,20 @@ def bars(shares: Sequence[float], key: Key, text: Iterable[str], width: float, *
     }  # fmt: skip
 
 
-def rows_chart(
-    title: str, label: str, data: Sequence[Trace], names: Sequence[str], across: Axis, *, rules: Iterable[float] = (),
-    row_px: int = 24, left_px: int = 120, most: int = 26, font_px: int = 10, keys: Sequence[Key] = (), note: str = "",
-    **layout: Any,
-) -> Chart:  # fmt: skip
-    """One row per name, of up to ``most`` letters in ``left_px`` pixels; dashed lines at ``rules``."""
-    layout |= {"xaxis": across, "yaxis": row_axis(names, most), "margin": {"l": left_px}}
-    layout["shapes"] = [rule(x=at) for at in rules]
+def row_layout(
+    names: Sequence[str], across: Axis, *, rules: Iterable[float] = (), row_px: int = 24, left_px: int = 120,
+    most: int = 26, font_px: int = 10,
+) -> dict[str, Any]:  # fmt: skip
+    """Layout, height and phone's layout of a chart with one row per name, and dashed lines at ``rules``.
+
+    Names have up to ``most`` letters in ``left_px`` pixels, on phones in fewer, of ``font_px``.
+    """
+    layout = {
+        "xaxis": across, "yaxis": row_axis(names, most), "margin": {"l": left_px}, "barmode": "stack",
+        "shapes": [rule(x=at) for at in rules],
+    }  # fmt: skip
     narrow = {"yaxis.tickfont.size": font_px, "margin.l": min(left_px, 155 if most > 32 else 120)}
-    return Chart(title, label, data, layout, row_px * len(names) + 76, keys, note, narrow)
+    return {"layout": layout, "height": row_px * len(names) + 76, "narrow": narrow}
 
 
 POINTS, FEWEST, MOST = 4800, 300, 1200
@@ -186,42 +174,27 @@ def points_of_each(trials: int) -> int:
 
 @dataclass(frozen=True)
 class Line:
-    """One line, or a set of points.
-
-    Attributes:
-        key: its legend entry.
-        time: shape (n,); NaN breaks the line.
-        values: shape (n,).
-        points: markers in place of a line.
-    """
+    """One line, or a set of points."""
 
     key: Key
-    time: Array
-    values: Array
-    points: bool = False
+    time: Array  # shape (n,); NaN breaks the line
+    values: Array  # shape (n,)
+    points: bool = False  # markers in place of a line
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One of several plots above each other.
+    """One of several plots above each other."""
 
-    Attributes:
-        title: of the vertical axis.
-        unit: of its values.
-        lines: to draw.
-        limits: of the vertical axis, or None for all that there is.
-        band: times and half heights of a shaded band around zero, shape (n,) each, or None; NaN breaks it.
-        rule: where a dashed line runs, or None.
-        log: whether the axis is logarithmic; then it starts at ``limits``.
-    """
-
-    title: str
+    title: str  # of the vertical axis
     unit: str
     lines: Sequence[Line]
-    limits: tuple[float, float] | None = None
-    band: tuple[Array, Array] | None = None
-    rule: float | None = None
-    log: bool = False
+    limits: tuple[float, float] | None = None  # of the vertical axis; None for all that there is
+    band: tuple[Array, Array] | None = (
+        None  # times and half heights around zero, shape (n,) each; NaN breaks it
+    )
+    rule: float | None = None  # where a dashed line runs
+    log: bool = False  # a logarithmic axis from the lower limit on
 
 
 def stacked_chart(
@@ -281,39 +254,29 @@ def around_zero(time: Array, half: Array) -> str:
     return "".join(out)
 
 
-def runs(time: Array, step_s: float) -> Array:
-    """Number of the uninterrupted run that each sample belongs to, shape (n,); a pause begins a new one."""
-    return np.concatenate([[0], np.cumsum(np.diff(time) > 1.5 * step_s)]) if len(time) else np.zeros(0)
-
-
-def thinned(time: Array, values: Array, run: Array | None = None, most: int = MOST) -> tuple[Array, Array]:
+def thinned(time: Array, values: Array, step_s: float | None = None, most: int = MOST) -> tuple[Array, Array]:
     """The smallest and the largest value of every stretch of time, at their own times; NaN rows at pauses.
 
     Args:
         time: shape (n,), increasing.
         values: shape (n, C); all columns share the times that are kept.
-        run: as ``runs`` gives it, or None where there is no pause.
-        most: rows to keep at most, apart from ends of runs.
+        step_s: between samples; a longer one is a pause. None where there is none.
+        most: rows to keep at most, apart from ends of what pauses part.
 
     Returns:
         Times, shape (m,), and values, shape (m, C).
     """
     n, columns = values.shape
-    run = np.zeros(n) if run is None else run
+    after = np.flatnonzero(np.diff(time) > 1.5 * step_s) + 1 if step_s else np.zeros(0, dtype=int)
+    chosen = np.arange(n)
     if n > most:
-        ends = np.flatnonzero(np.diff(run) > 0)
-        kept = {0, n - 1, *ends, *(ends + 1)}
+        kept = {0, n - 1, *after, *(after - 1)}
         edges = np.linspace(0, n, max(2, most // (2 * columns)) + 1).astype(int)
         for start, end in pairwise(edges):
             if end > start:
                 kept.update(start + np.argmin(values[start:end], axis=0))
                 kept.update(start + np.argmax(values[start:end], axis=0))
         chosen = np.array(sorted(int(k) for k in kept))
-        time, values, run = time[chosen], values[chosen], run[chosen]
-    return with_breaks(time, values, run)
-
-
-def with_breaks(time: Array, values: Array, run: Array) -> tuple[Array, Array]:
-    """Times, shape (n,), and values, shape (n, C), with a NaN row wherever another run begins."""
-    at = np.flatnonzero(np.diff(run) > 0) + 1
-    return np.insert(time.astype(float), at, np.nan), np.insert(values.astype(float), at, np.nan, axis=0)
+    at = np.searchsorted(chosen, after)
+    shown = np.insert(values[chosen].astype(float), at, np.nan, axis=0)
+    return np.insert(time[chosen].astype(float), at, np.nan), shown

@@ -441,61 +441,58 @@ def _rollouts(rolled: Values | None) -> dict[str, Any] | None:
         return None
     loop = rolled["commanded"]
     return {
-        "why_not": rolled["why_not"],
-        "free": _free(rolled) if rolled["why_not"] is None else None,
-        "why_no_loop": loop["why_not"],
-        "loop": _commanded(rolled, loop) if loop["why_not"] is None else None,
-    }
+        "why_not": rolled["why_not"], "free": _free(rolled) if rolled["why_not"] is None else None,
+        "why_no_loop": loop["why_not"], "loop": _commanded(rolled, loop) if loop["why_not"] is None else None,
+    }  # fmt: skip
 
 
 def _free(rolled: Values) -> dict[str, Any]:
     more = [*diverged_sentences(rolled), *rolled["refused"]]
     if rolled["not_simulated"]:
         more.append(f"Not in the rollouts: {', '.join(rolled['not_simulated'])}.")
-    named = rolled["horizons"][0]["after"] is not None
     rows: Rows = []
     for j in range(len(rolled["joints"])):
         for k, horizon in enumerate(rolled["horizons"]):
-            sides = [side and side["rms"][j] for side in (horizon["before"], horizon["after"])]
-            share = horizon["removed"] and horizon["removed"][j]
-            first = [_joint(rolled, j) if not k else "", value(horizon["seconds"], 2)]
-            rows.append([*first, *_row(rolled, j, sides, share, named=named), Num(str(horizon["starts"]))])
+            sides = [side and side["rms"] for side in (horizon["before"], horizon["after"])]
+            name, *errors = _joint_row(rolled, j, *sides, horizon["removed"])
+            rows.append(
+                ["" if k else name, value(horizon["seconds"], 2), *errors, Num(str(horizon["starts"]))]
+            )
     said = f"From measured states the model is let go under the logged torques, {blocks(rolled)}."
-    head = ["joint", "ahead [s]", *_rollout_heads(named=named), "starts"]
-    return {"said": tidy(" ".join([said, *more])), "head": head, "rows": rows}
+    heads = _errors_heads(rolled["horizons"][0]["after"])
+    return {
+        "said": tidy(" ".join([said, *more])),
+        "head": ["joint", "ahead [s]", *heads, "starts"],
+        "rows": rows,
+    }
 
 
 def _commanded(rolled: Values, loop: Values) -> dict[str, Any]:
-    named, count = loop["after"] is not None, len(loop["blocks"])
-    rows: Rows = []
-    for j in range(len(rolled["joints"])):
-        sides = [loop["before"][j], loop["after"][j] if named else None]
-        share = loop["removed"][j] if named else None
-        rows.append([_joint(rolled, j), *_row(rolled, j, sides, share, named=named)])
+    sides, count = (loop["before"], loop["after"], loop["removed"]), len(loop["blocks"])
     gone = [
         (word, lost(loop["blocks"], which)) for which, word in (("before", "given"), ("after", "extended"))
     ]
     missing = [
         f"of the {word} model {n} of {count} blocks diverged and are left out" for word, n in gone if n
     ]
-    note = "; ".join(["rms over the blocks under their logged commands", *missing])
-    return {"head": ["joint", *_rollout_heads(named=named)], "rows": rows, "note": note}
+    return {
+        "head": ["joint", *_errors_heads(loop["after"])],
+        "rows": [_joint_row(rolled, j, *sides) for j in range(len(rolled["joints"]))],
+        "note": "; ".join(["rms over the blocks under their logged commands", *missing]),
+    }
 
 
-def _rollout_heads(*, named: bool) -> list[str]:
-    return ["before", "after", "removed"] if named else ["error"]
+def _errors_heads(after: Any) -> list[str]:
+    return ["error"] if after is None else ["before", "after", "removed"]
 
 
-def _joint(rolled: Values, j: int) -> str:
-    return f"{rolled['joints'][j]} [{spelled_text(shown_units(rolled)[rolled['units'][j]][0])}]"
-
-
-def _row(
-    rolled: Values, j: int, sides: list[float | None], share: float | None, *, named: bool
-) -> list[Entry]:
-    scale = shown_units(rolled)[rolled["units"][j]][1]
-    numbers: list[Entry] = [Num(NONE) if x is None else value(scale * x, 3) for x in sides[: 1 + named]]
-    return [*numbers, Num(percent(share))] if named else numbers
+def _joint_row(rolled: Values, j: int, before: Any, after: Any, removed: Any) -> list[Entry]:
+    """A joint's name, its errors of both models, and the share that is removed; only errors where nothing is named."""
+    unit, scale = shown_units(rolled)[rolled["units"][j]]
+    sides = [side[j] for side in (before, after) if side is not None]
+    errors = [value(None if side is None else scale * side, 3) for side in sides]
+    share = [] if removed is None else [Num(percent(removed[j]))]
+    return [f"{rolled['joints'][j]} [{spelled_text(unit)}]", *errors, *share]
 
 
 def _limits(limits: Sequence[Values]) -> Rows:

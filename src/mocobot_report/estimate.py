@@ -29,7 +29,7 @@ from mocobot_report.charts import (
     line,
     log_axis,
     points_of_each,
-    rows_chart,
+    row_layout,
     stacked_chart,
     thinned,
 )
@@ -263,82 +263,71 @@ TRUTH = Key("truth", "truth", "text", "x")
 SIGNAL = Key("signal", "a direction of the parameters", "nominal", "circle")
 WEAK = Key("", "too weak below", "text", "dash")
 APART = 0.17
-Measured = tuple[float, float]
-"""A value and its standard error."""
 
 
 def _moment_chart(e: PayloadEstimate, truth: BodyFacts | None) -> Chart | None:
     """Principal moments of every recording, relative to the pooled ones, with standard errors."""
-    found = [(Path(r.name).name, r.inertia.principal) for r in e.recordings if r.inertia is not None]
+    found = {Path(r.name).name: r.inertia.principal for r in e.recordings if r.inertia is not None}
     if e.inertia is None or not found:
         return None
-    pooled = e.inertia.principal
-    rows = [("pooled", pooled), *found]
-
-    def read(p: Any, k: int) -> Measured:
-        return float(p.moments[k]), float(p.moments_se[k])
-
-    data = _against_pooled(rows, MOMENTS, read, "kg m²", [100.0 / float(m) for m in pooled.moments])
-    legend = list(MOMENTS)
+    pooled, extra = e.inertia.principal, []
     if truth is not None and truth.principal_kgm2 is not None:
-        shares = [float(s) for s in 100.0 * (np.sort(truth.principal_kgm2) / pooled.moments - 1.0)]
+        shares = 100.0 * (np.sort(truth.principal_kgm2) / pooled.moments - 1.0)
         text = [f"truth, moment {k + 1}" for k in range(len(shares))]
-        data.append(dots(shares, [APART * (k - 1) for k in range(len(shares))], TRUTH, text, size=8))
-        legend.append(TRUTH)
-    return _pooled_chart(
-        "Principal moments of inertia against the pooled estimate",
-        "Each recording's own principal moments of inertia relative to the pooled ones, with standard errors.",
-        data, [name for name, _ in rows], legend, "difference [%]",
-    )  # fmt: skip
+        at = [APART * (k - 1) for k in range(len(shares))]
+        extra.append((TRUTH, dots([float(share) for share in shares], at, TRUTH, text, size=8)))
+    rows = [(name, p.moments, p.moments_se) for name, p in ({"pooled": pooled} | found).items()]
+    title = "Principal moments of inertia against the pooled estimate"
+    label = (
+        "Each recording's own principal moments of inertia relative to the pooled ones, with standard errors."
+    )
+    return _pooled_chart((title, label, "kg m²"), rows, MOMENTS, 100.0 / pooled.moments, extra)
 
 
 def _grasp_charts(e: PayloadEstimate) -> list[Chart]:
     """Positions of the grasps from every recording alone, relative to the pooled ones, with standard errors."""
-    found = [(Path(r.name).name, r.grasps) for r in e.recordings if r.grasps is not None]
+    found = {Path(r.name).name: r.grasps for r in e.recordings if r.grasps is not None}
     if e.grasps is None or not found:
         return []
-
-    def read(pair: Any, k: int) -> Measured:
-        return 1e3 * float(pair.p_ij[k]), 1e3 * float(pair.p_se_m[k])
-
     charts = []
     for j in range(2, e.robots + 1):
-        rows = [(name, grasps.pair(1, j)) for name, grasps in [("pooled", e.grasps), *found]]
-        charts.append(
-            _pooled_chart(
-                f"Position of grasp {j} in {{1}} against the pooled estimate",
-                f"Each recording's own position of grasp {j} relative to the pooled one, with standard errors.",
-                _against_pooled(rows, AXES, read, "mm", [1.0] * 3), [name for name, _ in rows], AXES, "difference [mm]",
-            )
-        )  # fmt: skip
+        pairs = {name: grasps.pair(1, j) for name, grasps in ({"pooled": e.grasps} | found).items()}
+        rows = [(name, 1e3 * pair.p_ij, 1e3 * pair.p_se_m) for name, pair in pairs.items()]
+        title = f"Position of grasp {j} in {{1}} against the pooled estimate"
+        label = (
+            f"Each recording's own position of grasp {j} relative to the pooled one, with standard errors."
+        )
+        charts.append(_pooled_chart((title, label, "mm"), rows, AXES, np.ones(3)))
     return charts
 
 
-def _against_pooled(
-    rows: Sequence[tuple[str, Any]], keys: Sequence[Key], read: Callable[[Any, int], Measured], unit: str,
-    scales: Sequence[float],
-) -> list[Trace]:  # fmt: skip
-    """Differences from the first row, which is the pooled one, with horizontal bars of two standard errors."""
+def _pooled_chart(
+    words: tuple[str, str, str], rows: Sequence[tuple[str, Array, Array]], keys: Sequence[Key], scales: Array,
+    extra: Sequence[tuple[Key, Trace]] = (),
+) -> Chart:  # fmt: skip
+    """Differences from the first row, which is the pooled one, with horizontal bars of two standard errors.
+
+    Args:
+        words: title, label and the values' unit.
+        rows: name, values and standard errors of each, shape (3,).
+        keys: one per component.
+        scales: of differences, shape (3,).
+        extra: more points.
+    """
+    title, label, unit = words
     data = []
-    for k, (key, scale) in enumerate(zip(keys, scales, strict=True)):
-        found = [read(source, k) for _, source in rows]
-        differences = [scale * (number - found[0][0]) for number, _ in found]
-        text = [
-            f"{name}, {key.label}: {with_error(*each, unit)}"
-            for (name, _), each in zip(rows, found, strict=True)
-        ]
-        bars = {"array": [2.0 * scale * se for _, se in found], "thickness": 1.4, "width": 3}
+    for k, (key, scale) in enumerate(zip(keys, map(float, scales), strict=True)):
+        found = [(name, float(values[k]), float(errors[k])) for name, values, errors in rows]
+        text = [f"{name}, {key.label}: {with_error(number, se, unit)}" for name, number, se in found]
+        bars = {"array": [2.0 * scale * se for _, _, se in found], "thickness": 1.4, "width": 3}
+        differences = [scale * (number - found[0][1]) for _, number, _ in found]
         at = [n + APART * (k - 1) for n in range(len(rows))]
         data.append(dots(differences, at, key, text, error_x=bars))
-    return data
-
-
-def _pooled_chart(
-    title: str, label: str, data: Sequence[Trace], names: Sequence[str], keys: Sequence[Key], across: str
-) -> Chart:
-    return rows_chart(
-        title, label, data, names, axis(across, zerolinewidth=1.5, nticks=6), row_px=44, left_px=90, most=24,
-        font_px=11, keys=keys, note="bars: two standard errors either way",
+    across = axis(f"difference [{'%' if keys is MOMENTS else unit}]", zerolinewidth=1.5, nticks=6)
+    layout = row_layout([name for name, _, _ in rows], across, row_px=44, left_px=90, most=24, font_px=11)
+    return Chart(
+        title, label, data + [one for _, one in extra], keys=[*keys, *(key for key, _ in extra)],
+        note="bars: two standard errors either way", **layout,
     )  # fmt: skip
 
 
@@ -348,12 +337,12 @@ def _excitation_chart(e: PayloadEstimate) -> Chart:
     found = [(k, step, s) for k, step in enumerate(steps) for s in step.singular_values]
     x = [max(s / step.noise if step.noise > 0 else 1e6, 1e-3) for _, step, s in found]
     text = [f"{step.step}: signal {s:.2g} {step.unit}, noise {step.noise:.2g}" for _, step, s in found]
-    return rows_chart(
+    across = log_axis("signal over noise (rms)", [1.0, 100.0, *x])
+    return Chart(
         "Excitation: signal over noise of every direction",
         "Ratio of signal to noise for every direction that each step solves for; the numbers are in the table.",
-        [dots(x, [k for k, _, _ in found], SIGNAL, text, opacity=0.85)], [s.step for s in steps],
-        log_axis("signal over noise (rms)", [1.0, 100.0, *x]), rules=[FACTOR], row_px=34, left_px=150, most=40,
-        keys=[SIGNAL, WEAK],
+        [dots(x, [k for k, _, _ in found], SIGNAL, text, opacity=0.85)], keys=[SIGNAL, WEAK],
+        **row_layout([s.step for s in steps], across, rules=[FACTOR], row_px=34, left_px=150, most=40),
     )  # fmt: skip
 
 
@@ -363,21 +352,13 @@ SEGMENT_S = 10.0
 
 @dataclass(frozen=True)
 class Left:
-    """One quantity that is zero if all is well.
-
-    Attributes:
-        name: of it.
-        unit: of its values.
-        keys: one per column.
-        time: [s], shape (n,).
-        values: shape (n, C).
-    """
+    """One quantity that is zero if all is well."""
 
     name: str
     unit: str
-    keys: tuple[Key, ...]
-    time: Array
-    values: Array
+    keys: tuple[Key, ...]  # one per column
+    time: Array  # [s], shape (n,)
+    values: Array  # shape (n, C)
 
 
 def _signals(

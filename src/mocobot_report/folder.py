@@ -26,8 +26,8 @@ from estimator.inputs import file_sha256
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 from estimator.strict import Fields, is_number, read_json
+from mocobot_report import CAMPAIGN_FORMAT as CAMPAIGN
 from mocobot_report import SOUGHT, check_folder
-from mocobot_report.campaign import FORMAT as CAMPAIGN
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
 
@@ -40,50 +40,30 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Result:
-    """One result of a folder.
+    """One result of a folder."""
 
-    Attributes:
-        kind: one of ``KINDS``.
-        path: its file.
-        found: ``Paper``, ``PayloadEstimate``, ``Calibration``, ``Diagnosed``, or a campaign's summary.
-        provenance: how it was made, or None.
-        files: that it was read from.
-    """
-
-    kind: str
+    kind: str  # one of KINDS
     path: Path
-    found: Any
-    provenance: Json | None
-    files: tuple[Path, ...]
+    found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, or a campaign's summary
+    provenance: Json | None  # how it was made
+    files: tuple[Path, ...]  # that it was read from
 
 
 @dataclass(frozen=True)
 class Paper:
-    """What ``mocobot paper --out`` wrote.
+    """What ``mocobot paper --out`` wrote."""
 
-    Attributes:
-        scores: by preset, then payload.
-        trials: summaries of the simulated trials; empty where there are none.
-        estimates: by (payload, preset), those that are there.
-    """
-
-    scores: Mapping[str, Mapping[str, Any]]
-    trials: tuple[Json, ...]
-    estimates: Mapping[tuple[str, str], PayloadEstimate]
+    scores: Mapping[str, Mapping[str, Any]]  # by preset, then payload
+    trials: tuple[Json, ...]  # summaries of the simulated trials; empty where there are none
+    estimates: Mapping[tuple[str, str], PayloadEstimate]  # by (payload, preset), those that are there
 
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """What ``mocobot diagnose --out`` wrote.
+    """What ``mocobot diagnose --out`` wrote."""
 
-    Attributes:
-        values: the diagnosis as ``discrepancy.result.json`` documents it.
-        traces: residuals of every trial; empty where the folder has none.
-        channels: of the residuals.
-    """
-
-    values: Json
-    traces: tuple[Trace, ...]
+    values: Json  # as discrepancy.result.json documents it
+    traces: tuple[Trace, ...]  # residuals of every trial; empty where the folder has none
     channels: tuple[Channel, ...]
 
 
@@ -228,17 +208,11 @@ def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Source:
-    """A recording that a result was made from.
-
-    Attributes:
-        name: of the file.
-        path: where it is, or None.
-        why: why it is not used, a sentence without its end; empty if it is.
-    """
+    """A recording that a result was made from."""
 
     name: str
     path: Path | None
-    why: str = ""
+    why: str = ""  # it is not used, a sentence without its end
 
     def recording(self) -> Recording:
         """Read it.

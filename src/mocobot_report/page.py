@@ -128,11 +128,12 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
             answers += Markup("<h2>{}</h2>").format(heading) if len(results) > 1 else ""
             answers += module.answer()
     page.parts.append(_Part("provenance", "Provenance"))
-    page.parts[-1].content = Markup(
-        templates().get_template("provenance.html").render(page=page, read=_read(folder, results), results=[
-            (_called(result, results), _provenance(result.provenance)) for result in results
-        ])
+    read = dict.fromkeys(path for result in results for path in result.files)
+    provenance = templates().get_template("provenance.html").render(
+        page=page, rows_of=_files, option=_option, results=[(_called(one), one.provenance) for one in results],
+        read=[file_facts(path) | {"path": path.relative_to(folder).as_posix()} for path in read],
     )  # fmt: skip
+    page.parts[-1].content = Markup(provenance)
     answer = link_terms(answers)
     of_kind = zip(results, contexts, strict=True)
     titles = [context["title"] for _, context in sorted(of_kind, key=lambda one: one[0].kind != "diagnosis")]
@@ -208,32 +209,30 @@ class Picture:
     height: int = HEIGHT
 
 
-def render_pictures(contexts: Iterable[Context]) -> None:
+def render_pictures(contexts: Sequence[Context]) -> None:
     """Replace the pictures that parts want, (caption, function that makes a shot), by pictures.
 
-    All are rendered in one process. Where nothing can be rendered, one sentence takes the place of each group.
+    All are rendered in one process. Where nothing can be rendered, one sentence takes the place of each part's.
     """
-    groups: list[tuple[Context, list[Picture | tuple[str, Shot]]]] = []
+    shots: list[Shot] = []
     for context in contexts:
-        wanted: list[Picture | tuple[str, Shot]] = []
-        for caption, make in context.get("pictures", ()):
+        for k, (caption, make) in enumerate(context.get("pictures", ())):
             try:
-                wanted.append((caption, make()))
+                shots.append(make())
+                context["pictures"][k] = (caption, len(shots) - 1)
             except InputError as error:
-                wanted.append(Picture(f"No picture: {caption}", str(error)))
-        groups.append((context, wanted))
-    shots = [one[1] for _, wanted in groups for one in wanted if not isinstance(one, Picture)]
+                context["pictures"][k] = Picture(f"No picture: {caption}", str(error))
     made = render_shots(shots, WIDTH, HEIGHT)
-    pixels = iter(() if isinstance(made, str) else made)
-    for context, wanted in groups:
-        said = [one for one in wanted if isinstance(one, Picture)]
+    for context in contexts:
+        wanted = context.get("pictures", [])
         if isinstance(made, str):
+            said = [one for one in wanted if isinstance(one, Picture)]
             context["pictures"] = said + [Picture("No pictures", made)] * (len(said) < len(wanted))
-        else:
-            context["pictures"] = [
-                one if isinstance(one, Picture) else Picture(one[0], one[1].says, _jpeg(next(pixels)))
-                for one in wanted
-            ]
+            continue
+        for k, one in enumerate(wanted):
+            if not isinstance(one, Picture):
+                caption, at = one
+                wanted[k] = Picture(caption, shots[at].says, _jpeg(made[at]))
 
 
 def _jpeg(pixels: Any) -> str:
@@ -245,34 +244,14 @@ def _jpeg(pixels: Any) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode("ascii")
 
 
-def _called(result: Result, results: Sequence[Result]) -> str:
+def _called(result: Result) -> str:
     if result.kind in ("estimate", "calibration"):
         return result.path.name
     return "the experiment" if result.kind == "paper" else f"the {result.kind}"
 
 
-def _provenance(made: Any) -> Context | None:
-    """How a result was made: facts, and lists of files."""
-    if not isinstance(made, Mapping):
-        return None
-    packages, options = made.get("packages"), made.get("options")
-    entries: list[tuple[str, str]] = [
-        ("command", _code(f"mocobot {made.get('command', '')}")),
-        ("mocobot", f"{made.get('mocobot', '')}"),
-        ("commit", _code(str(made.get("commit") or "not from a checkout"))),
-        ("Python", f"{made.get('python', '')} on {made.get('platform', '')}"),
-        ("packages", ", ".join(f"{k} {v}" for k, v in packages.items()) if isinstance(packages, Mapping) else ""),
-    ]  # fmt: skip
-    if isinstance(options, Mapping):
-        entries += [(f"option {name}", _code(_option(value))) for name, value in options.items()]
-    listed = [(title, made.get(key)) for key, title in (("files", "Made from"), ("written", "Written"))]
-    return {
-        "facts": entries,
-        "files": [(title, _files(of)) for title, of in listed if isinstance(of, list) and of],
-    }
-
-
 def _option(value: Any) -> str:
+    """The value of a command's option as people write it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
@@ -280,25 +259,16 @@ def _option(value: Any) -> str:
     return "none" if value is None else str(value)
 
 
-def _code(text: str) -> Markup:
-    return Markup("<code>{}</code>").format(text)
-
-
 def _files(listed: Iterable[Any]) -> list[list[Entry]]:
     """Name, size and hash of each."""
     rows: list[list[Entry]] = []
     for entry in listed:
         if isinstance(entry, Mapping):
-            count, digest = entry.get("bytes"), str(entry.get("sha256", ""))
+            count, name = entry.get("bytes"), str(entry.get("path", entry.get("name", "")))
             shown = Num(size(count) if isinstance(count, int) else "")
-            name = _code(str(entry.get("path", entry.get("name", ""))))
-            rows.append([name, shown, Markup('<span class="hash">{}</span>').format(digest)])
+            digest = Markup('<span class="hash">{}</span>').format(str(entry.get("sha256", "")))
+            rows.append([Markup("<code>{}</code>").format(name), shown, digest])
     return rows
-
-
-def _read(folder: Path, results: Iterable[Result]) -> list[list[Entry]]:
-    paths = dict.fromkeys(path for result in results for path in result.files)
-    return _files(file_facts(path) | {"path": path.relative_to(folder).as_posix()} for path in paths)
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.charts import Chart, Key, Trace, column_axis, dots, log_axis, rows_chart
+from mocobot_report.charts import Chart, Key, Trace, column_axis, dots, log_axis, row_layout
 from mocobot_report.folder import Paper, Result
 from mocobot_report.numbers import PLUS_MINUS, about, plain, spelled, spelled_text
 from mocobot_report.tables import Entry, Num, distance, mass, moment, place, quantity, value
@@ -236,11 +236,12 @@ def _summary_chart(table: PaperTable) -> Chart:
         text = [f"{key.label}, {name}: {plain(v)}" for name, v in zip(names, values, strict=True)]
         data.append(dots([*map(_drawn, values)], range(len(rows)), key, text, size=11))
         seen += map(_drawn, values)
-    return rows_chart(
+    left_px, font_px = (245, 8) if wide else (150, 10)
+    across = log_axis("largest error", seen)
+    return Chart(
         "Largest errors at a glance",
         "Largest error of every quantity, the paper's beside ours; the numbers are in the first table.",
-        data, names, log_axis("largest error", seen), row_px=30, left_px=245 if wide else 150, most=40,
-        font_px=8 if wide else 10, keys=legend,
+        data, keys=legend, **row_layout(names, across, row_px=30, left_px=left_px, most=40, font_px=font_px),
     )  # fmt: skip
 
 

@@ -24,12 +24,10 @@ from mocobot_report.charts import (
     line,
     log_axis,
     points_of_each,
-    rows_chart,
+    row_layout,
     rule,
-    runs,
     stacked_chart,
     thinned,
-    with_breaks,
 )
 from mocobot_report.folder import Diagnosed
 from mocobot_report.numbers import percent, plain, spelled
@@ -66,19 +64,18 @@ def residuals(found: Diagnosed, names: Sequence[str], say: Callable[[str], objec
     most, trials = points_of_each(len(traces)), []
     for trace, name in zip(traces, names, strict=True):
         say(f"residuals of {name}")
-        run = runs(trace.time[: trace.moving], 1.0 / trace.rate_hz)
         views = {"as simulated": trace.before} | ({"with the named causes": trace.after} if named else {})
         physical = [
             _physical(
                 f"{name}: residual {view}",
-                _channels(trace, values, grouped, units, run, most),
+                _channels(trace, values, grouped, units, most),
                 grouped,
                 named,
             )
             for view, values in views.items()
         ]
         trials.append(
-            {"name": name, "physical": physical, "multiples": _multiples(trace, name, grouped, run, named)}
+            {"name": name, "physical": physical, "multiples": _multiples(trace, name, grouped, named)}
         )
     say("dependence of the residual")
     keys = misfits(named=named, lines=True)
@@ -101,7 +98,7 @@ def _components(grouped: Sequence[Group]) -> list[Key]:
 
 
 def _channels(
-    trace: Trace, values: Array, grouped: Sequence[Group], units: Mapping[str, Shown], run: Array, most: int
+    trace: Trace, values: Array, grouped: Sequence[Group], units: Mapping[str, Shown], most: int
 ) -> list[Panel]:
     """One panel for each group of channels, with a band of clean data."""
     keys, n, panels = _components(grouped), trace.moving, []
@@ -109,8 +106,8 @@ def _channels(
         columns, (unit, scale) = list(group.columns), units[group.unit]
         largest = float(np.abs(trace.before[:, columns]).max(initial=0.0))
         limit = scale * 1.05 * max(largest, 2.5 * float(trace.sigma[:, columns].max(initial=0.0))) or scale
-        lines = _lines(trace, scale * values[:, columns], keys, run, most)
-        time, sigma = with_breaks(trace.time[:n], trace.sigma[:n, columns], run)
+        lines = _lines(trace, scale * values[:, columns], keys, most)
+        time, sigma = thinned(trace.time[:n], trace.sigma[:n, columns], 1.0 / trace.rate_hz, n)
         band = (time, 2.0 * scale * sigma.max(axis=1)) if n else None
         panels.append(Panel(group.name, spelled(unit), lines, (-limit, limit), band=band))
     return panels
@@ -123,10 +120,10 @@ def _physical(title: str, panels: Sequence[Panel], grouped: Sequence[Group], nam
     return stacked_chart(title, said, panels, keys=[*keys, BAND] if len(keys) > 1 else [BAND], note=note)
 
 
-def _lines(trace: Trace, values: Array, keys: Sequence[Key], run: Array, most: int) -> list[Line]:
+def _lines(trace: Trace, values: Array, keys: Sequence[Key], most: int) -> list[Line]:
     """Columns over time: the series as lines, means of holds as points."""
     n = trace.moving
-    time, shown = thinned(trace.time[:n], values[:n], run, most)
+    time, shown = thinned(trace.time[:n], values[:n], 1.0 / trace.rate_hz, most)
     columns = range(values.shape[1])
     lines = [Line(keys[k], time, shown[:, k]) for k in columns]
     if n < len(trace.time):
@@ -134,7 +131,7 @@ def _lines(trace: Trace, values: Array, keys: Sequence[Key], run: Array, most: i
     return lines
 
 
-def _multiples(trace: Trace, name: str, grouped: Sequence[Group], run: Array, named: bool) -> Chart:
+def _multiples(trace: Trace, name: str, grouped: Sequence[Group], named: bool) -> Chart:
     """Running rms of each group of channels over clean noise."""
     keys, panels = misfits(named=named, lines=True), []
     for group in grouped:
@@ -142,7 +139,7 @@ def _multiples(trace: Trace, name: str, grouped: Sequence[Group], run: Array, na
         for key, white in zip(keys, (trace.white_before, trace.white_after), strict=True):
             shown = multiples(trace, white, group.columns)
             top = max(top, float(shown.max(initial=0.0)))
-            lines += _lines(trace, shown[:, None], [key], run, 600)
+            lines += _lines(trace, shown[:, None], [key], 600)
         log = top > LOG_FROM
         limits = (0.4, top) if log else (0.0, max(2.0, 1.1 * top))
         panels.append(Panel(group.name, "× clean", lines, limits, rule=1.0, log=log))
@@ -225,7 +222,8 @@ def _misfit(
         data.append(dots(numbers, range(len(rows)), key, text))
         seen += numbers
     said = f"{title}: chi-square per number, before and after, one row each."
-    return rows_chart(title, said, data, names, log_axis("chi²/n", seen), rules=[1.0], keys=[*keys, CLEAN])
+    layout = row_layout(names, log_axis("chi²/n", seen), rules=[1.0])
+    return Chart(title, said, data, keys=[*keys, CLEAN], **layout)
 
 
 def _along(title: str, shares: Values, colour: str) -> Chart:
@@ -234,10 +232,11 @@ def _along(title: str, shares: Values, colour: str) -> Chart:
     more = {"cliponaxis": False, "textposition": "auto", "insidetextanchor": "end"}
     data = bars(list(shares.values()), Key("", "", colour, "band"), text, 0.62, **more)
     said = ", ".join(f"{name} {share}" for name, share in zip(shares, text, strict=True))
-    return rows_chart(
-        title, f"{title}: share of the squared residual along single sources: {said}", [data], list(shares),
-        axis("share of the misfit [%]", range=[0, 114.0 * max(shares.values())], nticks=5), row_px=30,
+    across = axis("share of the misfit [%]", range=[0, 114.0 * max(shares.values())], nticks=5)
+    return Chart(
+        title, f"{title}: share of the squared residual along single sources: {said}", [data],
         note="share of the squared residual along what one source alone can do; sources overlap, shares do not add up",
+        **row_layout(list(shares), across, row_px=30),
     )  # fmt: skip
 
 
@@ -274,7 +273,8 @@ def _strongest(title: str, entries: Sequence[Values], causes: Sequence[Values], 
             text = [f"{names[k]}: {plain(nats[k])} nats, named from {plain(needed[k], 2)}" for k in rows]
             data.append(dots([nats[k] for k in rows], rows, key, text))
     said = ", ".join(f"{name} {plain(n)}" for name, n in zip(names, nats, strict=True))
-    return rows_chart(
-        title, f"{title}: evidence of the strongest candidates in nats, {said}", data, names, across, left_px=190,
-        most=40, font_px=9, keys=[*keys, NEEDED] if causes else [NEEDED],
+    return Chart(
+        title, f"{title}: evidence of the strongest candidates in nats, {said}", data,
+        keys=[*keys, NEEDED] if causes else [NEEDED],
+        **row_layout(names, across, left_px=190, most=40, font_px=9),
     )  # fmt: skip

@@ -24,7 +24,7 @@ from estimator.strict import parse_json, read_json, read_toml
 from invented_calibration import invented_calibration
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
-from mocobot_report.calibration_plots import save_plots
+from mocobot_report.plots_calibration import save_plots
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 from mocobot_sim.scene.payload import load_payload
 from recordings import small_recording

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from discrepancy.numbers import fitting, one_each, parameter
 from discrepancy.result.pictures.residual_statistics import binned, running_rms, spectrum
 from discrepancy.result.traces import Trace
-from mocobot_report.charts import runs, thinned
+from mocobot_report.charts import thinned
 from mocobot_report.numbers import (
     about,
     measured,
@@ -118,8 +118,7 @@ def test_thinning_loses_no_spike(seed: int, columns: int, rows: int, most: int) 
     values = rng.standard_normal((rows, columns))
     values[rng.integers(rows), rng.integers(columns)] = 50.0
     time = np.arange(rows) * 0.01 + np.where(np.arange(rows) > rows // 2, 3.0, 0.0)
-    run = runs(time, 0.01)
-    kept, shown = thinned(time, values, run, most)
+    kept, shown = thinned(time, values, 0.01, most)
     assert len(kept) <= max(most, 2 * 2 * columns) + 6 or rows <= most + 1
     np.testing.assert_array_equal(np.nanmax(shown, axis=0), values.max(axis=0))
     np.testing.assert_array_equal(np.nanmin(shown, axis=0), values.min(axis=0))
