@@ -12,7 +12,7 @@ from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.calibrate.outcome.text import DEG, MASSES, SHOWN, alike, frames_sentence, shown_groups
 from mocobot_report.charts import Axis, Chart, Key, axis, bars, dots, log_axis, row_layout
 from mocobot_report.numbers import NONE, counted, kinds_of, percent, plain, short_names, with_error
-from mocobot_report.tables import Entry, Num, component, measurement, quantity, table
+from mocobot_report.tables import Entry, Num, measurement, table, vector
 
 if TYPE_CHECKING:
     from mocobot_report.folder import Result
@@ -58,9 +58,8 @@ def _tiles(c: Calibration) -> list[tuple[str, str, str]]:
         label = "" if payload.label is None else f" of payload ({payload.label})"
         out.append((f"mass{label}", with_error(found.mass_kg, found.mass_se_kg, "kg"), ""))
     for key in FITS:
-        pairs = [
-            pair for t in c.trials if t.payload is not None and (pair := getattr(t, key.group)) is not None
-        ]
+        pairs = [getattr(trial, key.group) for trial in c.trials if trial.payload is not None]
+        pairs = [pair for pair in pairs if pair is not None]
         means = [plain(float(np.mean([pair[k] for pair in pairs])), 3) for k in range(2)] if pairs else [NONE]
         out.append((f"chi²/n {key.label}", " / ".join(means), "loops / balance, mean of recordings"))
     return out
@@ -99,24 +98,17 @@ def payload_table(calibration: Calibration) -> Markup:
     """Mass, centre of mass, principal moments and grasps of every payload."""
     found = [carried(payload, calibration.scale_sd) for payload in calibration.payloads]
     rows: list[list[Entry]] = [["mass", "kg", *(measurement(f.mass_kg, f.mass_se_kg) for f in found)]]
-    for k, axis_name in enumerate("xyz"):
-        cells = (component(f.p_1c, f.p_1c_se_m, k, 1e3) for f in found)
-        rows.append([quantity(f"p_1c {axis_name}"), "mm", *cells])
-    for k in range(3):
-        cells = (component(f.principal.moments, f.principal.moments_se, k) for f in found)
-        rows.append([f"principal moment {k + 1}", "kg m²", *cells])
+    rows += vector("p_1c", "mm", [(f.p_1c, f.p_1c_se_m) for f in found], 1e3)
+    moments = [(f.principal.moments, f.principal.moments_se) for f in found]
+    rows += vector("principal moment", "kg m²", moments, parts="123")
     for j in range(2, calibration.robots + 1):
         pairs = [grasps_of(payload, calibration.scale_sd).pair(1, j) for payload in calibration.payloads]
-        for k, axis_name in enumerate("xyz"):
-            cells = (component(pair.p_ij, pair.p_se_m, k, 1e3) for pair in pairs)
-            rows.append([quantity(f"p_1{j} {axis_name}"), "mm", *cells])
-        for k, axis_name in enumerate("xyz"):
-            cells = (component(pair.axis_angle_rad, pair.axis_angle_se_rad, k, DEG) for pair in pairs)
-            rows.append([quantity(f"R_1{j} {axis_name}"), "deg", *cells])
+        rows += vector(f"p_1{j}", "mm", [(pair.p_ij, pair.p_se_m) for pair in pairs], 1e3)
+        rows += vector(
+            f"R_1{j}", "deg", [(pair.axis_angle_rad, pair.axis_angle_se_rad) for pair in pairs], DEG
+        )
     names = ["value" if p.label is None else f"payload ({p.label})" for p in calibration.payloads]
-    note = (
-        "± standard error; p_1c: centre of mass in {1}; p_12, R_12: place and rotation vector of {2} in {1}"
-    )
+    note = "± standard error; p_1c: centre of mass in {1}; p_12, R_12: place, rotation vector of {2} in {1}"
     return table("What was carried", ["", "unit", *names], rows, note=note)
 
 
@@ -157,14 +149,14 @@ def _deviations(calibration: Calibration, robot: int) -> Iterator[Deviation]:
             if se > 0:
                 # A zero of theta_x has no prior in the fit itself; parallel flanges take that of the other encoders.
                 known = float(prior) or calibration.prior.encoder_zero_rad
-                yield Deviation(
-                    row, f"{shown.name} {entry}", shown.unit, shown.scale, float(value), float(se), known
-                )
+                name, numbers = f"{shown.name} {entry}", (float(value), float(se), known)
+                yield Deviation(row, name, shown.unit, shown.scale, *numbers)
 
 
-def _of_robots(
-    c: Calibration, words: tuple[str, str, str], across: Axis, rules: Sequence[float], of: "Of"
-) -> Chart:
+Of = Callable[[Deviation], tuple[float, float, str]]
+
+
+def _of_robots(c: Calibration, words: Sequence[str], across: Axis, rules: Sequence[float], of: Of) -> Chart:
     """A row for each kind of deviation with a dot for each of every robot; ``of`` gives x, half a bar, and a text."""
     names, data = kind_names([group.name for group in shown_groups(c)]), []
     keys = [Key(f"r{k + 1}", f"robot {k + 1}", COLOURS[k % len(COLOURS)], "circle") for k in range(c.robots)]
@@ -179,9 +171,6 @@ def _of_robots(
     layout = row_layout(names, across, rules=rules, row_px=50, left_px=178, most=30)
     title, label, note = words
     return Chart(title, label, data, keys=[*keys, ASSUMED], note=note, **layout)
-
-
-Of = Callable[[Deviation], tuple[float, float, str]]
 
 
 def _deviation_chart(c: Calibration) -> Chart:
@@ -219,9 +208,8 @@ def _fit_charts(calibration: Calibration) -> list[Chart]:
     """chi²/n of every recording: loops, balance."""
     short = short_names([trial.name for trial in calibration.trials])
     charts = []
-    for kind, title in enumerate(
-        ("Loops: where robots have each other's grasps", "Balance: wrenches and motion")
-    ):
+    titles = ("Loops: where robots have each other's grasps", "Balance: wrenches and motion")
+    for kind, title in enumerate(titles):
         there = [k for k, trial in enumerate(calibration.trials) if trial.count[kind]]
         names = [short[k] for k in there]
         data, seen = [], [1.0]

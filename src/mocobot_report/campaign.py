@@ -9,12 +9,11 @@ if TYPE_CHECKING:
     from mocobot_report.folder import Result
 
 BACKGROUNDS = {
-    "calibrated": "Calibrated robots",
-    "uncalibrated": "Uncalibrated robots",
-    "units": "The given robots",
+    "calibrated": ("Calibrated robots", "after", "circle"),
+    "uncalibrated": ("Uncalibrated robots", "before", "square"),
+    "units": ("The given robots", "after", "circle"),
 }
-COLOURS = {"calibrated": "after", "uncalibrated": "before", "units": "after"}
-SYMBOLS = {"calibrated": "circle", "uncalibrated": "square", "units": "circle"}
+"""What robots they are, their colour and marker."""
 APART = 1.03
 """By how much a background's points are moved to the right, so that bars do not hide each other."""
 Json = Mapping[str, Any]
@@ -47,7 +46,7 @@ def sentences(summary: Json) -> list[str]:
 
 def background_words(background: str) -> str:
     """What robots they are."""
-    return BACKGROUNDS[background]
+    return BACKGROUNDS[background][0]
 
 
 def share_words(share: Json) -> str:
@@ -70,11 +69,8 @@ def tables(summary: Json) -> list[tuple[str, list[str], list[list[str]]]]:
             "Found, by size over the detection limit (95 % interval)",
             ["robots", "size", "cause and place", "cause", "missed", "something besides"],
             [
-                [
-                    entry["background"],
-                    f"{entry['factor']:g}",
-                    *(share_words(entry[k]) for k in ("right", "cause", "missed", "extras")),
-                ]
+                [entry["background"], f"{entry['factor']:g}",
+                 *(share_words(entry[k]) for k in ("right", "cause", "missed", "extras"))]
                 for entry in summary["found"]
             ],
         ),
@@ -162,7 +158,7 @@ def _found_chart(values: Json) -> Chart:
     keys, data = [], []
     for k, background in enumerate(dict.fromkeys(entry["background"] for entry in values["found"])):
         own = [entry for entry in values["found"] if entry["background"] == background]
-        key = Key(background, background_words(background), COLOURS[background], SYMBOLS[background])
+        key = Key(background, *BACKGROUNDS[background])
         text = [f"{entry['factor']:g} times the limit: {share_words(entry['right'])}" for entry in own]
         keys.append(key)
         data.append(_shares([entry["factor"] * APART**k for entry in own], own, key, text))

@@ -42,9 +42,7 @@ class Chart:
     height: int  # [px]
     keys: Sequence[Key] = ()
     note: str = ""  # below the title
-    narrow: Mapping[str, float] = field(
-        default_factory=dict
-    )  # what changes in the layout on phones, by dotted path
+    narrow: Mapping[str, float] = field(default_factory=dict)  # on phones, by dotted path in the layout
 
     def to_json(self) -> dict[str, Any]:
         """For the page's script; arrays that traces share as ``x`` stand in ``arrays``, once."""
@@ -190,9 +188,7 @@ class Panel:
     unit: str
     lines: Sequence[Line]
     limits: tuple[float, float] | None = None  # of the vertical axis; None for all that there is
-    band: tuple[Array, Array] | None = (
-        None  # times and half heights around zero, shape (n,) each; NaN breaks it
-    )
+    band: tuple[Array, Array] | None = None  # times and half heights, shape (n,) each; NaN breaks it
     rule: float | None = None  # where a dashed line runs
     log: bool = False  # a logarithmic axis from the lower limit on
 
@@ -202,17 +198,9 @@ def stacked_chart(
 ) -> Chart:
     """Panels above each other over one time axis [s]; zooming one in time zooms all."""
     names = [f"y{k}" if k > 1 else "y" for k in range(1, len(panels) + 1)]
-    layout: dict[str, Any] = {
-        "grid": {
-            "rows": len(panels),
-            "columns": 1,
-            "subplots": [[f"x{name}"] for name in names],
-            "ygap": 0.15,
-        },
-        "xaxis": axis("time [s]", anchor=names[-1], zeroline=False),
-        "margin": {"l": 74},
-        "shapes": [],
-    }
+    grid = {"rows": len(panels), "columns": 1, "ygap": 0.15, "subplots": [[f"x{name}"] for name in names]}
+    across = axis("time [s]", anchor=names[-1], zeroline=False)
+    layout: dict[str, Any] = {"grid": grid, "xaxis": across, "margin": {"l": 74}, "shapes": []}
     data = []
     for name, panel in zip(names, panels, strict=True):
         layout[f"yaxis{name[1:]}"] = _vertical(panel)

@@ -116,9 +116,8 @@ def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
 def _is_robot(result: Result) -> bool:
     """Whether logs of one robot's joints were diagnosed, not a team's recordings."""
     options = (result.provenance or {}).get("options")
-    return is_of_joints(result.found.values) or (
-        isinstance(options, dict) and options.get("model") is not None
-    )
+    named = isinstance(options, dict) and options.get("model") is not None
+    return named or is_of_joints(result.found.values)
 
 
 def _title(values: Values, *, robot: bool) -> str:
@@ -154,10 +153,8 @@ def _said(values: Values) -> dict[str, Any]:
     if values["causes"]:
         return {"list": [sentence_of(cause) for cause in values["causes"]], "then": ""}
     if values["verdict"] == "miscalibrated":
-        return {
-            "list": [tidy(entry["sentence"]) for entry in values["scatter"]],
-            "then": tidy(remedy(values)),
-        }
+        listed = [tidy(entry["sentence"]) for entry in values["scatter"]]
+        return {"list": listed, "then": tidy(remedy(values))}
     if values["verdict"] != "consistent" and not values["remains"]:
         return {"list": [], "then": tidy(values["residual"]["nominal"]["signature"]["sentence"])}
     return {"list": [], "then": ""}
@@ -235,9 +232,8 @@ def _causes(causes: Sequence[Values]) -> dict[str, Any]:
 def _parameter(cause: Values, name: str) -> tuple[str, str]:
     """A parameter's name in words and its unit: a law brings its own, others carry theirs in the name."""
     law = cause.get("law")
-    return (
-        parameter(name) if law is None else (name.removesuffix("_rad").replace("_", " "), law["units"][name])
-    )
+    words = name.removesuffix("_rad").replace("_", " ")
+    return parameter(name) if law is None else (words, law["units"][name])
 
 
 def _rivals(causes: Sequence[Values]) -> tuple[Rows, Rows, list[str]]:
@@ -349,9 +345,8 @@ def _heads(shown: Collection[str]) -> list[str]:
 
 def _errors(errors: Values, shown: Collection[str]) -> dict[str, Any]:
     parts = {key: name.rstrip("]").split(" [") for key, name in ERRORS.items()}
-    rows = [
-        [name[0], name[-1], *(value(errors[which][key], 3) for which in shown)] for key, name in parts.items()
-    ]
+    cells = {key: [value(errors[which][key], 3) for which in shown] for key in parts}
+    rows = [[name[0], name[-1], *cells[key]] for key, name in parts.items()]
     return {"head": ["error of", "unit", *_heads(shown)], "rows": rows}
 
 
@@ -453,33 +448,23 @@ def _free(rolled: Values) -> dict[str, Any]:
     rows: Rows = []
     for j in range(len(rolled["joints"])):
         for k, horizon in enumerate(rolled["horizons"]):
-            sides = [side and side["rms"] for side in (horizon["before"], horizon["after"])]
-            name, *errors = _joint_row(rolled, j, *sides, horizon["removed"])
-            rows.append(
-                ["" if k else name, value(horizon["seconds"], 2), *errors, Num(str(horizon["starts"]))]
-            )
+            before, after = (side and side["rms"] for side in (horizon["before"], horizon["after"]))
+            name, *errors = _joint_row(rolled, j, before, after, horizon["removed"])
+            starts = Num(str(horizon["starts"]))
+            rows.append(["" if k else name, value(horizon["seconds"], 2), *errors, starts])
     said = f"From measured states the model is let go under the logged torques, {blocks(rolled)}."
-    heads = _errors_heads(rolled["horizons"][0]["after"])
-    return {
-        "said": tidy(" ".join([said, *more])),
-        "head": ["joint", "ahead [s]", *heads, "starts"],
-        "rows": rows,
-    }
+    head = ["joint", "ahead [s]", *_errors_heads(rolled["horizons"][0]["after"]), "starts"]
+    return {"said": tidy(" ".join([said, *more])), "head": head, "rows": rows}
 
 
 def _commanded(rolled: Values, loop: Values) -> dict[str, Any]:
-    sides, count = (loop["before"], loop["after"], loop["removed"]), len(loop["blocks"])
-    gone = [
-        (word, lost(loop["blocks"], which)) for which, word in (("before", "given"), ("after", "extended"))
-    ]
-    missing = [
-        f"of the {word} model {n} of {count} blocks diverged and are left out" for word, n in gone if n
-    ]
-    return {
-        "head": ["joint", *_errors_heads(loop["after"])],
-        "rows": [_joint_row(rolled, j, *sides) for j in range(len(rolled["joints"]))],
-        "note": "; ".join(["rms over the blocks under their logged commands", *missing]),
-    }
+    joints, ran = range(len(rolled["joints"])), loop["blocks"]
+    note = "rms over the blocks under their logged commands"
+    for which, word in (("before", "given"), ("after", "extended")):
+        if gone := lost(ran, which):
+            note += f"; of the {word} model {gone} of {len(ran)} blocks diverged and are left out"
+    rows = [_joint_row(rolled, j, loop["before"], loop["after"], loop["removed"]) for j in joints]
+    return {"head": ["joint", *_errors_heads(loop["after"])], "rows": rows, "note": note}
 
 
 def _errors_heads(after: Any) -> list[str]:
@@ -487,11 +472,11 @@ def _errors_heads(after: Any) -> list[str]:
 
 
 def _joint_row(rolled: Values, j: int, before: Any, after: Any, removed: Any) -> list[Entry]:
-    """A joint's name, its errors of both models, and the share that is removed; only errors where nothing is named."""
+    """A joint's name and errors, and where something is named the share that is removed."""
     unit, scale = shown_units(rolled)[rolled["units"][j]]
-    sides = [side[j] for side in (before, after) if side is not None]
+    sides = [side and side[j] for side in ([before] if after is None else [before, after])]
     errors = [value(None if side is None else scale * side, 3) for side in sides]
-    share = [] if removed is None else [Num(percent(removed[j]))]
+    share = [] if after is None else [Num(percent(removed and removed[j]))]
     return [f"{rolled['joints'][j]} [{spelled_text(unit)}]", *errors, *share]
 
 

@@ -42,10 +42,9 @@ from mocobot_report.tables import (
     distance,
     mass,
     measurement,
-    moment,
-    place,
     quantity,
     value,
+    vector,
 )
 from mocobot_sim.paper.scoring import rotation_error_deg
 from mocobot_view.facts.body_facts import BodyFacts
@@ -140,18 +139,14 @@ def _missing(e: PayloadEstimate) -> list[str]:
 
 def _payload(e: PayloadEstimate) -> Rows:
     rows: Rows = [["mass", "kg", mass(e)]]
-    rows += [[quantity(f"p_1c {name}"), "mm", place(e, k)] for k, name in enumerate("xyz")]
+    rows += vector("p_1c", "mm", [(e.p_1c, e.p_1c_se_m)], 1e3)
     if e.inertia is None:
         return [*rows, ["inertia", "kg m²", Num(NONE)]]
     se, p = np.sqrt(np.diag(e.inertia.covariance)), e.inertia.principal
     for k, (a, b, name) in enumerate(ORDER):
         rows.append([quantity(f"I_{name}"), "kg m²", measurement(float(e.inertia.inertia[a, b]), se[k])])
-    rows += [[f"principal moment {k + 1}", "kg m²", moment(e, k)] for k in range(3)]
-    for k, name in enumerate("xyz"):
-        rows.append(
-            [quantity(f"R_1c {name}"), "deg", component(p.axis_angle_rad, p.axis_angle_se_rad, k, DEG)]
-        )
-    return rows
+    rows += vector("principal moment", "kg m²", [(p.moments, p.moments_se)], parts="123")
+    return rows + vector("R_1c", "deg", [(p.axis_angle_rad, p.axis_angle_se_rad)], DEG)
 
 
 def _grasps(e: PayloadEstimate) -> tuple[Rows, Rows]:
@@ -190,9 +185,7 @@ def _steps(e: PayloadEstimate) -> Rows:
     ]  # fmt: skip
 
 
-def _pictures(
-    found: Sequence[Source], e: PayloadEstimate, truth: BodyFacts | None
-) -> list[tuple[str, Callable[[], Any]]]:
+def _pictures(found: Sequence[Source], e: PayloadEstimate, truth: BodyFacts | None) -> list[Any]:
     """The team at one instant of the first recording that is still there."""
     for source in found:
         with contextlib.suppress(InputError):
@@ -213,9 +206,7 @@ def _errors(e: PayloadEstimate, truth: BodyFacts) -> Rows:
     """Truth, error, error in percent and in standard errors, for every number that both have."""
     rows: Rows = []
 
-    def row(
-        name: str, unit: str, true: float, found: tuple[Any, Any, int], scale: float = 1.0, of: float = 0.0
-    ) -> None:
+    def row(name: str, unit: str, true: float, found: tuple, scale: float = 1.0, of: float = 0.0) -> None:
         values, errors, k = found
         shown = [Num(NONE), Num(NONE), Num(NONE)]
         if values is not None and errors is not None:
@@ -238,15 +229,9 @@ def _errors(e: PayloadEstimate, truth: BodyFacts) -> Rows:
         assert truth.grasps is not None
         true, pair = truth.grasps.p_1i[j - 1], None if e.grasps is None else e.grasps.pair(1, j)
         length = float(np.linalg.norm(true))
+        places = (None, None) if pair is None else (pair.p_ij, pair.p_se_m)
         for k, name in enumerate("xyz"):
-            row(
-                f"p_1{j} {name}",
-                "mm",
-                float(true[k]),
-                (pair and pair.p_ij, pair and pair.p_se_m, k),
-                1e3,
-                length,
-            )
+            row(f"p_1{j} {name}", "mm", float(true[k]), (*places, k), 1e3, length)
         if e.grasps is not None:
             angle = rotation_error_deg(truth.grasps.R_1i[j - 1], e.grasps.R_1i[j - 1])
             rows.append([quantity(f"R_1{j}"), "deg", Num(NONE), value(angle, 2), Num(NONE), Num(NONE)])
@@ -279,7 +264,7 @@ def _moment_chart(e: PayloadEstimate, truth: BodyFacts | None) -> Chart | None:
     rows = [(name, p.moments, p.moments_se) for name, p in ({"pooled": pooled} | found).items()]
     title = "Principal moments of inertia against the pooled estimate"
     label = (
-        "Each recording's own principal moments of inertia relative to the pooled ones, with standard errors."
+        "Each recording's own principal moments of inertia relative to the pooled ones, with their errors."
     )
     return _pooled_chart((title, label, "kg m²"), rows, MOMENTS, 100.0 / pooled.moments, extra)
 
@@ -294,9 +279,7 @@ def _grasp_charts(e: PayloadEstimate) -> list[Chart]:
         pairs = {name: grasps.pair(1, j) for name, grasps in ({"pooled": e.grasps} | found).items()}
         rows = [(name, 1e3 * pair.p_ij, 1e3 * pair.p_se_m) for name, pair in pairs.items()]
         title = f"Position of grasp {j} in {{1}} against the pooled estimate"
-        label = (
-            f"Each recording's own position of grasp {j} relative to the pooled one, with standard errors."
-        )
+        label = f"Each recording's own position of grasp {j} relative to the pooled one, with its errors."
         charts.append(_pooled_chart((title, label, "mm"), rows, AXES, np.ones(3)))
     return charts
 

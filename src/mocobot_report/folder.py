@@ -183,6 +183,12 @@ READERS: Mapping[str, Callable[[Path, Json], Result]] = {
 }  # fmt: skip
 
 
+INCOMPLETE = (
+    LookupError, TypeError, ValueError, AttributeError, OverflowError, StopIteration, UndefinedError,
+)  # fmt: skip
+"""What reading values raises where one is missing or of another kind."""
+
+
 @contextmanager
 def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
     """A block that reads a file's values; where one is missing or of another kind, the file is what is wrong.
@@ -192,15 +198,7 @@ def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
     """
     try:
         yield
-    except (
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        OverflowError,
-        StopIteration,
-        UndefinedError,
-    ) as error:
+    except INCOMPLETE as error:
         text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) and error.args else str(error)
         words = " ".join(text.split())[:120] or type(error).__name__
         raise InputError(f"{path}: {otherwise} ({words})") from error

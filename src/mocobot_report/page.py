@@ -120,9 +120,8 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
         name = f"{result.kind.capitalize()} {result.path.name}" if several else IN_DETAIL[result.kind]
         page.parts.append(_Part(page.identity(result.kind), name))
         with complete(result.path):
-            module: Any = (
-                templates().get_template(f"{result.kind}.html").make_module(context | {"page": page})
-            )
+            part = templates().get_template(f"{result.kind}.html")
+            module: Any = part.make_module(context | {"page": page})
             page.parts[-1].content = module.sections()
             heading = f"{context['title']}: {result.path.name}" if several else context["title"]
             answers += Markup("<h2>{}</h2>").format(heading) if len(results) > 1 else ""
@@ -274,9 +273,8 @@ def _files(listed: Iterable[Any]) -> list[list[Entry]]:
 @cache
 def terms() -> list[dict[str, Any]]:
     """The glossary of ``assets/glossary.toml``, with an id for each term."""
-    found = tomllib.loads(
-        files("mocobot_report").joinpath("assets/glossary.toml").read_text(encoding="utf-8")
-    )["term"]
+    file = files("mocobot_report").joinpath("assets/glossary.toml")
+    found = tomllib.loads(file.read_text(encoding="utf-8"))["term"]
     filled = {"{clean_chi2}": f"{SETTINGS.clean_chi2:g}", "{named}": f"{100 * SETTINGS.named:g}"}
     for term in found:
         term["id"] = "term-" + re.sub(r"[^a-z]+", "-", term["name"].lower()).strip("-")
@@ -307,9 +305,8 @@ def link_terms(html: Markup) -> Markup:
         if term["id"] in done:
             return match[0]
         done.add(term["id"])
-        return Markup('<a href="#{}" title="{}" class="term">{}</a>').format(
-            term["id"], term["meaning"], Markup(match[0])
-        )
+        marked = Markup('<a href="#{id}" title="{meaning}" class="term">{text}</a>')
+        return marked.format(**term, text=Markup(match[0]))
 
     pieces, inside = re.split(r"(<[^>]*>)", html), ""
     for k, piece in enumerate(pieces):

@@ -126,9 +126,8 @@ def _trust(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     """Whether the simulated physics held in all trials; None where nothing says so."""
     if not trials:
         return None
-    rod, weld, angle = (
-        max(t[key] for t in trials) for key in ("rod_error_m", "weld_error_m", "weld_error_deg")
-    )
+    worst = {key: max(t[key] for t in trials) for key in ("rod_error_m", "weld_error_m", "weld_error_deg")}
+    rod, weld, angle = worst.values()
     most_deg = float(np.rad2deg(WELD_LIMIT_RAD))
     return {
         "good": rod <= ROD_LIMIT_M and weld <= WELD_LIMIT_M and angle <= most_deg,

@@ -66,17 +66,11 @@ def residuals(found: Diagnosed, names: Sequence[str], say: Callable[[str], objec
         say(f"residuals of {name}")
         views = {"as simulated": trace.before} | ({"with the named causes": trace.after} if named else {})
         physical = [
-            _physical(
-                f"{name}: residual {view}",
-                _channels(trace, values, grouped, units, most),
-                grouped,
-                named,
-            )
+            _physical(f"{name}: residual {view}", _channels(trace, values, grouped, units, most), grouped, named)
             for view, values in views.items()
-        ]
-        trials.append(
-            {"name": name, "physical": physical, "multiples": _multiples(trace, name, grouped, named)}
-        )
+        ]  # fmt: skip
+        whitened = _multiples(trace, name, grouped, named)
+        trials.append({"name": name, "physical": physical, "multiples": whitened})
     say("dependence of the residual")
     keys = misfits(named=named, lines=True)
     shown_in = QUANTITIES | (OF_JOINTS if is_of_joints(found.values) else {})
@@ -209,10 +203,8 @@ def places(values: Values, names: Sequence[str]) -> dict[str, Any]:
     return {"charts": charts, "said": before["sentence"]}
 
 
-def _misfit(
-    title: str, before: Values, after: Values, shown: Mapping[str, str], keys: Sequence[Key]
-) -> Chart:
-    """chi²/n of every channel or trial, before and after."""
+def _misfit(title: str, before: Values, after: Values, shown: Values, keys: Sequence[Key]) -> Chart:
+    """chi²/n of every channel or trial, before and after, by the names that are shown for some."""
     rows = list(before)
     names = [shown.get(row, row) for row in rows]
     data, seen = [], [1.0]
@@ -250,15 +242,11 @@ RELATIONS = (
 
 def evidence(values: Values) -> list[Chart]:
     """The evidence for the strongest candidates, before and after what is named is in the model; on one scale."""
-    panels = {
-        "Nothing is named yet": drawn(values["evidence"]["before"] or []),
-        "What is named is in the model": drawn(values["evidence"]["after"] or []),
-    }
-    seen = [entry[key] for entries in panels.values() for entry in entries for key in ("nats", "needed")]
+    titles = {"before": "Nothing is named yet", "after": "What is named is in the model"}
+    panels = [(title, drawn(values["evidence"][key] or [])) for key, title in titles.items()]
+    seen = [entry[key] for _, entries in panels for entry in entries for key in ("nats", "needed")]
     across = log_axis("evidence [nats]", seen)
-    return [
-        _strongest(title, entries, values["causes"], across) for title, entries in panels.items() if entries
-    ]
+    return [_strongest(title, entries, values["causes"], across) for title, entries in panels if entries]
 
 
 def _strongest(title: str, entries: Sequence[Values], causes: Sequence[Values], across: Axis) -> Chart:

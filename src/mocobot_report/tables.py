@@ -52,15 +52,9 @@ def templates() -> Environment:
 
 
 def table(
-    caption: str,
-    head: Sequence[str],
-    rows: Sequence[Sequence[Entry]],
-    *,
-    note: str = "",
-    headers: int = 1,
-    groups: bool = False,
-    stack: bool = False,
-) -> Markup:
+    caption: str, head: Sequence[str], rows: Sequence[Sequence[Entry]], *, note: str = "", headers: int = 1,
+    groups: bool = False, stack: bool = False,
+) -> Markup:  # fmt: skip
     """A table in a box of its own that scrolls if it is too wide.
 
     A column ``unit`` right after the row headers is written behind them, so that narrow screens show the numbers.
@@ -124,6 +118,17 @@ def component(values: ArrayLike | None, errors: ArrayLike | None, k: int, scale:
     if values is None or errors is None:
         return Num(NONE)
     return measurement(scale * float(np.asarray(values)[k]), scale * float(np.asarray(errors)[k]))
+
+
+def vector(
+    name: str, unit: str, found: Sequence[tuple[ArrayLike | None, ArrayLike | None]], scale: float = 1.0,
+    parts: str = "xyz",
+) -> list[list[Entry]]:  # fmt: skip
+    """Three rows: a component's name, the unit, and the component of every measured vector and error in ``found``."""
+    return [
+        [quantity(f"{name} {part}"), unit, *(component(values, errors, k, scale) for values, errors in found)]
+        for k, part in enumerate(parts)
+    ]
 
 
 def mass(e: PayloadEstimate) -> Num:

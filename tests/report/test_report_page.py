@@ -406,23 +406,37 @@ def test_shares_of_causes_add_up_and_no_probability_is_one(tmp_path: Path) -> No
     assert "probability > 99.9 % that it is this cause" in text
 
 
-def test_a_number_of_a_form_that_a_cause_does_not_have_is_left_out(tmp_path: Path) -> None:
-    folder = diagnosis_folder(tmp_path / "one")
-    for value, shown in ((0.0, False), (0.002, True)):
-        entry = {"presliding_rad": {"value": value, "se": None}}
-        edit(folder, lambda values, entry=entry: values["causes"][0]["parameters"].update(entry))
-        assert ("presliding" in written(folder).rows()) == shown
+def presliding(value: float) -> Callable[[dict], None]:
+    return lambda values: values["causes"][0]["parameters"].update(
+        presliding_rad={"value": value, "se": None}
+    )
 
 
-def test_models_to_take_away_are_told_where_they_are(tmp_path: Path) -> None:
-    folder = diagnosis_folder(tmp_path / "one")
-    assert "--model as_found" not in written(folder).rows()
+def as_found(folder: Path) -> Path:
     (folder / "as_found").mkdir()
     (folder / "as_found" / "team.xml").write_text("<mujoco/>")
-    text = written(folder).rows()
-    for name in ("extended", "as_found"):
-        assert f"mocobot simulate --model {name}" in text
-        assert f"{name}/team.xml" in text
+    return folder
+
+
+SLIPPED = "The encoder of phi2 of robot 3 slipped by 1.2 deg."
+FAR = "Zero of a gimbal axis: farthest off are robot 2, joint 3 (−9.1 mrad), robot 1, joint 1 (7.2 mrad)"
+KNOWN = ("What it is worth to know the robots", "The payload's estimate before and after")
+EXTENDED = ("mocobot simulate --model extended", "extended/team.xml")
+SAYS = {
+    "a form that a cause has not": (lambda f: edit(diagnosis_folder(f), presliding(0.0)), (), "presliding"),
+    "a form that it has": (lambda f: edit(diagnosis_folder(f), presliding(0.002)), ("presliding",), ""),
+    "models to take away": (diagnosis_folder, EXTENDED, "--model as_found"),
+    "as found": (lambda f: as_found(diagnosis_folder(f)), (*EXTENDED, "--model as_found", "as_found/team.xml"), ""),
+    "places that scatter": (lambda f: diagnosis_folder(f, "miscalibrated"), (FAR, *KNOWN), ""),
+    "findings": (lambda f: calibration_folder(f, (SLIPPED,)), (SLIPPED, "What speaks"), "Nothing speaks"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "said", "unsaid"), SAYS.values(), ids=SAYS)
+def test_page_says(make: Callable[[Path], Path], said: tuple[str, ...], unsaid: str, tmp_path: Path) -> None:
+    text = written(make(tmp_path / "result")).rows()
+    assert [words for words in said if words not in text] == []
+    assert not unsaid or unsaid not in text
 
 
 def test_what_fits_much_worse_is_folded_away_and_parts_as_found_are_told(tmp_path: Path) -> None:
@@ -505,22 +519,6 @@ def test_numbers_of_a_calibration_are_in_its_page(pages: dict[str, Reader], fold
     (block,) = [b for b in pages["calibration"].blocks.values() if b["data"][0].get("type") == "bar"]
     np.testing.assert_allclose(np.sum([trace["x"] for trace in block["data"]], axis=0), 100.0)
     assert len(block["data"]) == 5
-
-
-def test_findings_of_a_calibration_come_first(tmp_path: Path) -> None:
-    slipped = "The encoder of phi2 of robot 3 slipped by 1.2 deg."
-    text = written(calibration_folder(tmp_path / "bad", (slipped,))).rows()
-    assert "What speaks against these numbers" in text
-    assert slipped in text
-    assert "Nothing speaks against" not in text
-
-
-def test_places_of_a_kind_that_scatters_are_told(tmp_path: Path) -> None:
-    text = written(diagnosis_folder(tmp_path / "diagnosis", "miscalibrated")).rows()
-    far = "Zero of a gimbal axis: farthest off are robot 2, joint 3 (−9.1 mrad), robot 1, joint 1 (7.2 mrad)"
-    assert far in text
-    assert "What it is worth to know the robots" in text
-    assert "The payload's estimate before and after" in text
 
 
 def test_rollouts_have_every_joint(tmp_path: Path) -> None:
