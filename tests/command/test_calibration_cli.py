@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -62,7 +63,7 @@ def test_self_calibrate(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     found = mocobot.read_estimate(target)
     assert found.method == "calibrated"
     assert found.p_1c == pytest.approx(COM, abs=3e-4)
-    told = write_report(tmp_path).read_text(encoding="utf-8")
+    told = html.unescape(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "in one least squares with the robots' own calibration" in told
 
 
