@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
+import mocobot_report
 from discrepancy.cause_names import JOINTS, TEAM, excluded_from
 from estimator.errors import InputError
 from estimator.files import check_place, holds
@@ -27,7 +28,6 @@ from mocobot.files.targets import (
 )
 from mocobot.options import Kind
 from mocobot_logs.formats import output_kind
-from mocobot_report import sought
 from mocobot_sim.effect_names import check_effect_name
 from mocobot_sim.scene.models import payload_path, truth_path
 
@@ -281,8 +281,8 @@ def check_report(options: opt.Report) -> None:
     """A folder that is none, and a page that may not be written, or cannot."""
     if options.dir.is_file() and options.dir.suffix != ".json":
         return  # the command finds out what kind of file it is
-    sought.check_folder(options.dir)
-    check_output(options.out or options.dir / sought.NAME, force=options.force, suffix=sought.SUFFIX)
+    mocobot_report.check_folder(options.dir)
+    check_output(options.out or options.dir / mocobot_report.NAME, force=options.force, suffix=mocobot_report.SUFFIX)
 
 
 def check_compare(options: opt.Compare) -> None:

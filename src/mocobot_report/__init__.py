@@ -1,1 +1,26 @@
-"""One HTML page from the files that a result folder holds: tables, plots, pictures and provenance, for a colleague."""
+"""One HTML page of a result folder: what it is made of, and what it is called."""
+
+from pathlib import Path
+
+from estimator.errors import InputError
+from estimator.files import system_errors
+
+NAME, SUFFIX = "report.html", ".html"
+CAMPAIGN_FORMAT = "mocobot-campaign"
+SOUGHT = (
+    "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of "
+    "`mocobot calibrate --out`, campaign.json of `mocobot campaign --out`, or JSON files of `mocobot estimate --out`"
+)
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse what is no folder.
+
+    Raises:
+        InputError: there is none, or it is a file.
+    """
+    with system_errors(folder, "read"):
+        if not folder.exists():
+            raise InputError(f"{folder}: there is no such folder; it must hold {SOUGHT}")
+        if not folder.is_dir():
+            raise InputError(f"{folder}: is a file; name the folder that holds it")

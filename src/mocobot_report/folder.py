@@ -1,10 +1,12 @@
-"""What a folder holds that a report can be made of."""
+"""What a folder holds that a report can be made of, and the recordings that it was made from."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from jinja2 import UndefinedError
 
 from discrepancy.channel import Channel
 from discrepancy.result.read import FORMAT as DIAGNOSIS
@@ -13,7 +15,6 @@ from discrepancy.result.report import format_verdict
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import load_traces
-from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.json import FORMAT as CALIBRATION
 from estimator.calibrate.json import calibration_from_dict
 from estimator.errors import InputError
@@ -21,152 +22,100 @@ from estimator.estimate.result import FORMAT as ESTIMATE
 from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import system_errors
+from estimator.inputs import file_sha256
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 from estimator.strict import Fields, is_number, read_json
-from mocobot_report.campaign.words import FORMAT as CAMPAIGN
-from mocobot_report.sought import SOUGHT, check_folder
+from mocobot_report import CAMPAIGN_FORMAT as CAMPAIGN
+from mocobot_report import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
 
+KINDS = ("paper", "estimate", "calibration", "diagnosis", "campaign")
+"""Kinds of results, in the order of a page."""
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
 Json = dict[str, Any]
 
 
 @dataclass(frozen=True)
+class Result:
+    """One result of a folder."""
+
+    kind: str  # one of KINDS
+    path: Path
+    found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, or a campaign's summary
+    provenance: Json | None  # how it was made
+    files: tuple[Path, ...]  # that it was read from
+
+
+@dataclass(frozen=True)
 class Paper:
-    """What ``mocobot paper --out`` wrote.
+    """What ``mocobot paper --out`` wrote."""
 
-    Attributes:
-        scores: by preset, then payload.
-        trials: summaries of the simulated trials; empty where there are none.
-        estimates: by (payload, preset), those that are there.
-        provenance: of the run, or None.
-    """
-
-    scores: Mapping[str, Mapping[str, Any]]
-    trials: tuple[Json, ...]
-    estimates: Mapping[tuple[str, str], PayloadEstimate]
-    provenance: Json | None
-
-
-@dataclass(frozen=True)
-class Estimated:
-    """One file of ``mocobot estimate --out``."""
-
-    path: Path
-    estimate: PayloadEstimate
-    provenance: Json | None
-
-
-@dataclass(frozen=True)
-class Calibrated:
-    """What ``mocobot calibrate --out`` wrote."""
-
-    path: Path
-    calibration: Calibration
-    provenance: Json | None
+    scores: Mapping[str, Mapping[str, Any]]  # by preset, then payload
+    trials: tuple[Json, ...]  # summaries of the simulated trials; empty where there are none
+    estimates: Mapping[tuple[str, str], PayloadEstimate]  # by (payload, preset), those that are there
 
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """What ``mocobot diagnose --out`` wrote.
+    """What ``mocobot diagnose --out`` wrote."""
 
-    Attributes:
-        folder: where.
-        values: the diagnosis as ``discrepancy.result.json`` documents it.
-        traces: residuals of every trial; empty where the folder has none.
-        channels: of the residuals.
-    """
-
-    folder: Path
-    values: Json
-    traces: tuple[Trace, ...]
+    values: Json  # as discrepancy.result.json documents it
+    traces: tuple[Trace, ...]  # residuals of every trial; empty where the folder has none
     channels: tuple[Channel, ...]
 
-    @property
-    def provenance(self) -> Json | None:
-        """Of the run, or None."""
-        return self.values.get("provenance")
 
-
-@dataclass(frozen=True)
-class Campaign:
-    """What ``mocobot campaign --out`` wrote: its summary (``mocobot_report.campaign.words``)."""
-
-    path: Path
-    values: Json
-    provenance: Json | None
-
-
-@dataclass(frozen=True)
-class Contents:
-    """Everything found in a folder, and the files that it was read from."""
-
-    folder: Path
-    paper: Paper | None
-    estimates: tuple[Estimated, ...]
-    diagnosis: Diagnosed | None
-    calibrations: tuple[Calibrated, ...]
-    campaign: Campaign | None
-    files: tuple[Path, ...]
-
-
-def read_folder(folder: Path) -> Contents:
-    """Read all results that a folder holds.
+def read_folder(folder: Path) -> list[Result]:
+    """Read all results that a folder holds, in the order of a page.
 
     Raises:
         InputError: there is no such folder, it holds no result, or one of them cannot be read.
     """
     check_folder(folder)
     with system_errors(folder, "read"):
-        jsons = sorted(path for path in folder.glob("*.json") if path.is_file())
-    paper = diagnosis = campaign = None
-    estimates, calibrations, files = [], [], []
-    for path in jsons:
-        if path.name == "paper.json":
-            paper = _paper(folder)
-            files.append(path)
-        elif path.name not in ("trials.json", "provenance.json") and not path.name.endswith(".truth.json"):
-            values = read_json(path, "a result of mocobot")
-            if path.name == "diagnosis.json" or values.get("format") == DIAGNOSIS:
-                diagnosis = _diagnosis(path, values, diagnosis)
-                files.append(path)
-            elif values.get("format") == ESTIMATE:
-                estimates.append(_estimate(path, values))
-                files.append(path)
-            elif values.get("format") == CAMPAIGN:
-                campaign = Campaign(path, values, _provenance(folder / "provenance.json"))
-                files += [path, *(p for p in [folder / "provenance.json"] if p.is_file())]
-            elif values.get("format") == CALIBRATION:
-                made = values.get("provenance")
-                found = calibration_from_dict(values, str(path))
-                calibrations.append(Calibrated(path, found, made if isinstance(made, dict) else None))
-                files.append(path)
-    if not (paper or diagnosis or campaign or estimates or calibrations):
+        paths = sorted(path for path in folder.glob("*.json") if path.is_file())
+    results: list[Result] = []
+    for path in paths:
+        if path.name in ("trials.json", "provenance.json") or path.name.endswith(".truth.json"):
+            continue
+        values = read_json(path, "a result of mocobot")
+        if kind := _kind(path, values):
+            if kind == "diagnosis" and any(one.kind == kind for one in results):
+                raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
+            results.append(READERS[kind](path, values))
+    if not results:
         raise InputError(f"{folder}: holds no result of mocobot; a report is made of {SOUGHT}")
-    if paper is not None:
-        files += [p for p in (folder / "trials.json", folder / "provenance.json") if p.is_file()]
-        files += [folder / "estimates" / f"{p}_{preset}.json" for p, preset in paper.estimates]
-    if diagnosis is not None and diagnosis.traces:
-        files.append(folder / RESIDUALS)
-    return Contents(folder, paper, tuple(estimates), diagnosis, tuple(calibrations), campaign, tuple(files))
+    return sorted(results, key=lambda one: KINDS.index(one.kind))
 
 
-def _paper(folder: Path) -> Paper:
-    path = folder / "paper.json"
-    scores = read_json(path, "the scores of the paper's experiment")
+def _kind(path: Path, values: Json) -> str | None:
+    if path.name in ("paper.json", "diagnosis.json"):
+        return path.stem
+    formats = {DIAGNOSIS: "diagnosis", ESTIMATE: "estimate", CAMPAIGN: "campaign", CALIBRATION: "calibration"}
+    named = values.get("format")
+    return formats.get(named) if isinstance(named, str) else None
+
+
+def _paper(path: Path, scores: Json) -> Result:
     with complete(path, "not the scores of the paper's experiment"):
         tables = [*paper_tables(scores), summary_table(scores)]
         cells = [cell for table in tables for row in table.rows for cell in row.cells]
-        if not cells or not all(_number(x) for cell in cells for x in (cell.value, cell.spread)):
+        numbers = [x for cell in cells for x in (cell.value, cell.spread) if x is not None]
+        if not cells or not all(is_number(x) and x >= 0 for x in numbers):
             raise ValueError("it must hold errors, numbers of at least 0 or null")
-    found = {
-        (payload, preset): read_estimate(file)
+    folder, trials = path.parent, path.with_name("trials.json")
+    files = {
+        (payload, preset): file
         for preset, by_payload in scores.items()
         for payload in by_payload
         if (file := folder / "estimates" / f"{payload}_{preset}.json").is_file()
     }
-    return Paper(scores, _trials(folder / "trials.json"), found, _provenance(folder / "provenance.json"))
+    found = Paper(scores, _trials(trials), {key: read_estimate(file) for key, file in files.items()})
+    made, beside = _provenance_beside(path)
+    read = [path, *([trials] if trials.is_file() else []), *beside, *files.values()]
+    return Result("paper", path, found, made, tuple(read))
 
 
 def _trials(path: Path) -> tuple[Json, ...]:
@@ -181,36 +130,63 @@ def _trials(path: Path) -> tuple[Json, ...]:
     return tuple(trials)
 
 
-def _provenance(path: Path) -> Json | None:
-    if not path.is_file():
-        return None
-    values = read_json(path, "the provenance of a result")
-    return values if values.get("format") == PROVENANCE else None
+def _provenance_beside(path: Path) -> tuple[Json | None, list[Path]]:
+    """What ``provenance.json`` says, and that file if it is there."""
+    file = path.with_name("provenance.json")
+    if not file.is_file():
+        return None, []
+    values = read_json(file, "the provenance of a result")
+    return values if values.get("format") == PROVENANCE else None, [file]
 
 
-def _estimate(path: Path, values: Json) -> Estimated:
-    if values.get("version") != ESTIMATE_VERSION:
+def _provenance_within(values: Json) -> Json | None:
+    made = values.get("provenance")
+    return made if isinstance(made, dict) else None
+
+
+def _estimate(path: Path, values: Json) -> Result:
+    version = values.get("version")
+    if version != ESTIMATE_VERSION:
         raise InputError(
-            f"{path}: is an estimate of version {values.get('version')!r:.40}; this mocobot reads version "
-            f"{ESTIMATE_VERSION}"
+            f"{path}: is an estimate of version {version!r:.40}; this mocobot reads version {ESTIMATE_VERSION}"
         )
-    found = values.get("provenance")
-    return Estimated(path, read_estimate(path), found if isinstance(found, dict) else None)
+    return Result("estimate", path, read_estimate(path), _provenance_within(values), (path,))
 
 
-def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
-    if other is not None:
-        raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
+def _calibration(path: Path, values: Json) -> Result:
+    found = calibration_from_dict(values, str(path))
+    return Result("calibration", path, found, _provenance_within(values), (path,))
+
+
+def _diagnosis(path: Path, values: Json) -> Result:
     parse_diagnosis(values, path)
     with complete(path, "not a complete diagnosis"):
         # The text touches most keys that a report has to show.
         values = as_now(values)
         format_verdict(values, verbose=True)
-    file = path.parent / RESIDUALS
+    file = path.with_name(RESIDUALS)
     traces, channels = load_traces(file) if file.is_file() else ([], [])
     if traces and [trace.name for trace in traces] != list(values["recordings"]):
         raise InputError(f"{file}: is of other trials than {path.name}; diagnose again")
-    return Diagnosed(path.parent, values, tuple(traces), tuple(channels))
+    found = Diagnosed(values, tuple(traces), tuple(channels))
+    return Result("diagnosis", path, found, _provenance_within(values), (path, file) if traces else (path,))
+
+
+def _campaign(path: Path, values: Json) -> Result:
+    made, beside = _provenance_beside(path)
+    return Result("campaign", path, values, made, (path, *beside))
+
+
+READERS: Mapping[str, Callable[[Path, Json], Result]] = {
+    "paper": _paper, "estimate": _estimate, "calibration": _calibration, "diagnosis": _diagnosis,
+    "campaign": _campaign,
+}  # fmt: skip
+
+
+INCOMPLETE = (
+    LookupError, TypeError, ValueError, AttributeError, OverflowError, StopIteration, UndefinedError,
+)  # fmt: skip
+"""What reading values raises where one is missing or of another kind."""
 
 
 @contextmanager
@@ -222,20 +198,53 @@ def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
     """
     try:
         yield
-    except (
-        KeyError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        IndexError,
-        OverflowError,
-        StopIteration,
-    ) as error:
+    except INCOMPLETE as error:
         text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) and error.args else str(error)
         words = " ".join(text.split())[:120] or type(error).__name__
         raise InputError(f"{path}: {otherwise} ({words})") from error
 
 
-def _number(value: Any) -> bool:
-    """Whether a score is null or a finite number of at least 0."""
-    return value is None or (is_number(value) and value >= 0)
+@dataclass(frozen=True)
+class Source:
+    """A recording that a result was made from."""
+
+    name: str
+    path: Path | None
+    why: str = ""  # it is not used, a sentence without its end
+
+    def recording(self) -> Recording:
+        """Read it.
+
+        Raises:
+            InputError: it is not used, or cannot be read.
+        """
+        if self.path is None:
+            raise InputError(self.why)
+        return read_recording(self.path)
+
+
+def sources(result: Result) -> list[Source]:
+    """Recordings that a result's provenance lists.
+
+    Each is sought where the user named it (from the current folder on), beside the result, and under its name there;
+    the hash must be the same.
+    """
+    files = (result.provenance or {}).get("files")
+    listed = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
+    folder = result.path.parent
+    return [_source(entry, folder) for entry in listed if str(entry.get("path", "")).endswith(".parquet")]
+
+
+def _source(entry: Json, folder: Path) -> Source:
+    name, given, changed = str(entry.get("name", "")), entry["path"], False
+    for path in (Path(given), folder / given, folder / name, folder.parent / name):
+        try:
+            same = file_sha256(path) == entry.get("sha256")
+        except (OSError, ValueError):  # a name with a NUL
+            continue
+        if same:
+            return Source(name, path)
+        changed = True
+    if changed:
+        return Source(name, None, f"{name} is no longer the file that the result was made from")
+    return Source(name, None, f"{name} is no longer where it was ({given})")

@@ -1,190 +1,40 @@
-"""The report of a result folder: the answer, a part for every result, provenance."""
+"""The report of a result folder: the answer, a part for every result, provenance, a glossary."""
 
+import base64
+import gzip
+import io
+import json
+import re
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from plotly.offline import get_plotlyjs
+from markupsafe import Markup
 
+from discrepancy.evidence.settings import SETTINGS
+from estimator.errors import InputError
 from estimator.files import add_written, check_target, file_facts, whole_file
-from mocobot_report.blocks import palette
-from mocobot_report.blocks.book import Book, section
-from mocobot_report.blocks.html import Node, data_block, el, raw, to_bytes, variables, words
-from mocobot_report.blocks.numbers import size
-from mocobot_report.blocks.prose import facts, folded, paragraph
-from mocobot_report.blocks.tables import Entry, Num, table
-from mocobot_report.blocks.theme import TEMPLATES
-from mocobot_report.calibration import part as calibration_part
-from mocobot_report.campaign import part as campaign_part
-from mocobot_report.diagnosis import part as diagnosis_part
-from mocobot_report.estimate import part as estimate_part
-from mocobot_report.folder import (
-    Calibrated,
-    Campaign,
-    Contents,
-    Diagnosed,
-    Estimated,
-    Paper,
-    complete,
-    read_folder,
-)
-from mocobot_report.glossary import glossary, link_terms
-from mocobot_report.paper import part as paper_part
-from mocobot_report.sought import NAME, SUFFIX
-
-
-def provenance_part(book: Book, contents: Contents, results: Iterable[tuple[str, Any]]) -> list[Node]:
-    """One section per result, by its name and provenance, and the files that this page was made from."""
-    out = [section(book, f"How {name} was made", *_one(made)) for name, made in results]
-    return [*out, section(book, "What this page was made from", _read(contents))]
-
-
-def _one(made: Any) -> list[Node]:
-    if not isinstance(made, Mapping):
-        return [paragraph("The result does not say how it was made; it is of an older mocobot.")]
-    packages = made.get("packages")
-    versions = ", ".join(f"{k} {v}" for k, v in packages.items()) if isinstance(packages, Mapping) else ""
-    commit = str(made.get("commit") or "not from a checkout")
-    entries: list[tuple[str, Node | str]] = [
-        ("command", el("code", f"mocobot {made.get('command', '')}")),
-        ("mocobot", f"{made.get('mocobot', '')}"),
-        ("commit", el("code", commit)),
-        ("Python", f"{made.get('python', '')} on {made.get('platform', '')}"),
-        ("packages", versions),
-    ]
-    options = made.get("options")
-    if isinstance(options, Mapping):
-        entries += [(f"option {name}", el("code", _text(v))) for name, v in options.items()]
-    out = [facts(entries)]
-    for key, title in (("files", "Made from"), ("written", "Written")):
-        listed = made.get(key)
-        if isinstance(listed, list) and listed:
-            shown = _files(title, [entry for entry in listed if isinstance(entry, Mapping)])
-            out.append(shown if len(listed) <= 12 else folded(f"{title}: {len(listed)} files", shown))
-    return out
-
-
-def _text(option: Any) -> str:
-    if isinstance(option, bool):
-        return "yes" if option else "no"
-    if isinstance(option, list):
-        return " ".join(map(str, option)) or "none"
-    return "none" if option is None else str(option)
-
-
-def _files(caption: str, listed: Sequence[Mapping[str, Any]]) -> Node:
-    rows: list[list[Entry]] = []
-    for entry in listed:
-        count, digest = entry.get("bytes"), el("span", str(entry.get("sha256", "")), class_="hash")
-        name = el("code", str(entry.get("path", entry.get("name", ""))))
-        rows.append([name, Num(size(count) if isinstance(count, int) else ""), digest])
-    return table(caption, ["file", "size", "SHA-256"], rows, stack=True)
-
-
-def _read(contents: Contents) -> Node:
-    listed = [
-        file_facts(path) | {"path": path.relative_to(contents.folder).as_posix()} for path in contents.files
-    ]
-    return _files("Read from the folder", listed)
-
-
-POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
-    "form-action 'none'"
-)
-"""What the page may load: nothing but itself."""
-
-
-def document(title: str, main: list[Node]) -> Node:
-    """The whole page.
-
-    Args:
-        title: of the browser's window.
-        main: sections; the first is the answer, the others have a heading and sections of their own.
-    """
-    style, script = page_assets()
-    dark = f"color-scheme:dark;{variables(palette.DARK)}"
-    colours = (
-        f":root{{{variables(palette.LIGHT)}}}"
-        f"@media (prefers-color-scheme: dark){{:root:not([data-theme=light]){{{dark}}}}}"
-        f":root[data-theme=dark]{{{dark}}}"
-        f"@media print{{:root:root:root{{color-scheme:light;{variables(palette.LIGHT)}}}}}"
-    )
-    foot = f"Made by mocobot {_version()}. This file is complete: it loads nothing from anywhere."
-    return el(
-        "html",
-        el(
-            "head",
-            el("meta", charset="utf-8"),
-            el("meta", name="generator", content="mocobot report"),
-            el("title", f"{title} | mocobot report"),
-            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            el("meta", http_equiv="Content-Security-Policy", content=POLICY),
-            el("link", rel="icon", href="data:,"),
-            raw("style", colours + style),
-        ),
-        el(
-            "body",
-            el("a", "Skip to the results", href="#main", class_="skip"),
-            el(
-                "header",
-                el("div", "mocobot ", el("span", "report"), class_="brand"),
-                el("button", "Dark theme", type="button", id="theme"),
-                class_="top",
-            ),
-            el(
-                "div",
-                _navigation(main),
-                el(
-                    "main",
-                    el("noscript", el("p", "Plots need JavaScript; everything else on this page does not.")),
-                    *main,
-                    el("p", foot, class_="foot"),
-                    id="main",
-                    tabindex="-1",
-                ),
-                class_="frame",
-            ),
-            data_block("templates", {name: theme.to_plotly_json() for name, theme in TEMPLATES.items()}),
-            raw("script", get_plotlyjs()),
-            raw("script", script),
-        ),
-        lang="en",
-    )
-
-
-def page_assets() -> tuple[str, str]:
-    """Style sheet and script of the page."""
-    assets = files("mocobot_report").joinpath("assets")
-    style, script = (assets.joinpath(name).read_text(encoding="utf-8") for name in ("style.css", "page.js"))
-    return style, script
-
-
-def _navigation(main: list[Node]) -> Node:
-    """Links to every part and its sections."""
-    entries = [el("li", el("a", "Answer", href="#answer"))]
-    for part in main[1:]:
-        inner = [el("li", _link(child, child[0])) for child in part if child.tag == "section"]
-        entries.append(el("li", _link(part, part[0]), el("ol", *inner) if inner else None))
-    return el("nav", el("p", "Contents", class_="contents"), el("ol", *entries), aria_label="Contents")
-
-
-def _link(target: Node, heading: Node) -> Node:
-    return el("a", words(heading), href=f"#{target.get('id')}")
-
-
-def _version() -> str:
-    try:
-        return version("mocobot")
-    except PackageNotFoundError:
-        return "from source"
-
+from estimator.inputs import printable
+from mocobot_report import NAME, SUFFIX, calibration, campaign, diagnosis, estimate, paper
+from mocobot_report.charts import Chart
+from mocobot_report.folder import Result, complete, read_folder
+from mocobot_report.numbers import counted, size
+from mocobot_report.palette import DARK, LIGHT, template
+from mocobot_report.tables import Entry, Num, templates
+from mocobot_view.pictures.render import Shot, render_shots
 
 Say = Callable[[str], object]
+Context = dict[str, Any]
+PARTS: Mapping[str, Callable[[Result, Say], Context]] = {
+    "paper": paper.context, "estimate": estimate.context, "calibration": calibration.context,
+    "diagnosis": diagnosis.context, "campaign": campaign.context,
+}  # fmt: skip
+"""What gives the data of each kind's template: a ``title``, ``pictures`` that it wants, and its own names."""
 
 
 def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: None) -> Path:
@@ -201,101 +51,282 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     Raises:
         InputError: the folder holds no result, or one that cannot be read, or the file cannot be written.
     """
-    contents = read_folder(folder)
+    results = read_folder(folder)
     out = folder / NAME if out is None else out
     check_target(out, SUFFIX)
     with whole_file(out) as temporary:
-        temporary.write_bytes(make_page(contents, say))
+        temporary.write_bytes(make_page(folder, results, say))
     if out.parent == folder:
         add_written(out)
     return out
 
 
-def make_page(contents: Contents, say: Say = lambda _: None) -> bytes:
-    """The page of a folder's contents, HTML in UTF-8; the same files give the same bytes.
+@dataclass
+class _Part:
+    """One part of the page below the answer, with its sections' ids and titles."""
 
-    Args:
-        contents: of a result folder.
-        say: takes the name of every stage that begins.
+    id: str
+    name: str
+    content: Markup = field(default_factory=Markup)
+    sections: list[tuple[str, str]] = field(default_factory=list)
+
+
+@dataclass
+class _Page:
+    """What templates share: running ids, figures, and the parts so far."""
+
+    parts: list[_Part] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def identity(self, kind: str) -> str:
+        """An id that the page has once; the same for the same inputs."""
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+        return f"{kind}-{self.counts[kind]}"
+
+    def section(self, title: str, name: str | None) -> str:
+        """The id of a section of the last part."""
+        name = name or self.identity("part")
+        self.parts[-1].sections.append((name, title))
+        return name
+
+    def figure(self, chart: Chart) -> str:
+        """The id of a chart."""
+        name = self.identity("figure")
+        self.figures[name] = chart.to_json()
+        return name
+
+    def link(self, section: Markup) -> Markup:
+        """A section with links to the glossary."""
+        return link_terms(section)
+
+
+def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None) -> bytes:
+    """The page of a folder's results, HTML in UTF-8; the same files give the same bytes.
 
     Raises:
         InputError: a file has gone, or changed its meaning, since the folder was read.
     """
-    book, parts, answers = Book(say), [], []
-    results = _results(contents)
+    contexts: list[Context] = []
     for result in results:
         with complete(result.path):
-            answers.append(
-                (f"{result.part.title(result.found)}{result.of}", result.part.answer(result.found))
-            )
-            parts.append((result.identity, result.name, result.part.sections(book, result.found)))
-    made = [(result.made, result.found.provenance) for result in results]
-    parts.append(("provenance", "Provenance", provenance_part(book, contents, made)))
-    if len(answers) == 1:
-        title, top = answers[0]
-    else:
-        title, top = (
-            f"{len(answers)} results",
-            [node for name, nodes in answers for node in (el("h2", name), *nodes)],
-        )
-    main = [el("section", el("h1", title), *top, id="answer", aria_label="Answer")]
-    for identity, name, blocks in parts:
-        heading = el("h2", name, id=f"{identity}-heading")
-        main.append(
-            el("section", heading, *blocks, id=identity, class_="part", aria_labelledby=f"{identity}-heading")
-        )
+            contexts.append(PARTS[result.kind](result, say))
     say("pictures")
-    book.gallery.fill()
-    if terms := link_terms(main):
-        heading = el("h2", "Glossary", id="glossary-heading")
-        main.append(
-            el(
-                "section",
-                heading,
-                glossary(terms),
-                id="glossary",
-                class_="part",
-                aria_labelledby="glossary-heading",
-            )
-        )
+    render_pictures(contexts)
     say("page")
-    return to_bytes(document(title, main))
+    page, answers = _Page(), Markup("")
+    for result, context in zip(results, contexts, strict=True):
+        several = sum(one.kind == result.kind for one in results) > 1
+        name = f"{result.kind.capitalize()} {result.path.name}" if several else IN_DETAIL[result.kind]
+        page.parts.append(_Part(page.identity(result.kind), name))
+        with complete(result.path):
+            part = templates().get_template(f"{result.kind}.html")
+            module: Any = part.make_module(context | {"page": page})
+            page.parts[-1].content = module.sections()
+            heading = f"{context['title']}: {result.path.name}" if several else context["title"]
+            answers += Markup("<h2>{}</h2>").format(heading) if len(results) > 1 else ""
+            answers += module.answer()
+    page.parts.append(_Part("provenance", "Provenance"))
+    read = dict.fromkeys(path for result in results for path in result.files)
+    provenance = templates().get_template("provenance.html").render(
+        page=page, rows_of=_files, option=_option, results=[(_called(one), one.provenance) for one in results],
+        read=[file_facts(path) | {"path": path.relative_to(folder).as_posix()} for path in read],
+    )  # fmt: skip
+    page.parts[-1].content = Markup(provenance)
+    answer = link_terms(answers)
+    of_kind = zip(results, contexts, strict=True)
+    titles = [context["title"] for _, context in sorted(of_kind, key=lambda one: one[0].kind != "diagnosis")]
+    if met := glossary_of([answer, *(part.content for part in page.parts)]):
+        page.parts.append(_Part("glossary", "Glossary", met))
+    return _whole(page, title_of(titles), answer)
+
+
+IN_DETAIL = {
+    "paper": "The experiment in detail", "estimate": "The estimate in detail",
+    "calibration": "The calibration in detail", "diagnosis": "The diagnosis in detail",
+    "campaign": "The campaign in detail",
+}  # fmt: skip
+LONGEST_TITLE = 160
+
+
+def title_of(titles: Sequence[str]) -> str:
+    """All results by what they are, the same once, as far as that fits a heading."""
+    first, *others = dict.fromkeys(titles)
+    shown = [first]
+    for title in others:
+        if sum(map(len, shown)) + len(title) <= LONGEST_TITLE:
+            shown.append(title[:1].lower() + title[1:])
+    more = len(titles) - len(shown)
+    return "; ".join([*shown, f"and {counted(more, 'more result')}"] if more else shown)
+
+
+def _whole(page: _Page, title: str, answer: Markup) -> bytes:
+    from plotly.offline import get_plotlyjs
+
+    data = {"figures": page.figures, "templates": {"light": template(LIGHT), "dark": template(DARK)}}
+    text = templates().get_template("page.html").render(
+        title=title, answer=answer, parts=page.parts, version=_version(), light=_variables(LIGHT),
+        dark=_variables(DARK), plotly=_packed(get_plotlyjs()), figures=_packed(json.dumps(data, allow_nan=False)),
+    )  # fmt: skip
+    return _NOT_HTML.sub(lambda found: printable(found[0]), text).encode() + b"\n"
+
+
+_NOT_HTML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
+"""Characters that a page may not hold."""
+
+
+def _packed(text: str) -> Markup:
+    """Text that the page's script unpacks: gzip in base 85, with commas for ``<``, which HTML would read."""
+    packed = base64.b85encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+    return Markup(packed.replace("<", ","))
+
+
+def _variables(colours: Mapping[str, str]) -> Markup:
+    """CSS custom properties."""
+    return Markup("".join(f"--{name}:{value};" for name, value in colours.items()))
+
+
+def _version() -> str:
+    try:
+        return version("mocobot")
+    except PackageNotFoundError:
+        return "from source"
+
+
+WIDTH, HEIGHT, QUALITY = 1120, 700, 84
+"""Size of a picture [px] and quality of its JPEG."""
 
 
 @dataclass(frozen=True)
-class _Result:
-    """One result: its file, what was read, the module that makes nodes of it, its id, and how headings call it."""
+class Picture:
+    """A picture as data in the page, or, without a source, why there is none."""
 
-    path: Path
-    found: Paper | Estimated | Calibrated | Diagnosed | Campaign
-    part: ModuleType
-    identity: str
-    name: str
-    made: str
-    of: str = ""
+    caption: str
+    says: str
+    source: str = ""
+    width: int = WIDTH
+    height: int = HEIGHT
 
 
-def _results(contents: Contents) -> list[_Result]:
-    out = []
-    if (paper := contents.paper) is not None:
-        path = contents.folder / "paper.json"
-        out.append(_Result(path, paper, paper_part, "paper", "The experiment in detail", "the experiment"))
-    for k, one in enumerate(contents.estimates, start=1):
-        several = len(contents.estimates) > 1
-        name = f"Estimate {one.path.name}" if several else "The estimate in detail"
-        of = f": {one.path.name}" if several else ""
-        out.append(_Result(one.path, one, estimate_part, f"estimate-{k}", name, one.path.name, of))
-    for k, one in enumerate(contents.calibrations, start=1):
-        several = len(contents.calibrations) > 1
-        name = f"Calibration {one.path.name}" if several else "The calibration in detail"
-        of = f": {one.path.name}" if several else ""
-        out.append(_Result(one.path, one, calibration_part, f"calibration-{k}", name, one.path.name, of))
-    if (diagnosis := contents.diagnosis) is not None:
-        path = diagnosis.folder / "diagnosis.json"
-        out.append(
-            _Result(path, diagnosis, diagnosis_part, "diagnosis", "The diagnosis in detail", "the diagnosis")
-        )
-    if (campaign := contents.campaign) is not None:
-        name = "The campaign in detail"
-        out.append(_Result(campaign.path, campaign, campaign_part, "campaign", name, "the campaign"))
-    return out
+def render_pictures(contexts: Sequence[Context]) -> None:
+    """Replace the pictures that parts want, (caption, function that makes a shot), by pictures.
+
+    All are rendered in one process. Where nothing can be rendered, one sentence takes the place of each part's.
+    """
+    shots: list[Shot] = []
+    for context in contexts:
+        for k, (caption, make) in enumerate(context.get("pictures", ())):
+            try:
+                shots.append(make())
+                context["pictures"][k] = (caption, len(shots) - 1)
+            except InputError as error:
+                context["pictures"][k] = Picture(f"No picture: {caption}", str(error))
+    made = render_shots(shots, WIDTH, HEIGHT)
+    for context in contexts:
+        wanted = context.get("pictures", [])
+        if isinstance(made, str):
+            said = [one for one in wanted if isinstance(one, Picture)]
+            context["pictures"] = said + [Picture("No pictures", made)] * (len(said) < len(wanted))
+            continue
+        for k, one in enumerate(wanted):
+            if not isinstance(one, Picture):
+                caption, at = one
+                wanted[k] = Picture(caption, shots[at].says, _jpeg(made[at]))
+
+
+def _jpeg(pixels: Any) -> str:
+    """An image as a data URI."""
+    from PIL import Image  # an extra: without it nothing is rendered
+
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "JPEG", quality=QUALITY, optimize=True)
+    return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+
+
+def _called(result: Result) -> str:
+    if result.kind in ("estimate", "calibration"):
+        return result.path.name
+    return "the experiment" if result.kind == "paper" else f"the {result.kind}"
+
+
+def _option(value: Any) -> str:
+    """The value of a command's option as people write it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return " ".join(map(str, value)) or "none"
+    return "none" if value is None else str(value)
+
+
+def _files(listed: Iterable[Any]) -> list[list[Entry]]:
+    """Name, size and hash of each."""
+    rows: list[list[Entry]] = []
+    for entry in listed:
+        if isinstance(entry, Mapping):
+            count, name = entry.get("bytes"), str(entry.get("path", entry.get("name", "")))
+            shown = Num(size(count) if isinstance(count, int) else "")
+            digest = Markup('<span class="hash">{}</span>').format(str(entry.get("sha256", "")))
+            rows.append([Markup("<code>{}</code>").format(name), shown, digest])
+    return rows
+
+
+@cache
+def terms() -> list[dict[str, Any]]:
+    """The glossary of ``assets/glossary.toml``, with an id for each term."""
+    file = files("mocobot_report").joinpath("assets/glossary.toml")
+    found = tomllib.loads(file.read_text(encoding="utf-8"))["term"]
+    filled = {"{clean_chi2}": f"{SETTINGS.clean_chi2:g}", "{named}": f"{100 * SETTINGS.named:g}"}
+    for term in found:
+        term["id"] = "term-" + re.sub(r"[^a-z]+", "-", term["name"].lower()).strip("-")
+        for name, number in filled.items():
+            term["meaning"] = term["meaning"].replace(name, number)
+    return sorted(found, key=lambda term: term["name"].lower())
+
+
+UNLINKED = ("a", "button", "code", "h1", "h2", "h3", "h4", "label", "legend", "style", "svg", "summary")
+"""Elements whose text gets no links."""
+
+
+@cache
+def _spelled() -> tuple[dict[str, dict[str, Any]], re.Pattern[str]]:
+    """Terms by how texts write them, and what finds any of them."""
+    known = {spelling.lower(): term for term in terms() for spelling in term["spellings"]}
+    longest_first = sorted(map(re.escape, known), key=len, reverse=True)
+    return known, re.compile(rf"(?<!\w)(?:{'|'.join(longest_first)})(?!\w)", re.IGNORECASE)
+
+
+def link_terms(html: Markup) -> Markup:
+    """Link every term of the glossary at its first place in a section's HTML."""
+    known, spelled = _spelled()
+    done: set[str] = set()
+
+    def link(match: re.Match[str]) -> str:
+        term = known[match[0].lower()]
+        if term["id"] in done:
+            return match[0]
+        done.add(term["id"])
+        marked = Markup('<a href="#{id}" title="{meaning}" class="term">{text}</a>')
+        return marked.format(**term, text=Markup(match[0]))
+
+    pieces, inside = re.split(r"(<[^>]*>)", html), ""
+    for k, piece in enumerate(pieces):
+        if k % 2:  # a tag
+            name = re.split(r"[\s/>]", piece.strip("</"))[0]
+            if piece.startswith("</"):
+                inside = "" if name == inside else inside
+            elif not inside and name in UNLINKED:
+                inside = name
+        elif not inside:
+            pieces[k] = spelled.sub(link, piece)
+    return Markup("".join(pieces))
+
+
+def glossary_of(pieces: Sequence[str]) -> Markup:
+    """Terms that are linked, with their meanings."""
+    linked = {name for piece in pieces for name in re.findall(r'href="#(term-[^"]*)"', piece)}
+    entries = [
+        Markup('<dt id="{}">{}</dt><dd>{}</dd>').format(term["id"], term["name"], term["meaning"])
+        for term in terms()
+        if term["id"] in linked
+    ]
+    return Markup('<dl class="list">{}</dl>').format(Markup("").join(entries)) if entries else Markup("")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +16,7 @@ from estimator.calibrate.calibrate import calibrate
 from estimator.recording.parquet import read_recording, write_recording
 from invented_calibration import invented_calibration
 from mocobot.files.calibrations import read_calibration, write_calibration
-from mocobot_report.blocks.html import words
-from mocobot_report.estimate.part import answer
-from mocobot_report.folder import Estimated
+from mocobot_report.page import write_report
 from recorded_team import COM, MASS
 from recordings import small_recording
 from uncalibrated_team import DEFAULT, uncalibrated
@@ -64,7 +63,7 @@ def test_self_calibrate(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     found = mocobot.read_estimate(target)
     assert found.method == "calibrated"
     assert found.p_1c == pytest.approx(COM, abs=3e-4)
-    told = words(answer(Estimated(target, found, None))[0])
+    told = html.unescape(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "in one least squares with the robots' own calibration" in told
 
 

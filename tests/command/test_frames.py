@@ -19,8 +19,7 @@ from estimator.recording.parquet import write_recording
 from invented_calibration import invented_calibration
 from mocobot.api.calibration import Calibration
 from mocobot.commands.watch import _payload
-from mocobot_report.estimate.part import answer
-from mocobot_report.folder import Estimated
+from mocobot_report.page import write_report
 from mocobot_view.facts.fact_files import read_truth
 from recorded_team import COM, GRASPS, INERTIA, MASS
 from uncalibrated_team import DEFAULT, uncalibrated
@@ -89,7 +88,7 @@ def test_text_json_page_notebook_and_first_look_say_which_frames(
     }  # fmt: skip
     again = mocobot.read_estimate(target)
     assert again.zero_sd_rad == pytest.approx(np.deg2rad(1.0))
-    page = "".join(answer(Estimated(target, again, None))[0].itertext())
+    page = write_report(tmp_path).read_text(encoding="utf-8")
     for text in (page, again._repr_html_(), _payload(again)):
         assert SAID in text
     plain = mocobot.estimate(files[0])

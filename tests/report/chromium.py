@@ -15,6 +15,7 @@ FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync",
 )  # fmt: skip
+CHECKS = Path(__file__).with_name("page_checks.js")
 DESKTOP, PHONE = (1280, 900), (390, 844)
 
 
@@ -28,17 +29,7 @@ class Seen:
 
     def draw_all(self) -> None:
         """Show every panel and detail, scroll past everything, wait until all plots are drawn."""
-        self.page.evaluate(
-            """async () => {
-                 for (const part of document.querySelectorAll('details')) part.open = true;
-                 for (const panel of document.querySelectorAll('[data-panel]')) panel.hidden = false;
-                 for (let y = 0; y < document.documentElement.scrollHeight; y += 600) {
-                   scrollTo({top: y, behavior: 'instant'});
-                   await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
-                 }
-                 scrollTo({top: 0, behavior: 'instant'});
-               }"""
-        )
+        self.page.evaluate("checks.drawAll()")
         self.page.wait_for_function(
             "[...document.querySelectorAll('.plot')].every((plot) => plot.dataset.drawn)", timeout=20_000
         )
@@ -71,6 +62,7 @@ def opened(browser: object, path: Path, size: tuple[int, int] = DESKTOP, **optio
             "dialog", lambda dialog: (seen.said.append(f"dialog: {dialog.message}"), dialog.dismiss())
         )
         seen.page.on("request", lambda request: seen.asked.append(request.url))
+        seen.page.add_init_script(path=CHECKS)
         seen.page.goto(path.as_uri())
         yield seen
     finally:

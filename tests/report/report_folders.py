@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -187,6 +188,43 @@ def calibration_folder(folder: Path, findings: tuple[str, ...] = ()) -> Path:
         folder / "calibration.json", made, provenance("calibrate", {"tilt": False, "known_mass": []})
     )
     return folder
+
+
+def rolled(*, named: bool = True) -> dict[str, Any]:
+    """Two joints, one of which slides; at the second horizon the first diverged in the given model."""
+
+    def side(first: float | None, second: float, gone: int) -> dict[str, Any]:
+        return {"rms": [first, second], "diverged": [gone, 0]}
+
+    def horizon(
+        seconds: float, before: dict[str, Any], after: dict[str, Any], removed: list[Any]
+    ) -> dict[str, Any]:
+        return {"seconds": seconds, "starts": 40, "before": before, "after": after if named else None,
+                "removed": removed if named else None}  # fmt: skip
+
+    return {
+        "joints": ["hip", "lift"],
+        "units": ["rad", "m"],
+        "validated": True,
+        "why_not": None,
+        "horizons": [
+            horizon(0.1, side(0.05, 0.004, 0), side(0.01, 0.001, 0), [0.8, 0.75]),
+            horizon(0.5, side(None, 0.02, 30), side(0.08, 0.005, 0), [None, 0.75]),
+        ],
+        "not_simulated": ["elasticity of joint 1 (hip)"],
+        "refused": [],
+        "commanded": {
+            "why_not": None, "joints": [1],
+            "blocks": [
+                {"name": "one", "seconds": 6.0, "motion": [0.5, 0.1], "before": [0.03, 0.002],
+                 "after": [0.02, 0.001] if named else None},
+                {"name": "two", "seconds": 6.0, "motion": [0.5, 0.1], "before": [None, 0.002],
+                 "after": [0.02, 0.001] if named else None},
+            ],
+            "before": [0.03, 0.002], "after": [0.02, 0.001] if named else None,
+            "removed": [0.33, 0.5] if named else None,
+        },
+    }  # fmt: skip
 
 
 def _write(path: Path, values: object) -> None:

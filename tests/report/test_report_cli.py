@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -124,6 +125,7 @@ BROKEN = [
     (diagnosis_folder, cut("residuals.npz"), ("residuals.npz", "damaged")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"recordings": ["a", "b"]}),
      ("residuals.npz", "other trials")),
+    (diagnosis_folder, lambda folder: shutil.copy(folder / DIAGNOSIS, folder / "second.json"), ("second diagnosis",)),
 ]  # fmt: skip
 
 
@@ -142,12 +144,6 @@ def test_broken_results(
     for words in said:
         assert words in sentence, sentence
     assert sorted(path.name for path in folder.iterdir()) == before
-
-
-def test_two_diagnoses_in_one_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = diagnosis_folder(tmp_path / "result")
-    (folder / "second.json").write_text((folder / "diagnosis.json").read_text())
-    assert "second diagnosis" in refused(capsys, folder)
 
 
 def test_nothing_of_others_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

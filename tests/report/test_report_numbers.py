@@ -10,9 +10,18 @@ from hypothesis import strategies as st
 from discrepancy.numbers import fitting, one_each, parameter
 from discrepancy.result.pictures.residual_statistics import binned, running_rms, spectrum
 from discrepancy.result.traces import Trace
-from mocobot_report.blocks.numbers import about, measured, percent, plain, size, spelled, with_error
-from mocobot_report.blocks.series import runs, thinned
-from mocobot_report.blocks.units import short_names
+from mocobot_report.charts import thinned
+from mocobot_report.numbers import (
+    about,
+    measured,
+    percent,
+    plain,
+    probability,
+    short_names,
+    size,
+    spelled,
+    with_error,
+)
 
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
@@ -54,6 +63,8 @@ def test_measured_numbers_of_every_kind() -> None:
 def test_shares_ratios_sizes_and_probabilities() -> None:
     shown = [percent(v).replace("\u00a0", " ") for v in (0.5, 0.994, 1.0, 0.9999, 0.000016, -0.2, None)]
     assert shown == ["50 %", "99.4 %", "100 %", "100 %", "0.0016 %", "\u221220 %", "–"]
+    shown = [probability(v).replace("\u00a0", " ") for v in (1.0, 0.9995, 0.9985, 0.5, 0.004, 0.0)]
+    assert shown == ["> 99.9 %", "> 99.9 %", "99.9 %", "50 %", "0.40 %", "< 0.1 %"]
     assert [about(v).replace("\u00a0", " ") for v in (53325.0, 97.3, 1.13, 0.4)] == [
         "53 000",
         "97",
@@ -107,8 +118,7 @@ def test_thinning_loses_no_spike(seed: int, columns: int, rows: int, most: int) 
     values = rng.standard_normal((rows, columns))
     values[rng.integers(rows), rng.integers(columns)] = 50.0
     time = np.arange(rows) * 0.01 + np.where(np.arange(rows) > rows // 2, 3.0, 0.0)
-    run = runs(time, 0.01)
-    kept, shown = thinned(time, values, run, most)
+    kept, shown = thinned(time, values, 0.01, most)
     assert len(kept) <= max(most, 2 * 2 * columns) + 6 or rows <= most + 1
     np.testing.assert_array_equal(np.nanmax(shown, axis=0), values.max(axis=0))
     np.testing.assert_array_equal(np.nanmin(shown, axis=0), values.min(axis=0))

@@ -1,30 +1,33 @@
 """Results as small HTML tables for notebooks: no script, no network; every text is escaped."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
-from xml.etree import ElementTree
+
+from markupsafe import Markup
 
 from discrepancy.result.read import name_of
 from discrepancy.result.remains import remedy
 from estimator.arm.unit import frames_said
 from estimator.calibrate.calibration import Calibration
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.html import Child, Node, el
-from mocobot_report.blocks.numbers import percent, plain
-from mocobot_report.blocks.prose import bullets, tidy
-from mocobot_report.blocks.tables import (
+from mocobot_report.calibration import deviation_tables, payload_table, trial_table
+from mocobot_report.numbers import percent, plain, tidy
+from mocobot_report.tables import (
     Entry,
     Num,
+    bullets,
+    cause_name,
+    chance_of,
     distance,
     mass,
     measurement,
     moment,
+    numbers_of,
     place,
     quantity,
+    sentence_of,
     table,
 )
-from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
-from mocobot_report.diagnosis.keys import cause_name, chance_of, numbers_of, sentence_of
 
 Values = Mapping[str, Any]
 STYLE = (
@@ -83,7 +86,7 @@ def diagnosis_html(values: Values) -> str:
     removed = (values["gain"] or {}).get("removed")
     if removed is not None and rows:
         misfit.append(["excess error of the response removed", Num(percent(removed["share"]))])
-    named = el("p", el("strong", values["verdict"].replace("_", " ").upper()))
+    named = Markup("<p><strong>{}</strong></p>").format(values["verdict"].replace("_", " ").upper())
     sentences = [sentence_of(cause) for cause in values["causes"]]
     if values["verdict"] == "miscalibrated":
         sentences = [
@@ -116,14 +119,12 @@ def inspection_html(values: Values) -> str:
     ]  # fmt: skip
     head = ["", "samples", "rate [Hz]", "length [s]", "gaps", "duplicates"]
     return _whole(
-        el("p", el("strong", values["ready"])),
-        bullets(wrong) if wrong else el("p", "Nothing wrong was found."),
+        Markup("<p><strong>{}</strong></p>").format(values["ready"]),
+        bullets(wrong) if wrong else Markup("<p>Nothing wrong was found.</p>"),
         table(f"Log {log['name']}", head, rows, note=f"{log['level']} level"),
     )
 
 
-def _whole(*blocks: Child) -> str:
-    style: Sequence[Node] = [el("style", STYLE)]
-    return ElementTree.tostring(
-        el("div", style, *blocks, class_="mocobot"), encoding="unicode", method="html"
-    )
+def _whole(*blocks: Markup | None) -> str:
+    inside = Markup("").join(block for block in blocks if block is not None)
+    return str(Markup('<div class="mocobot"><style>{}</style>{}</div>').format(Markup(STYLE), inside))

@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
-from mocobot_report.blocks.palette import LIGHT
-from mocobot_report.campaign.words import background_words
+from mocobot_report.campaign import background_words
+from mocobot_report.palette import LIGHT
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 COLOURS = {"calibrated": LIGHT["after"], "uncalibrated": LIGHT["before"], "units": LIGHT["after"]}

@@ -29,7 +29,7 @@ from scipy.stats import beta
 
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.ground import one_axis
-from mocobot_report.campaign.words import FORMAT
+from mocobot_report import CAMPAIGN_FORMAT as FORMAT
 from mocobot_sim.effects.catalogue import EFFECTS
 
 BINS = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 0.99), (0.99, 1.0 + 1e-12))

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mocobot_report.campaign.words import sentences, tables
+from mocobot_report.campaign import sentences, tables
 
 WIDTH = 110
 COLUMNS = (

@@ -4,8 +4,8 @@ from estimator.errors import InputError
 from mocobot.files.recordings import check_no_log
 from mocobot.options import Report
 from mocobot.progress import stages
+from mocobot_report import NAME
 from mocobot_report.page import write_report
-from mocobot_report.sought import NAME
 
 
 def run(options: Report) -> None:

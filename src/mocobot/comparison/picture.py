@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mocobot.comparison.comparison import Comparison
-from mocobot_report.blocks.palette import LIGHT
+from mocobot_report.palette import LIGHT
 from mocobot_sim.plots_plain import plain_words
 
 FARTHEST = 30.0

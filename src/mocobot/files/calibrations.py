@@ -79,7 +79,7 @@ def write_into(
     for robot in range(1, calibration.robots + 1):
         write_text(folder / f"omnid{robot}.toml", unit_toml(calibration, robot))
     if draws_plots():
-        from mocobot_report.calibration.plots import save_plots  # matplotlib, which reading does not need
+        from mocobot_report.plots_calibration import save_plots  # matplotlib, which reading does not need
 
         save_plots(calibration, folder)
     write_calibration(folder / NAME, calibration, made_with)

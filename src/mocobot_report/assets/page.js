@@ -3,7 +3,8 @@
   const root = document.documentElement;
   const system = matchMedia("(prefers-color-scheme: dark)");
   const button = document.getElementById("theme");
-  const figures = new Map();  // element -> its data, for drawing again in another theme
+  const plots = [...document.querySelectorAll(".plot")];
+  let page;  // figures and templates, once they are unpacked
   const narrow = matchMedia("(max-width: 40rem)");
 
   // Theme: the system's until the button is used.
@@ -15,16 +16,12 @@
   const setTheme = () => {
     root.dataset.theme = dark() ? "dark" : "light";
     button.textContent = dark() ? "Light theme" : "Dark theme";
-    for (const plot of figures.keys()) if (plot.dataset.drawn) draw(plot);
+    for (const plot of plots) if (plot.dataset.drawn) draw(plot);
   };
   button.addEventListener("click", () => { chosen = dark() ? "light" : "dark"; store(chosen); setTheme(); });
   system.addEventListener("change", setTheme);
 
-  const config = {
-    responsive: true, displaylogo: false, displayModeBar: !narrow.matches && "hover",
-    modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]],  // none that sends anything anywhere
-    toImageButtonOptions: { format: "svg" },
-  };
+  const config = { responsive: true, displaylogo: false, displayModeBar: false };
   const hiddenGroups = (plot) => new Set(
     [...plot.closest("figure").querySelectorAll('.legend button[aria-pressed="false"]')].map((b) => b.dataset.group));
 
@@ -34,36 +31,72 @@
     keys.reduce((at, key) => (at[key] ??= {}), values)[last] = value;
   };
   function draw(plot) {
-    const figure = figures.get(plot);
+    if (!page) return;
+    const figure = page.figures[plot.id];
     const style = getComputedStyle(root);
     const hidden = hiddenGroups(plot);
     const data = figure.data.map((line) => ({ ...line, visible: !hidden.has(line.legendgroup) }));
     const layout = {
       ...structuredClone(figure.layout),
-      template: templates[root.dataset.theme], colorway: data.map((line) => style.getPropertyValue(`--${line.meta}`).trim()),
+      template: page.templates[root.dataset.theme], colorway: data.map((line) => style.getPropertyValue(`--${line.meta}`).trim()),
       font: { family: getComputedStyle(document.body).fontFamily },
       dragmode: narrow.matches ? false : "zoom",  // a finger scrolls the page
       uirevision: "keep",
     };
     if (narrow.matches) for (const [path, value] of Object.entries(figure.narrow)) set(layout, path, value);
-    Plotly.react(plot, data, layout, config).then(() => { plot.dataset.drawn = "yes"; });
+    Plotly.react(plot, data, layout, config).then(() => {
+      plot.dataset.drawn = "yes";
+      plot.closest("figure").querySelector(".save").hidden = false;
+    });
   }
-  const block = (name) => JSON.parse(document.getElementById(name).textContent);
-  const templates = block("templates");
-  for (const plot of document.querySelectorAll(".plot")) {
-    const figure = block(plot.dataset.figure);
-    for (const line of figure.data) if (typeof line.x === "number") line.x = figure.arrays[line.x];
-    figures.set(plot, figure);
-  }
+
+  // The library and the figures are packed: gzip in base 85, of which a comma stands for "<".
+  const digits = new Uint8Array(128);
+  [..."0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~"].forEach(
+    (character, k) => { digits[character.charCodeAt(0)] = k; });
+  const decoded = (text) => {
+    const missing = (5 - text.length % 5) % 5;
+    const whole = text + "~".repeat(missing);
+    const words = new DataView(new ArrayBuffer(whole.length / 5 * 4));
+    for (let k = 0; k < whole.length; k += 5) {
+      let word = 0;
+      for (let n = k; n < k + 5; n += 1) word = word * 85 + digits[whole.charCodeAt(n)];
+      words.setUint32(k / 5 * 4, word);
+    }
+    return new Uint8Array(words.buffer, 0, words.byteLength - missing);
+  };
+  const unpacked = async (name) => {
+    const bytes = decoded(document.getElementById(name).textContent);
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  };
+  const ready = (async () => {
+    const [library, data] = await Promise.all([unpacked("plotly"), unpacked("figures")]);
+    document.head.append(Object.assign(document.createElement("script"), { textContent: library }));
+    const found = JSON.parse(data);
+    for (const figure of Object.values(found.figures)) {
+      for (const line of figure.data) if (typeof line.x === "number") line.x = figure.arrays[line.x];
+    }
+    page = found;
+  })();
+  ready.catch(() => { document.getElementById("no-plots").hidden = false; });
+
   const near = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       if (!entry.isIntersecting) continue;
       near.unobserve(entry.target);
-      draw(entry.target);
+      ready.then(() => draw(entry.target), () => {});
     }
   }, { rootMargin: "600px 0px" });
-  for (const plot of figures.keys()) near.observe(plot);
-  const drawAll = () => { for (const plot of figures.keys()) if (!plot.dataset.drawn) { near.unobserve(plot); draw(plot); } };
+  for (const plot of plots) near.observe(plot);
+  const drawAll = () => { for (const plot of plots) if (!plot.dataset.drawn) { near.unobserve(plot); ready.then(() => draw(plot), () => {}); } };
+
+  for (const save of document.querySelectorAll(".save")) {
+    save.addEventListener("click", () => {
+      const figure = save.closest("figure");
+      const filename = figure.querySelector("figcaption b").textContent;
+      Plotly.downloadImage(figure.querySelector(".plot"), { format: "svg", filename });
+    });
+  }
 
   for (const toggle of document.querySelectorAll(".legend button")) {
     toggle.addEventListener("click", () => {

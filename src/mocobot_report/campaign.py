@@ -1,16 +1,21 @@
-"""What a campaign's summary (``campaign.json``) says, as sentences and tables, for text and page."""
+"""A blind campaign: its summary (``campaign.json``) as sentences, tables and plots, for text and page."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-FORMAT = "mocobot-campaign"
+from mocobot_report.charts import Axis, Chart, Key, Trace, axis, dots, log_axis
+
+if TYPE_CHECKING:
+    from mocobot_report.folder import Result
+
 BACKGROUNDS = {
-    "calibrated": "Calibrated robots",
-    "uncalibrated": "Uncalibrated robots",
-    "units": "The given robots",
+    "calibrated": ("Calibrated robots", "after", "circle"),
+    "uncalibrated": ("Uncalibrated robots", "before", "square"),
+    "units": ("The given robots", "after", "circle"),
 }
-
-
+"""What robots they are, their colour and marker."""
+APART = 1.03
+"""By how much a background's points are moved to the right, so that bars do not hide each other."""
 Json = Mapping[str, Any]
 
 
@@ -41,7 +46,7 @@ def sentences(summary: Json) -> list[str]:
 
 def background_words(background: str) -> str:
     """What robots they are."""
-    return BACKGROUNDS[background]
+    return BACKGROUNDS[background][0]
 
 
 def share_words(share: Json) -> str:
@@ -64,11 +69,8 @@ def tables(summary: Json) -> list[tuple[str, list[str], list[list[str]]]]:
             "Found, by size over the detection limit (95 % interval)",
             ["robots", "size", "cause and place", "cause", "missed", "something besides"],
             [
-                [
-                    entry["background"],
-                    f"{entry['factor']:g}",
-                    *(share_words(entry[k]) for k in ("right", "cause", "missed", "extras")),
-                ]
+                [entry["background"], f"{entry['factor']:g}",
+                 *(share_words(entry[k]) for k in ("right", "cause", "missed", "extras"))]
                 for entry in summary["found"]
             ],
         ),
@@ -134,3 +136,65 @@ def _counts(counts: Mapping[str, int]) -> str:
 
 def _number(value: float | None, scale: float = 1.0, unit: str = "") -> str:
     return "-" if value is None else f"{scale * value:.2g}{unit}"
+
+
+def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
+    """Data of ``assets/campaign.html``."""
+    say("campaign")
+    values = result.found
+    charts = [_found_chart(values)] if values["found"] else []
+    charts += [_reliability_chart(values["reliability"]["bins"])] if values["reliability"]["bins"] else []
+    failed = values["sets"]["failed"]
+    return {
+        "title": "A blind campaign",
+        "said": [sentence.replace(" %", "\u00a0%") for sentence in sentences(values)],
+        "failed": [f"{entry['key']}: {str(entry['error']).strip().splitlines()[-1]}" for entry in failed],
+        "charts": charts,
+        "tables": [(*name.partition(": ")[::2], heads, rows) for name, heads, rows in tables(values)],
+    }
+
+
+def _found_chart(values: Json) -> Chart:
+    keys, data = [], []
+    for k, background in enumerate(dict.fromkeys(entry["background"] for entry in values["found"])):
+        own = [entry for entry in values["found"] if entry["background"] == background]
+        key = Key(background, *BACKGROUNDS[background])
+        text = [f"{entry['factor']:g} times the limit: {share_words(entry['right'])}" for entry in own]
+        keys.append(key)
+        data.append(_shares([entry["factor"] * APART**k for entry in own], own, key, text))
+    across = log_axis("size over the detection limit", [entry["factor"] for entry in values["found"]])
+    return Chart(
+        "Cause and place right, by size",
+        "Share of sets in which cause and place were right, by size; values are in the table below.",
+        data, {"xaxis": across, "yaxis": _percent_axis("right [%]")}, 320, keys, "bars: 95 % intervals",
+    )  # fmt: skip
+
+
+def _reliability_chart(bins: Sequence[Json]) -> Chart:
+    key = Key("named", "causes named", "after", "circle")
+    text = [f"{100 * entry['mean']:.0f} % said: {share_words(entry['right'])}" for entry in bins]
+    diagonal = {"type": "line", "x0": 0, "y0": 0, "x1": 100, "y1": 100}
+    axes = {"xaxis": _percent_axis("probability stated [%]"), "yaxis": _percent_axis("right [%]")}
+    return Chart(
+        "Stated probabilities",
+        "Share of named causes that were right, by stated probability; values are in the table below.",
+        [_shares([100 * entry["mean"] for entry in bins], bins, key, text)], axes | {"shapes": [diagonal]}, 340, [key],
+        "bars: 95 % intervals; the line is where the stated probability holds",
+    )  # fmt: skip
+
+
+def _shares(x: Sequence[float], entries: Sequence[Json], key: Key, text: Sequence[str]) -> Trace:
+    """Shares that were right [%], with their intervals."""
+    shares = [entry["right"] for entry in entries]
+    at = [100 * share["hits"] / share["of"] for share in shares]
+    low, high = ([100 * share["interval"][k] for share in shares] for k in (0, 1))
+    interval = {
+        "type": "data", "symmetric": False, "thickness": 1.3, "width": 3,
+        "array": [b - a for a, b in zip(at, high, strict=True)],
+        "arrayminus": [a - b for a, b in zip(at, low, strict=True)],
+    }  # fmt: skip
+    return dots(x, at, key, text, error_y=interval)
+
+
+def _percent_axis(title: str) -> Axis:
+    return axis(title, range=[-4, 104], fixedrange=True)

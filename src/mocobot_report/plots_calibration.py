@@ -1,7 +1,5 @@
 """Pictures of a calibration: parameters against priors, what recordings leave over, what each of them contributes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +9,10 @@ from matplotlib.figure import Figure
 
 from estimator.arm.unit import AT
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.text import SHOWN, shown_groups
-from mocobot_report.blocks.palette import LIGHT
-from mocobot_report.blocks.units import short_names
-from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names
+from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from mocobot_report.calibration import COLOURS, FITS, fits_of, kind_names, shares_of
+from mocobot_report.numbers import short_names
+from mocobot_report.palette import LIGHT
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
@@ -24,17 +22,14 @@ MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
 def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
     """Draw everything into an existing folder and return the paths."""
     figures = {
-        "deviations.png": _deviations(calibration),
-        "recordings.png": _recordings(calibration),
-        "shares.png": _shares(calibration),
+        folder / "deviations.png": _deviations(calibration),
+        folder / "recordings.png": _recordings(calibration),
+        folder / "shares.png": _shares(calibration),
     }
-    return [_save(figure, folder / name) for name, figure in figures.items()]
-
-
-def _save(figure: Figure, path: Path) -> Path:
-    FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=110)
-    return path
+    for path, figure in figures.items():
+        FigureCanvasAgg(figure)
+        figure.savefig(path, dpi=110)
+    return list(figures)
 
 
 def _deviations(calibration: Calibration) -> Figure:
@@ -83,14 +78,9 @@ def _recordings(calibration: Calibration) -> Figure:
     axes = figure.subplots(1, 2, squeeze=False, sharey=True)[0]
     for kind, (axis, title) in enumerate(zip(axes, ("loops", "balance"), strict=True)):
         for key in FITS:
-            pairs = [getattr(trial, key.group) for trial in calibration.trials]
-            shown = [
-                (pair[kind], row)
-                for row, (pair, trial) in enumerate(zip(pairs, calibration.trials, strict=True))
-                if pair is not None and trial.count[kind]
-            ]
+            shown = fits_of(calibration, kind, key)
             axis.plot(
-                [x for x, _ in shown], [y for _, y in shown], MARKERS[key.symbol], color=LIGHT[key.colour],
+                [x for _, x in shown], [row for row, _ in shown], MARKERS[key.symbol], color=LIGHT[key.colour],
                 label=key.label if not kind else None, ms=6,
             )  # fmt: skip
         axis.axvline(1.0, color=LIGHT["text"], lw=1.0, ls="--")
@@ -107,31 +97,18 @@ def _recordings(calibration: Calibration) -> Figure:
 
 
 def _shares(calibration: Calibration) -> Figure:
-    trials = [trial for trial in calibration.trials if trial.shares]
-    kinds = [k for k in (trials[0].shares if trials else {}) if k not in hidden_kinds(calibration)]
+    kinds, series = shares_of(calibration)
     figure = Figure(figsize=(9.0, 0.36 * len(kinds) + 1.6), layout="constrained")
     axis = figure.subplots()
-    left = np.zeros(len(kinds))
-    for k, (name, trial) in enumerate(zip(short_names([t.name for t in trials]), trials, strict=True)):
-        share = 100.0 * np.array([trial.shares.get(kind, 0.0) for kind in kinds])
-        axis.barh(
-            range(len(kinds)),
-            share,
-            0.66,
-            left,
-            color=LIGHT[COLOURS[k % len(COLOURS)]],
-            label=name if name[0] != "_" else f" {name}",
-        )
+    rows, left = range(len(kinds)), np.zeros(len(kinds))
+    for k, (name, shares) in enumerate(series):
+        share, colour = 100.0 * np.array(shares), LIGHT[COLOURS[k % len(COLOURS)]]
+        label = name if name[0] != "_" else f" {name}"
+        axis.barh(rows, share, 0.66, left, color=colour, label=label)
         left += share
-    axis.barh(
-        range(len(kinds)),
-        np.maximum(0.0, 100.0 - left),
-        0.66,
-        left,
-        color=LIGHT["band"],
-        label="prior, weights",
-    )
-    axis.set_yticks(range(len(kinds)), kind_names(kinds), fontsize=9)
+    rest = np.maximum(0.0, 100.0 - left)
+    axis.barh(rows, rest, 0.66, left, color=LIGHT["band"], label="prior, weights")
+    axis.set_yticks(rows, kind_names(kinds), fontsize=9)
     axis.set_ylim(len(kinds) - 0.4, -0.6)
     axis.set_xlim(0.0, 100.0)
     axis.set_xlabel("share [%]")

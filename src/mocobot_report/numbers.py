@@ -1,7 +1,8 @@
-"""Numbers as people read them: as many digits as the standard error has meaning, units that fit their size."""
+"""Numbers, units and sentences as the page prints them."""
 
 import math
 import re
+from collections.abc import Sequence
 
 from estimator.statistics import decimals
 
@@ -9,6 +10,8 @@ MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
 SUPERSCRIPTS = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
+LEAST = 0.001
+"""Probabilities are not known better than that."""
 
 
 def plain(value: float | None, digits: int = 3) -> str:
@@ -45,7 +48,7 @@ def with_error(value: float | None, se: float | None, unit: str = "") -> str:
 
 
 def percent(share: float | None) -> str:
-    """``99 %``; more digits near 0 and 100 %."""
+    """A share, ``99 %``; more digits near 0 and 100 %."""
     if share is None or not math.isfinite(share):
         return NONE
     value = 100.0 * share
@@ -53,6 +56,18 @@ def percent(share: float | None) -> str:
         return f"{plain(value, 2)}{THIN}%"
     digits = 1 if 99.0 < value < 99.95 else 0
     return f"{_signed(f'{value:.{digits}f}')}{THIN}%"
+
+
+def probability(value: float) -> str:
+    """A probability in percent; never 0 or 100 %, since none is known that well."""
+    if value < LEAST:
+        return f"<{THIN}{100 * LEAST:g}{THIN}%"
+    return f">{THIN}{100 * (1 - LEAST):g}{THIN}%" if value > 1.0 - LEAST else percent(value)
+
+
+def without_percent(text: str) -> str:
+    """The number alone, for columns whose head has the unit."""
+    return text.removesuffix(f"{THIN}%")
 
 
 def about(value: float) -> str:
@@ -69,12 +84,46 @@ def size(count: int) -> str:
     return f"{count}{THIN}B"
 
 
+def counted(count: int, noun: str) -> str:
+    """``1 trial``, ``2 trials``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def kinds_of(kinds: Sequence[str]) -> str:
+    """``2 random, 1 static``."""
+    return ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
+
+
 def spelled(unit: str) -> str:
     """A unit as printed: ``kg m^2`` with a superscript, ``um`` with a Greek letter."""
     unit = re.sub(r"\bu(?=(m|rad|N m|s)\b)", "µ", unit)
     for ascii_power, shown in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
         unit = unit.replace(ascii_power, shown)
     return unit.replace(" ", THIN)
+
+
+def spelled_text(text: str) -> str:
+    """Text whose bracketed unit is printed with superscripts and does not break."""
+    return re.sub(r"\[(.*?)\]", lambda m: f"[{spelled(m[1])}]", text)
+
+
+def tidy(sentence: str, *, inside: bool = False) -> str:
+    """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital unless it goes on."""
+    text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("+-(", f"{PLUS_MINUS}(")
+    text = text.replace("chi2/n", "chi²/n")
+    text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
+    text = re.sub(r"(?<=\d )u(?=m\b)", "µ", text).replace("rad^3", "rad³").replace("m^2", "m²")
+    return text if inside else text[:1].upper() + text[1:]
+
+
+def short_names(names: list[str]) -> list[str]:
+    """Trials without their folders and suffix, with running numbers where two are alike."""
+    out: list[str] = []
+    for name in names:
+        stem = re.split(r"[/\\]", name)[-1].removesuffix(".parquet") or "trial"
+        numbered = (f"{stem} ({k})" if k > 1 else stem for k in range(1, len(names) + 2))
+        out.append(next(shown for shown in numbered if shown not in out))
+    return out
 
 
 def _signed(text: str) -> str:

@@ -1,1 +1,0 @@
-"""The part of the page on a blind campaign."""

@@ -1,1 +1,0 @@
-"""A diagnosis' part of a report."""

@@ -1,1 +1,0 @@
-"""An estimate's part of a report."""

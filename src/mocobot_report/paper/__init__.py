@@ -1,1 +1,0 @@
-"""The paper's part of a report."""
