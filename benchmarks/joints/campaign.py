@@ -31,8 +31,8 @@ from arm.sets import make as make_arm
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import diagnose, labels_of
-from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import Given
 from joints.foreign import make, thinned
 from mocobot_logs.joints.joint_log import JointLog
 from scoring import SURE, changed_settings, log_score, median_and_most

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.evidence.findings import Event, Finding, Limit, Offer, Rival, Scatter
-from discrepancy.evidence.member import Member
-from discrepancy.joints.findings import Foretold, JointVerdict
+from discrepancy.evidence.findings import Event, Finding, Limit, Member, Offer, Rival, Scatter
 from discrepancy.joints.model import SerialModel, load_model
+from discrepancy.joints.verdict import Foretold, JointVerdict
 from discrepancy.result.traces import Trace
 
 ROBOT = """<mujoco><worldbody>

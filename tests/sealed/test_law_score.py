@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discrepancy.team.laws.places import places_of
+from discrepancy.team.laws import places_of
 from sealed.law_score import FORMULAS, PLACES, VARIABLES, score_laws
 from sealed.law_truth import SHAPES
 from sealed.registry import OUTSIDE, UNLISTED

@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from discrepancy.evidence.findings import Finding, Limit, Offer, Rival, Scatter, Word
-from discrepancy.evidence.member import Member
+from discrepancy.evidence.findings import Finding, Limit, Member, Offer, Rival, Scatter, Word
 from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Parts, Values
 from discrepancy.evidence.posterior import Group, Posterior

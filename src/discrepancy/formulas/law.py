@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.evidence.member import Member
+from discrepancy.evidence.findings import Member
 from discrepancy.formulas.formula import Formula, Piece
 from discrepancy.numbers import SMALL, fitting
 from estimator.arrays import Array

@@ -16,22 +16,66 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
-from discrepancy.joints.given import Given, horizontal, with_load
-from discrepancy.joints.mechanics.along import along
-from discrepancy.joints.mechanics.regressor import (
+from discrepancy.joints.mechanics import (
+    Tree,
     body_regressor,
+    by_acceleration,
+    by_displacement,
     force_torque,
     inertial_parameters,
     rigid_torque,
     torque_of,
 )
-from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
-from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.signals import Signals
+from discrepancy.joints.signals import Signals, along
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
 from estimator.filtering import low_pass
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a problem takes besides logs and values.
+
+    Attributes:
+        changed: signals in which causes act; those after them are a reference, in which the model may be wrong, too.
+            None: all.
+        joints: which have torques, from 0; None: all.
+        motors: joints whose torque per unit is fitted to the model.
+        back_emf: joints whose drives lose torque to the speed while they are on.
+        excluded: causes that are left out.
+        tolerances: standard deviations by cause and parameter in place of the usual ones.
+        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
+        kept: weight of each sample, shape (W, J) a log; empty: all count.
+    """
+
+    changed: int | None = None
+    joints: tuple[int, ...] | None = None
+    motors: frozenset[int] = frozenset()
+    back_emf: frozenset[int] = frozenset()
+    excluded: frozenset[str] = frozenset()
+    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    noise: Sequence[Array] | None = None
+    kept: Sequence[Array] = ()
+
+
+def horizontal(gravity: Array) -> Array:
+    """Two horizontal axes, shape (2, 3)."""
+    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
+
+
+def with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
+    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
+    total = max(mass + float(load[0]), 0.05 * mass)
+    centre = (mass * com + load[1:4]) / total
+    xx, yy, zz, xy, xz, yz = load[4:]
+    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def about(c: Array) -> Array:
+        return c @ c * np.eye(3) - np.outer(c, c)
+
+    return total, centre, inertia + mass * about(com) + more - total * about(centre)
+
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
 """Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""

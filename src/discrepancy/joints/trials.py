@@ -13,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from discrepancy.evidence.findings import Event
-from discrepancy.evidence.held import HeldReadings
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.evidence.findings import Event, HeldReadings
+from discrepancy.joints.mechanics import Tree, inverse_torque
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.noise import sensor_noise
-from discrepancy.joints.servo.motor import Motor, with_torques
-from discrepancy.joints.signals import Signals
+from discrepancy.joints.servo import Motor, with_torques
+from discrepancy.joints.signals import Signals, sensor_noise
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import JointLog

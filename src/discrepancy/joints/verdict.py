@@ -5,39 +5,75 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from discrepancy.cause_names import excluded_from
-from discrepancy.evidence.findings import Event, Finding
-from discrepancy.evidence.held import with_held
+from discrepancy.evidence.findings import Event, Finding, Member, Verdict, with_held
 from discrepancy.evidence.judge import Judge
-from discrepancy.evidence.member import Member
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
-from discrepancy.evidence.search import Chosen
+from discrepancy.evidence.search import Chosen, Until
 from discrepancy.evidence.settings import SETTINGS
-from discrepancy.evidence.until import Until
 from discrepancy.formulas.law import Law
 from discrepancy.joints.causes import LINKS
-from discrepancy.joints.diagnose import Outcome, diagnose
-from discrepancy.joints.findings import Foretold, JointVerdict
-from discrepancy.joints.given import Given
+from discrepancy.joints.diagnose import Outcome, diagnose, parts_of
+from discrepancy.joints.effects import NAMES, absolute, physical
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.parts import parts_of
-from discrepancy.joints.problem import JointProblem
-from discrepancy.joints.servo.loop import loop_laws, sentences
-from discrepancy.joints.servo.motor import driven_by_voltage
+from discrepancy.joints.problem import Given, JointProblem
+from discrepancy.joints.servo import Motor, driven_by_voltage, loop_laws, sentences
+from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, at_limits, held_in, notes_of, resting, trials_of
 from discrepancy.joints.unlisted import SIGNALS, law_of
-from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
 from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
+
+
+@dataclass(frozen=True, eq=False)
+class Foretold:
+    """How well the torques of one trial are foretold by the others.
+
+    Attributes:
+        trial: its name.
+        before, after: root mean squares of measured minus foretold torque without and with the findings, as the other
+            trials have them, shape (J,) [N m or N].
+        noise: of the rows, shape (J,).
+        torque: root mean square of the measured torque, shape (J,).
+        chi2_before, chi2_after: squares over the noise's variance, per row.
+    """
+
+    trial: str
+    before: Array
+    after: Array
+    noise: Array
+    torque: Array
+    chi2_before: float
+    chi2_after: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointVerdict(Verdict):
+    """What logs say of a model of a robot of joints.
+
+    Attributes:
+        model: the robot as described.
+        parts: the trials: smoothed logs, or parts of one.
+        motors: drives that tell no torque, and what they give by what they were given.
+        foretold: one a trial, each by the others; by all of them where there is one trial only (``validated``).
+        by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
+    """
+
+    model: SerialModel
+    parts: Sequence[Signals]
+    motors: tuple[Motor, ...]
+    foretold: tuple[Foretold, ...]
+    by_the_others: Callable[[int], tuple[Finding, ...]]
+
 
 Say = Callable[[str], object]
 

@@ -1,13 +1,13 @@
-"""Residuals and pictures of a diagnosis, written into a folder."""
+"""A diagnosis and its folder: what teams and robots of joints have in common."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from discrepancy.channel import Channel
-from discrepancy.result.traces import Trace
-from discrepancy.result.traces_file import NAME as RESIDUALS
-from discrepancy.result.traces_file import save_traces
+from discrepancy.result.traces import NAME as RESIDUALS
+from discrepancy.result.traces import Channel, Trace, save_traces
 from estimator.extras import draws_plots
 
 REPORT = "report.txt"
@@ -31,6 +31,6 @@ def draw(
     """
     save_traces(traces, channels, folder / RESIDUALS)
     if draws_plots():
-        from discrepancy.result.pictures.plots import save_plots
+        from discrepancy.result.pictures import save_plots
 
         save_plots(values, traces, channels, unit, folder)

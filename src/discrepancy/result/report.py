@@ -1,4 +1,4 @@
-"""The text of a verdict of the small engine: at most five sentences and one table; the rest on request."""
+"""The text of a verdict: at most five sentences and one table; the rest on request."""
 
 from __future__ import annotations
 
@@ -8,24 +8,396 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
+import numpy as np
+
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.formulas.law import OFF_BY
-from discrepancy.numbers import number, one_each, parameter, three_digits
-from discrepancy.result.lines import (
-    NOTHING_WRONG_HERE,
-    WIDTH,
-    cause_lines,
-    label,
-    limit_lines,
-    probability_words,
-    wrapped,
-)
-from discrepancy.result.read import VERDICTS, is_of_joints
-from discrepancy.result.remains import remedy
-from discrepancy.result.text_gain import gain_lines
-from discrepancy.result.text_rollouts import rollout_lines
+from discrepancy.numbers import Shown, number, one_each, parameter, three_digits
+from discrepancy.result.read import VERDICTS, is_of_joints, kind_of, name_of
+from discrepancy.result.remains import all_as_found, remedy
 
+WIDTH = 100
 Values = Mapping[str, Any]
+NOTHING_WRONG_HERE = ("consistent", "miscalibrated")
+"""Verdicts with which no place stands out."""
+SAID = 0.001
+"""Probabilities below are not told."""
+NEAREST = 4
+"""How many of what else it might be are told."""
+
+
+def cause_lines(cause: Values, *, further: bool) -> Iterable[str]:
+    """What supports a cause, and what else may be in its place; ``further``: it is not the first."""
+    more = "a further " if further else ""
+    explained = f"Explains {more}{_percent(cause['explained']['in_sample'])} of the misfit in sample"
+    if cause["explained"]["held_out"] is not None:
+        explained += f", {_percent(cause['explained']['held_out'])} on held-out trials"
+    if cause["folds"]:
+        better = sum(gain > 0 for gain in cause["folds"])
+        explained += f" (a gain on {better} of {len(cause['folds'])} folds)"
+    over = (
+        ""
+        if cause["over_nothing"] is None
+        else f", {cause['over_nothing']:.0f} nats over nothing in its place"
+    )
+    yield from wrapped(
+        f"Probability {probability_words(cause['probability'])}{over}{_else(cause)}. {explained}."
+    )
+    alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
+    ruled_out: dict[str, Values] = {}  # the likeliest of those that may act at several instants
+    for rival in cause["alternatives"]:
+        if not rival["ambiguous"]:
+            ruled_out.setdefault(name_of(rival), rival)
+    if alike:
+        names = ", ".join(f"{name_of(rival)} by {rival['evidence_gap']:.1f} nats" for rival in alike)
+        yield from wrapped(f"Cannot be told from: {names}.")
+        advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
+        yield from wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
+    if ruled_out:
+        yield from wrapped("Fits worse: " + ", ".join(map(_rival, list(ruled_out.values())[:NEAREST])) + ".")
+    if not cause["alternatives"]:
+        yield from wrapped("No other cause comes near.")
+
+
+def _else(cause: Values) -> str:
+    """What else may be in its place, the likeliest first."""
+    instead = cause["instead"]
+    others = [(rival["probability"], name_of(rival)) for rival in cause["alternatives"]]
+    others += [
+        (instead["unlisted"], "something unlisted that looks like it"),
+        (instead["nothing"], "nothing"),
+    ]
+    likely = sorted((pair for pair in others if pair[0] >= SAID), key=lambda pair: -pair[0])[:NEAREST]
+    told = ", ".join(f"{name} ({probability_words(share)})" for share, name in likely)
+    return f"; else {told}" if told else ""
+
+
+def _rival(rival: Values) -> str:
+    loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {three_digits(rival['chi2_per_n'])}"
+    gap = rival["evidence_gap"]
+    return f"{name_of(rival)} ({abs(gap):.0f} nats {'worse' if gap >= 0 else 'better in the rows'}{loop})"
+
+
+def limit_lines(limits: Sequence[Values]) -> Iterable[str]:
+    """One line per cause: each parameter's smallest and largest limit over the places, in one unit per quantity."""
+    sizes: dict[str, dict[str, list[float | None]]] = {}
+    kinds = {entry["cause"]: kind_of(entry) for entry in limits}
+    for entry in limits:
+        for name, size in entry["parameters"].items():
+            sizes.setdefault(entry["cause"], {}).setdefault(name, []).append(size)
+    shown = one_each(
+        (parameter(name)[1], size)
+        for parameters in sizes.values() for name, values in parameters.items() for size in values if size is not None
+    )  # fmt: skip
+    for cause, parameters in sizes.items():
+        each = ", ".join(_range(*parameter(name), values, shown) for name, values in parameters.items())
+        yield from wrapped(f"{kinds[cause]} ({cause}): {each}")
+
+
+def _range(words: str, unit: str, sizes: Sequence[float | None], shown: Mapping[str, Shown]) -> str:
+    seen = sorted(size for size in sizes if size is not None)
+    if not seen:
+        return f"{words} never"
+    unit, scale = shown[unit]
+    low, high = f"{scale * seen[0]:.2g}", f"{scale * seen[-1]:.2g}"
+    both = low if low == high else f"{low} to {high}"
+    return f"{words} {both} {unit}".rstrip() + (" (not everywhere)" if len(seen) < len(sizes) else "")
+
+
+def _percent(share: float) -> str:
+    """``94 %``; a digit of what would round to none."""
+    if 0.0 < abs(share) < SAID / 100:
+        return "less than 0.001 %"
+    whole = f"{100 * share:.0f} %"
+    return whole if share == 0.0 or whole not in ("0 %", "-0 %") else f"{100 * share:.1g} %"
+
+
+def probability_words(probability: float) -> str:
+    """``94 %``; more digits near 0 and 100 %."""
+    if probability > 1.0 - SAID:
+        return "above 99.9 %"
+    if probability < SAID:
+        return "below 0.1 %"
+    return f"{100 * probability:.{1 if probability < 0.095 or probability > 0.99 else 0}f} %"
+
+
+def wrapped(text: str, indent: str = "    ") -> Sequence[str]:
+    """Lines of at most ``WIDTH`` columns."""
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
+    return [entry for entry in strongest if entry["nats"] >= 1.0]
+
+
+def label(entry: Mapping[str, Any]) -> str:
+    """An entry in words, for a plot."""
+    if entry["at"] is None:
+        return name_of(entry)
+    return f"{kind_of(entry)} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
+
+
+def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:
+    """What an entry is to the named causes: ``named``, of their ``family``, or ``other``."""
+    place = ("cause", "robot", "joint")
+    if any(all(entry[key] == cause[key] for key in place) for cause in causes):
+        return "named"
+    return "family" if any(entry["family"] == cause["family"] for cause in causes) else "other"
+
+
+
+ERRORS = {
+    "mass_percent": "mass [%]",
+    "com_mm": "centre of mass [mm]",
+    "principal_inertia_percent": "principal inertia [%]",
+    "grasp_rotation_deg": "grasp rotation [deg]",
+    "grasp_position_mm": "grasp position [mm]",
+}
+
+
+def gain_lines(values: Values) -> list[str]:
+    """Closed loop and estimates, before and after, as lines of at most 100 columns."""
+    gain = values["gain"]
+    if gain is None:
+        return []
+    lines, known = list(_closed_loop(gain, named=bool(values["causes"]))), something_is_off(values)
+    if "errors" in gain:
+        lines += ["", "[[Error of the payload's estimate (the truth is known)]]"]
+        lines += _compared(gain["errors"], ERRORS, named=known)
+    if "estimates" in gain and known:
+        lines += ["", "[[Payload's estimate]]", *_compared(*_estimates(gain["estimates"]), named=True)]
+    return lines
+
+
+def something_is_off(values: Values) -> bool:
+    """Whether the payload is to be told with what is off: a cause is named, or the robots are found all the same."""
+    return bool(values["causes"]) or values["verdict"] == "miscalibrated"
+
+
+def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
+    before, after = (gain["held_out"][name] for name in ("before", "after"))
+    if before is None or after is None:
+        return
+    what = "on trials left out of the fit" if gain["validated"] else "on trials in the fit: not validated"
+    yield from ("", f"[[{answer(gain)} ({what})]]")
+    heads = ["before", "after", "noise alone"] if named else ["error", "noise alone"]
+    units = response_units(gain)
+    width = max(26, *(len(f"{channel} rms / motion [%]") for channel in units))
+    yield f"    {'':<{width}}" + "".join(f"{head:>14}" for head in heads)
+    for channel in gain["units"]:
+        shown, scale = units[channel]
+        noise = scale * gain["noise"][f"{channel}_rms"]
+        rms = [scale * which[f"{channel}_rms"] for which in (before, after)]
+        share = [100.0 * which[f"{channel}_nrmse"] for which in (before, after)]
+        yield _numbers_line(f"{channel} rms [{shown}]", rms, named=named, last=noise, width=width)
+        yield _numbers_line(f"{channel} rms / motion [%]", share, named=named, width=width)
+    yield _numbers_line(
+        "chi2/n", [before["chi2_per_n"], after["chi2_per_n"]], named=named, last=1.0, width=width
+    )
+    if gain["removed"] is not None and named:
+        low, high = gain["removed"]["interval"]
+        count = sum(t["before"] is not None and t["after"] is not None for t in gain["trials"])
+        text = f"    {100 * gain['removed']['share']:.1f} % of the excess error removed"
+        if low is not None and high is not None and count > 1:
+            text += f" (95 % interval over {count} trials: {100 * low:.1f} to {100 * high:.1f} %)"
+        yield text
+    yield from (f"    chi2/n {found}" for found in all_as_found(gain))
+
+
+def foretold_torques(gain: Values) -> bool:
+    """Whether the channels are torques of a serial robot, foretold from its motion: no commands are needed for them."""
+    return all(channel.endswith(" torque") for channel in gain["units"])
+
+
+def floor_words(gain: Values) -> str:
+    """What is left at best."""
+    return "noise" if foretold_torques(gain) else "noise and integration error"
+
+
+def answer(gain: Values) -> str:
+    """What is held against the recordings."""
+    if foretold_torques(gain):
+        return "Torques, foretold from the recorded motion"
+    return "Response to the recorded commands, simulated again"
+
+
+def response_units(gain: Values) -> dict[str, Shown]:
+    """In which unit every channel's error is shown: one for all channels of a kind, by the largest error."""
+    errors = [gain["held_out"]["before"], *(trial["before"] for trial in gain["trials"])]
+    shown = one_each(
+        (unit, error[f"{channel}_rms"])
+        for error in errors
+        if error
+        for channel, unit in gain["units"].items()
+    )
+    return {channel: shown[unit] for channel, unit in gain["units"].items()}
+
+
+def _estimates(estimates: Values) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
+    """Numbers of an estimate by label: mass, centre of mass, moments, distances of the grasps."""
+    table: dict[str, dict[str, float]] = {}
+    for name, estimate in estimates.items():
+        row = {"mass [kg]": estimate["mass_kg"]}
+        row |= {f"centre of mass {a} [m]": v for a, v in zip("xyz", estimate["p_1c_m"], strict=True)}
+        row |= {
+            f"principal {k} [kg m^2]": v for k, v in enumerate(estimate["principal_inertia_kgm2"], start=1)
+        }
+        for i, grasp in enumerate(estimate["grasps"], start=1):
+            if i > 1:
+                row[f"distance of grasp {i} [m]"] = float(np.linalg.norm(grasp["p_1i_m"]))
+        table[name] = row
+    return table, {label: label for label in table["before"]}
+
+
+def _compared(values: Values, labels: Mapping[str, str], *, named: bool) -> Iterable[str]:
+    if named:
+        yield f"    {'':<26}{'before':>14}{'after':>14}"
+    for key, label in labels.items():
+        yield _numbers_line(label, [values["before"][key], values["after"][key]], named=named)
+
+
+def _numbers_line(
+    label: str, numbers: list[float], *, named: bool, last: float | None = None, width: int = 26
+) -> str:
+    shown = (numbers if named else numbers[:1]) + ([] if last is None else [last])
+    return f"    {label:<{width}}" + "".join(f"{x:>14.4g}" for x in shown)
+
+
+FREE = "Rolled out from measured states under the logged torques"
+LOOP = "Rolled out under the logged commands, loops closed"
+ROLLED = "rms error of the position, of the given model -> of the extended one (share removed)"
+
+
+def rollout_lines(values: Values) -> list[str]:
+    """Errors of every joint before and after, as lines of at most 100 columns; none where there are no rollouts."""
+    rolled = values.get("rollouts")
+    if rolled is None:
+        return []
+    lines = (
+        list(_free(rolled)) if rolled["why_not"] is None else [f"Not rolled out freely: {rolled['why_not']}."]
+    )
+    return ["", f"[[{FREE} ({blocks(rolled)})]]", *_indented(lines), *_loop(rolled)]
+
+
+def _indented(lines: Iterable[str]) -> Iterable[str]:
+    for line in lines:
+        indented = f"    {line}"
+        if len(indented) <= WIDTH:
+            yield indented
+        else:
+            yield from textwrap.wrap(line, WIDTH, initial_indent="    ", subsequent_indent="    ")
+
+
+def blocks(rolled: Values) -> str:
+    """On which blocks."""
+    return "on blocks left out of the fit" if rolled["validated"] else "on the block itself: not validated"
+
+
+def _free(rolled: Values) -> Iterable[str]:
+    horizons = rolled["horizons"]
+    if horizons[0]["after"] is not None:
+        yield ROLLED
+    heads = [f"{h['seconds']:g} s ahead" for h in horizons]
+    shown = shown_units(rolled)
+    rows = []
+    for j in range(len(rolled["joints"])):
+        _, scale = shown[rolled["units"][j]]
+        cells = []
+        for h in horizons:
+            after = None if h["after"] is None else h["after"]["rms"][j]
+            removed = None if h["removed"] is None else h["removed"][j]
+            cells.append(_cell(h["before"]["rms"][j], after, removed, scale, named=h["after"] is not None))
+        rows.append(cells)
+    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+    called = _called(rolled, shown, WIDTH - 4 - sum(widths) - 2 * len(widths))
+    for name, cells in zip(["joint", *called], [heads, *rows], strict=True):
+        line = (f"  {cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+        yield f"{name:<{max(map(len, called))}}" + "".join(line)
+    yield from diverged_sentences(rolled)
+    if rolled["not_simulated"]:
+        yield f"Not in the rollouts: {', '.join(rolled['not_simulated'])}."
+    yield from rolled["refused"]
+
+
+def _called(rolled: Values, shown: Mapping[str, Shown], room: int) -> list[str]:
+    """Joints by name, with units; by number where names are too long: cut short, they may be alike."""
+    units = [shown[unit][0] for unit in rolled["units"]]
+    named = [f"{name} [{unit}]" for name, unit in zip(rolled["joints"], units, strict=True)]
+    if max(map(len, named)) <= room:
+        return named
+    return [f"joint {j} [{unit}]" for j, unit in enumerate(units, start=1)]
+
+
+def _cell(
+    before: float | None, after: float | None, removed: float | None, scale: float, *, named: bool
+) -> str:
+    text = _error(before, scale)
+    if not named:
+        return text
+    share = "" if removed is None else f" ({100.0 * removed:.0f} %)"
+    return f"{text} -> {_error(after, scale)}{share}"
+
+
+def _error(value: float | None, scale: float) -> str:
+    return "diverged" if value is None else f"{scale * value:.3g}"
+
+
+def diverged_sentences(rolled: Values) -> Iterable[str]:
+    """How many rollouts diverged, by model and horizon."""
+    for which, words in (("before", "the given model"), ("after", "the extended model")):
+        counts = [
+            f"{max(h[which]['diverged'])} of {h['starts']} at {h['seconds']:g} s"
+            for h in rolled["horizons"]
+            if h[which] is not None and max(h[which]["diverged"])
+        ]
+        if counts:
+            listed = ", ".join(counts)
+            yield f"Rollouts of {words} that diverged in the worst joint: {listed}; they are not in its errors."
+
+
+def shown_units(rolled: Values) -> dict[str, Shown]:
+    """The unit in which errors of joints that turn and of those that slide are shown: by what is off first."""
+    free = [(h[which] or {}).get("rms", []) for h in rolled["horizons"][:1] for which in ("before", "after")]
+    loop = [rolled["commanded"][which] or [] for which in ("before", "after")]
+    return one_each(
+        (rolled["units"][j], x or 0.0)
+        for errors in (*free, *loop, [0.0] * len(rolled["units"]))
+        for j, x in enumerate(errors)
+    )
+
+
+def _loop(rolled: Values) -> Iterable[str]:
+    loop = rolled["commanded"]
+    if loop["why_not"] is not None:
+        yield from _indented([f"The closed loop was not simulated: {loop['why_not']}."])
+        return
+    yield from ("", f"[[{LOOP} ({blocks(rolled)})]]", *_indented(_loop_errors(rolled, loop)))
+
+
+def _loop_errors(rolled: Values, loop: Values) -> Iterable[str]:
+    shown = shown_units(rolled)
+    named = loop["after"] is not None
+    cells = []
+    for j in range(len(rolled["joints"])):
+        _, scale = shown[rolled["units"][j]]
+        after, removed = (loop[key][j] if named else None for key in ("after", "removed"))
+        cell = _cell(loop["before"][j], after, removed, scale, named=named)
+        cells.append(cell)
+    called = _called(rolled, shown, WIDTH - 4 - 2 - max(map(len, cells)))
+    for name, cell in zip(called, cells, strict=True):
+        yield f"{name:<{max(map(len, called))}}  {cell:>{max(map(len, cells))}}"
+    for which, words in (("before", "the given model"), ("after", "the extended model")):
+        count = lost(loop["blocks"], which)
+        if count:
+            yield f"{count} of {len(loop['blocks'])} blocks of {words} diverged; they are in no error."
+
+
+def lost(runs: Sequence[Values], which: str) -> int:
+    """How many blocks diverged in some joint."""
+    return sum(run[which] is not None and None in run[which] for run in runs)
+
+
 MOST_NAMED = 4
 """Findings that the second sentence lists."""
 MOST_ALIKE = 3
@@ -50,7 +422,7 @@ def format_verdict(values: Values, *, verbose: bool = False) -> str:
     """Readable report of at most 100 columns.
 
     Args:
-        values: a verdict in the form of ``result.told``.
+        values: a verdict in the form of ``result.json``.
         verbose: whether to tell rivals, limits, rollouts, notes and evidence, too.
     """
     lines = [*wrapped(" ".join(_sentences(values, verbose=verbose)), ""), *_table(values, verbose=verbose)]

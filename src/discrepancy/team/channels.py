@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.channel import Channel
+from discrepancy.result.traces import Channel
+from discrepancy.team.linear.rows import Whitening
 from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.linear.whitening import Whitening
 from estimator.arrays import Array
 from estimator.rigid_team.slots import PHI, TAU, THETA
 

@@ -19,8 +19,8 @@ from discrepancy.candidate import Candidate, Transient
 from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
+from discrepancy.team.candidates import origin_of
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.linear.origin import origin_of
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.unlisted import OPEN_NATS, Laws
 from estimator.arrays import Array

@@ -19,10 +19,17 @@ from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Key, Search, State
 from discrepancy.formulas.law import Law
 from discrepancy.numbers import three_digits
-from discrepancy.team.around import found_in, robots_at
-from discrepancy.team.closed_loop import named_effects, posture, team_of
-from discrepancy.team.diagnose import TeamOutcome
-from discrepancy.team.gain import MARGIN_SHARE, Gain, Response, is_worse, mean_chi2
+from discrepancy.team.closed_loop import (
+    MARGIN_SHARE,
+    Gain,
+    Response,
+    is_worse,
+    mean_chi2,
+    named_effects,
+    posture,
+    team_of,
+)
+from discrepancy.team.diagnose import TeamOutcome, found_in, robots_at
 from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arrays import Array

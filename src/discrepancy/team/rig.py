@@ -11,14 +11,17 @@ import numpy as np
 
 from discrepancy.candidate import Candidate
 from discrepancy.cause_names import excluded_from
-from discrepancy.channel import Channel
+from discrepancy.result.traces import Channel
 from discrepancy.team.candidates import (
+    beyond,
     every_candidate,
     further_shapes,
     in_shapes,
     indices,
     is_adjusted,
+    origin_of,
     other_shapes,
+    places_of,
     shape_steps,
 )
 from discrepancy.team.causes import CAUSES
@@ -31,19 +34,25 @@ from discrepancy.team.closed_loop import (
     scale_of_response,
     why_not,
 )
-from discrepancy.team.linear.adjust import as_loud, noise_of
-from discrepancy.team.linear.filed import OneByOne, is_filed, rested
-from discrepancy.team.linear.origin import beyond, origin_of, places_of
-from discrepancy.team.linear.patches import Patches
-from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import HEALTHY, limits_of
+from discrepancy.team.linear.rows import Patches, Reduction, Whitening, whitened
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.start import (
+    OneByOne,
+    Sensed,
+    as_loud,
+    exact_residual,
+    is_filed,
+    linearised_trials,
+    noise_of,
+    rested,
+    start_shared,
+    trial_at,
+    without_bases,
+)
 from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.linear.unsearched import trial_at, without_bases
-from discrepancy.team.linear.whitening import Whitening, whitened
-from discrepancy.team.long.parts import LaterPart
-from discrepancy.team.words import statements
+from discrepancy.team.long import LaterPart
+from discrepancy.team.told import statements
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate

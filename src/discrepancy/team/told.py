@@ -1,4 +1,4 @@
-"""A verdict on a team as JSON values, text and folder; ``discrepancy.result.json`` documents the keys."""
+"""A verdict on a team as JSON values with words, text and folder."""
 
 from __future__ import annotations
 
@@ -12,23 +12,152 @@ from typing import Any
 import numpy as np
 
 from discrepancy.candidate import Candidate
-from discrepancy.evidence.findings import Finding
-from discrepancy.evidence.held import words_of
+from discrepancy.evidence.findings import Finding, words_of
+from discrepancy.numbers import Numbers, three_digits
 from discrepancy.result.folder import REPORT, draw
+from discrepancy.result.json import Told, Values
 from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
 from discrepancy.result.remains import of_response
 from discrepancy.result.report import format_verdict
-from discrepancy.result.told import Told, Values
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.closed_loop import Gain, Response
 from discrepancy.team.diagnose import TeamOutcome
-from discrepancy.team.gain import Gain, Response
 from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.signature import signature
 from discrepancy.team.verdict import TeamVerdict
-from discrepancy.team.words import TeamWords
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
+
+
+def signature(rig: TeamRig, z: Sequence[Array]) -> dict[str, Any]:
+    """Describe what is left of the whitened residual beyond noise, shape (n, C) a trial, as plain numbers.
+
+    Returns:
+        ``chi2_per_n`` in all and by ``kind`` of channel, ``robot``, ``trial``; ``moving_share``: part of the excess
+        while the rig moves; ``correlation`` of its size with the rig's explanatory quantities; ``frequency_hz``:
+        median frequency of the worst channel; ``along``: the source along which most of it points; ``sentence``.
+    """
+    squares = np.concatenate([(x**2) for x in z])
+    out: dict[str, Any] = {"chi2_per_n": float(squares.mean())}
+    kinds = sorted({channel.kind for channel in rig.channels})
+    out["kind"] = {
+        kind: float(squares[:, [k for k, c in enumerate(rig.channels) if c.kind == kind]].mean())
+        for kind in kinds
+    }
+    out["channel"] = {c.name: float(squares[:, k].mean()) for k, c in enumerate(rig.channels)}
+    out["trial"] = {name: float((x**2).mean()) for name, x in zip(rig.trials, z, strict=True)}
+    size = np.concatenate([(x**2).mean(axis=1) for x in z])
+    quantities = [rig.quantities(t) for t in range(len(rig.trials))]
+    out["correlation"] = {}
+    for name in quantities[0]:
+        values = np.concatenate([q[name] for q in quantities])
+        constant = np.std(values) < 1e-12 or np.std(size) < 1e-12
+        out["correlation"][name] = 0.0 if constant else float(np.corrcoef(values, np.log(size + 1e-12))[0, 1])
+    speed = np.concatenate([q["speed"] for q in quantities])
+    moving = speed > 0.2 * np.sqrt(np.mean(speed**2))
+    excess = np.maximum(size - 1.0, 0.0)
+    out["moving_share"] = float(excess[moving].sum() / max(excess.sum(), 1e-12))
+    worst = int(np.argmax(squares.mean(axis=0)))
+    out["worst_channel"] = rig.channels[worst].name
+    out["frequency_hz"] = _median_frequency(rig, z, worst)
+    out["along"] = _along(rig, z)
+    out["sentence"] = _sentence(out)
+    return out
+
+
+def _median_frequency(rig: TeamRig, z: Sequence[Array], channel: int) -> float:
+    power, at = 0.0, None
+    for t, x in enumerate(z):
+        rate = rig.row_rate_hz(t)
+        series = x[: len(x) // 2 * 2, channel]
+        spectrum = np.abs(np.fft.rfft(series, 512)) ** 2
+        power, at = power + spectrum, np.fft.rfftfreq(512, 1.0 / rate)
+    total = np.cumsum(power)
+    return float(at[np.searchsorted(total, 0.5 * total[-1])]) if at is not None else 0.0
+
+
+def _along(rig: TeamRig, z: Sequence[Array]) -> dict[str, float]:
+    """Share of the squared residual along each source's own direction (one of C dimensions, or a few)."""
+    shares: dict[str, list[float]] = {}
+    total = sum(float(np.sum(x**2)) for x in z)
+    for t, x in enumerate(z):
+        for name, directions in rig.directions(t).items():
+            inside = np.einsum("nc,nck->nk", x, directions)
+            shares.setdefault(name, []).append(float(np.sum(inside**2)))
+    ranked = sorted(((sum(v) / max(total, 1e-12), k) for k, v in shares.items()), reverse=True)
+    return {name: share for share, name in ranked[:5]}
+
+
+def _sentence(out: dict[str, Any]) -> str:
+    kind = max(out["kind"], key=lambda k: out["kind"][k])
+    source, share = next(iter(out["along"].items()), ("no single source", 0.0))
+    motion = "while it moves" if out["moving_share"] > 0.6 else "at rest and in motion alike"
+    return (
+        f"chi2/n is {three_digits(out['kind'][kind])} in the {kind} channels (worst: {out['worst_channel']}, around "
+        f"{out['frequency_hz']:.1f} Hz); {100 * share:.0f} % of the misfit lies along {source}, {motion}."
+    )
+
+
+UNDECIDABLE = (
+    (
+        "zero of the last gimbal axis",
+        "it turns the grasp frame by a constant, and the grasp frame is itself unknown",
+        "a grasp whose orientation is known",
+    ),
+    (
+        "mass of the gimbal and the platform",
+        "a point mass at the wrist is a part of the payload",
+        "a run of the arm alone",
+    ),
+    (
+        "a scale common to all torques",
+        "it scales the payload's mass and inertia and nothing else",
+        "a known weight on the payload",
+    ),
+    (
+        "which robot's gimbal rubs",
+        "a pure moment about parallel axes is the same wherever it acts; only the axis shows",
+        "one robot released at a time",
+    ),
+)
+"""What recordings of a parked team that holds one rigid payload cannot decide: what, why, and what would."""
+
+
+class TeamWords:
+    """Sentences about a mocobot team."""
+
+    units = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}  # noqa: RUF012
+
+    def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+        """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+        cause = CAUSES[candidate.cause]
+        return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
+
+    def separate(self, candidate: Candidate) -> str:
+        """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
+        return CAUSES[candidate.cause].separate
+
+    def unit(self, name: str) -> str:
+        """Unit of a closed-loop channel, or of a quantity that a misfit may depend on."""
+        return self.units[name]
+
+
+def statements(robots: int, *, aligned: bool) -> list[dict[str, Any]]:
+    """What, why, and what would decide it, for a team of N robots whose clocks the motion may have set (aligned)."""
+    said = [{"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE]
+    if aligned:
+        why = "the conversion has taken out what the motion tells of the clocks"
+        said.append(
+            {"what": "the robots' clocks", "why": why, "remedy": "one clock for all, and no --clock correct"}
+        )
+    if robots == 1:
+        what = "every error of angles, lengths, bases and grasps of a single robot"
+        said.append(
+            {"what": what, "why": "no other robot tells where the payload is", "remedy": "a second robot"}
+        )
+    return said
+
 
 NOT_SIMULATED: Values = {
     "held_out": {"before": None, "after": None, "as_found": None}, "units": {}, "noise": {}, "removed": None,

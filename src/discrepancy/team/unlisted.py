@@ -1,4 +1,4 @@
-"""Errors that no cause of the tables makes: smooth functions of one signal, at one place of a team."""
+"""Laws of a team that no table lists."""
 
 from __future__ import annotations
 
@@ -14,11 +14,7 @@ from scipy.stats import rankdata
 from discrepancy.evidence.posterior import Group
 from discrepancy.formulas.formula import Curve, Kind, Piece, formula_of
 from discrepancy.formulas.law import Law, Of, traces
-from discrepancy.team.laws.directions import directions_at
-from discrepancy.team.laws.place import Place
-from discrepancy.team.laws.places import places_of
-from discrepancy.team.laws.variable import TIME, Variable
-from discrepancy.team.laws.variables import joint_variable, signals_of
+from discrepancy.team.laws import TIME, Place, Variable, directions_at, joint_variable, places_of, signals_of
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 

@@ -8,11 +8,9 @@ import numpy as np
 import plotly.graph_objects as go
 
 from discrepancy.numbers import Shown
-from discrepancy.result.lines import drawn, label, relation
-from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.read import is_of_joints
-from discrepancy.result.text_rollouts import blocks, diverged_sentences, lost, shown_units
-from discrepancy.result.traces import Group, Trace, group_units, groups
+from discrepancy.result.report import blocks, diverged_sentences, drawn, label, lost, relation, shown_units
+from discrepancy.result.traces import Group, Trace, binned, group_units, groups, multiples, spectrum
 from estimator.arrays import Array
 from mocobot_report.blocks.book import Book, section, tabs
 from mocobot_report.blocks.charts import Axis, axis, chart, dots, figure, line, log_axis, row_axis

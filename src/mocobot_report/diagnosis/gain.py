@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.result.remains import all_as_found
-from discrepancy.result.text_gain import (
+from discrepancy.result.report import (
     ERRORS,
     floor_words,
     foretold_torques,

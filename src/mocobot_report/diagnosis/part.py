@@ -9,7 +9,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.numbers import one_each, parameter
-from discrepancy.result.lines import NEAREST, NOTHING_WRONG_HERE, SAID, label
 from discrepancy.result.read import (
     AS_FOUND,
     EXTENDED,
@@ -20,7 +19,7 @@ from discrepancy.result.read import (
     read_diagnosis,
 )
 from discrepancy.result.remains import farthest, remedy, sizes_of
-from discrepancy.result.text_gain import foretold_torques
+from discrepancy.result.report import NEAREST, NOTHING_WRONG_HERE, SAID, foretold_torques, label
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate

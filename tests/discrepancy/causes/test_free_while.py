@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.team.causes.free_while import free_while
+from discrepancy.team.causes.friction import free_while
 
 RATE_HZ = 100.0
 

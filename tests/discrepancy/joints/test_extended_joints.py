@@ -19,17 +19,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.evidence.findings import Event, Finding
-from discrepancy.evidence.member import Member
-from discrepancy.joints.effects import effects_of, write_extended
-from discrepancy.joints.given import Given
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.evidence.findings import Event, Finding, Member
+from discrepancy.joints.effects import absolute, effects_of, physical, write_extended
+from discrepancy.joints.mechanics import Tree, inverse_torque
 from discrepancy.joints.model import SerialModel, load_model
-from discrepancy.joints.problem import JointProblem, joint_problem
-from discrepancy.joints.rolled.robot import LoggedTorques, Robot
+from discrepancy.joints.problem import Given, JointProblem, joint_problem
+from discrepancy.joints.rolled import LoggedTorques, Robot
 from discrepancy.joints.signals import Signals
-from discrepancy.joints.values import absolute, physical
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.extended import load_effects, step

@@ -16,9 +16,8 @@ from diagnosed import check_finite, small_diagnosis
 from discrepancy.cause_names import JOINTS as EXCLUDABLE
 from discrepancy.evidence.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints import diagnosed
-from discrepancy.joints.causes import CAUSES, OTHERS, WORDS
-from discrepancy.joints.json import verdict_to_dict
-from discrepancy.joints.said import Said, parameter_name
+from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, Said, parameter_name
+from discrepancy.joints.diagnosed import verdict_to_dict
 from discrepancy.result.read import read_diagnosis
 from discrepancy.result.report import format_verdict
 from estimator.errors import InputError

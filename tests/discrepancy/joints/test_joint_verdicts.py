@@ -10,12 +10,10 @@ import pytest
 
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from discrepancy.joints.diagnose import Outcome, Until, labels_of
-from discrepancy.joints.findings import JointVerdict
-from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import joint_problem
+from discrepancy.joints.problem import Given, joint_problem
 from discrepancy.joints.trials import trials_of
-from discrepancy.joints.verdict import judged
+from discrepancy.joints.verdict import JointVerdict, judged
 from estimator.errors import InputError
 from followed_arm import RATE_HZ, TORQUE_NOISE_NM, Change, arm_log, arm_model, both, rubs
 from mocobot_logs.joints.joint_log import JointLog

@@ -13,17 +13,23 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.evidence.findings import Event, Finding
-from discrepancy.evidence.member import Member
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.evidence.findings import Event, Finding, Member
+from discrepancy.joints.mechanics import Tree, inverse_torque
 from discrepancy.joints.model import SerialModel, load_model
-from discrepancy.joints.rolled.closed import laws_without, longest
-from discrepancy.joints.rolled.free import diverged, in_neither, rms, starts, usable
-from discrepancy.joints.rolled.robot import LoggedTorques, Robot
-from discrepancy.joints.rolled.told import rolled_out
+from discrepancy.joints.rolled import (
+    LoggedTorques,
+    Robot,
+    diverged,
+    in_neither,
+    laws_without,
+    longest,
+    rms,
+    rolled_out,
+    starts,
+    usable,
+)
 from discrepancy.joints.signals import Signals
-from discrepancy.result.text_rollouts import rollout_lines
+from discrepancy.result.report import rollout_lines
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import step
@@ -71,7 +77,7 @@ def turning(rubs: float = RUBS, seconds: float = 6.0, rate_hz: float = 500.0) ->
 @pytest.fixture
 def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Enough where only who is rolled out matters."""
-    monkeypatch.setattr("discrepancy.joints.rolled.free.MOST_STARTS", 10)
+    monkeypatch.setattr("discrepancy.joints.rolled.MOST_STARTS", 10)
 
 
 def signals(model: SerialModel, log: JointLog) -> Signals:
@@ -370,7 +376,7 @@ def test_closed_loop_of_mujocos_own_servo(tmp_path: Path) -> None:
 def test_closed_loops_are_as_long_as_one_hundred_seconds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("discrepancy.joints.rolled.told.MOST_LOOP_S", 4.0)
+    monkeypatch.setattr("discrepancy.joints.rolled.MOST_LOOP_S", 4.0)
     model = read(tmp_path, TURNTABLE)
     rolled = rolled_out(verdict(model, halves(signals(model, commanded(0.0)))))
     assert rolled is not None

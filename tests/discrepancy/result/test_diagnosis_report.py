@@ -12,21 +12,18 @@ import pytest
 
 from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
-from discrepancy.channel import Channel
 from discrepancy.numbers import number
 from discrepancy.result.json import plain
-from discrepancy.result.pictures.plots import file_names
-from discrepancy.result.pictures.plots_evidence import closed_loop_figure
+from discrepancy.result.pictures import closed_loop_figure, file_names
 from discrepancy.result.remains import of_response
-from discrepancy.result.report import format_verdict
-from discrepancy.result.text_gain import ERRORS, response_units
-from discrepancy.result.traces import Trace, group_units, groups
+from discrepancy.result.report import ERRORS, format_verdict, response_units
+from discrepancy.result.traces import Channel, Trace, group_units, groups
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors
-from discrepancy.team.linear.whitening import Whitening
+from discrepancy.team.linear.rows import Whitening
+from discrepancy.team.told import TeamWords
 from discrepancy.team.verdict import unwhitened
-from discrepancy.team.words import TeamWords
 from mocobot_sim.effects.catalogue import EFFECTS
 
 WIDTH = 100

@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from discrepancy.channel import Channel
-from discrepancy.result.traces import Trace
-from discrepancy.result.traces_file import TABLES, load_traces, save_traces
+from discrepancy.result.traces import TABLES, Channel, Trace, load_traces, save_traces
 from estimator import inputs
 from estimator.errors import InputError
 

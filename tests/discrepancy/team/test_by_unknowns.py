@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from discrepancy.team.linear.by_unknowns import by_bases, by_shared
+from discrepancy.team.linear.trial_linear import by_bases, by_shared
 from estimator.rigid_team.residual import balance, pose_error
 from team_case import exact
 

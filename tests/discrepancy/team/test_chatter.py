@@ -8,7 +8,7 @@ from helpers.team_case import Case, true_bases, true_shared
 
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import linearise

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from discrepancy.team.linear.chatter import Fast
-from discrepancy.team.linear.inertia import held_inertia
-from discrepancy.team.linear.start import linearised_trials, start_shared
+from discrepancy.team.linear.noise import Fast
+from discrepancy.team.linear.rows import Whitening
+from discrepancy.team.linear.start import held_inertia, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.linear.whitening import Whitening
 from discrepancy.team.rig import TeamRig
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.principal import inertia_parameters

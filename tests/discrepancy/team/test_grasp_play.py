@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.team.candidates import shape_steps
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.causes.free_while import free_while, in_parts, pieces_while
-from discrepancy.team.causes.grasp_play import displaced
+from discrepancy.team.causes.friction import free_while, in_parts, pieces_while
+from discrepancy.team.causes.yielding import displaced
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
 from estimator.estimate.principal import inertia_parameters
 from patchwork import dense

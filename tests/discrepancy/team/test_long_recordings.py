@@ -11,12 +11,10 @@ import mocobot
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear import filed as filing
-from discrepancy.team.linear.filed import is_filed
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.long import choice, parts
-from discrepancy.team.long.choice import Choice
-from discrepancy.team.long.parts import LaterPart, parted
+from discrepancy.team.linear.start import is_filed
+from discrepancy.team.long import Choice, LaterPart, choice, parted, parts
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload

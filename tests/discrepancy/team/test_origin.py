@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.team.candidates import every_candidate, explained_by
+from discrepancy.team.candidates import every_candidate, explained_by, origin_of, places_of
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.linear.adjust import SignalNoise
-from discrepancy.team.linear.origin import origin_of, places_of
-from discrepancy.team.linear.start import Sensed, exact_residual
+from discrepancy.team.linear.start import Sensed, SignalNoise, exact_residual
 from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from discrepancy.team.linear.patches import Patches
-from discrepancy.team.linear.whitening import Whitening
+from discrepancy.team.linear.rows import Patches, Whitening
 from patchwork import dense, patchwork
 
 N, C, MOVING = 60, 5, 50

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt, welch
 
-from discrepancy.team.linear.reduction import TEAM_ROWS_HZ, Reduction
+from discrepancy.team.linear.rows import TEAM_ROWS_HZ, Reduction
 from discrepancy.team.linear.signals import TEAM_TRIM_S, Signals
 from estimator.errors import InputError
 from patchwork import dense

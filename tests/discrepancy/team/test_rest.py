@@ -7,9 +7,8 @@ import pytest
 from scipy.signal import fftconvolve
 from scipy.stats import chi2
 
-from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import Resting
-from discrepancy.team.linear.whitening import Whitening
+from discrepancy.team.linear.rows import Reduction, Whitening
 from team_case import exact
 
 LIMIT_NM = 0.05

@@ -11,14 +11,12 @@ import mocobot
 from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import start_shared
-from discrepancy.team.linear.unsearched import trial_at, without_bases
+from discrepancy.team.linear.start import start_shared, trial_at, without_bases
+from discrepancy.team.long import Choice, Left, more_left, searched_s, times_as_much
 from discrepancy.team.long import choice as choices
 from discrepancy.team.long import left as lefts
-from discrepancy.team.long.choice import Choice, searched_s
-from discrepancy.team.long.left import Left, more_left, times_as_much
 from discrepancy.team.rig import AsFound, TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from estimator.arm.unit import COUNT, ArmUnit

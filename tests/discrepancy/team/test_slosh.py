@@ -7,8 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.causes.pendulum import Pendulum, swung
-from discrepancy.team.causes.slosh import OFF
+from discrepancy.team.causes.slosh import OFF, Pendulum, swung
 from outside_wrench import check_wrench, point, relieved, reported
 from recorded_team import COM
 from team_case import DESIGN, residual_of

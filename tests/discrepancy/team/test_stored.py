@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from discrepancy.team.linear.stored import given_back, is_stored, stored
+from discrepancy.team.linear.trial_linear import given_back, is_stored, stored
 
 
 def resident_MB() -> float:

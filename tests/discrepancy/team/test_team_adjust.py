@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
-from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.start import Sensed, noise_rows
-from discrepancy.team.linear.trial_linear import filtered
-from discrepancy.team.linear.whitening import Whitening
+from discrepancy.team.linear.rows import Whitening
+from discrepancy.team.linear.start import Sensed, SignalNoise, noise_rows, with_adjusted_signals
+from discrepancy.team.linear.trial_linear import by_bases, by_shared, filtered
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.rigid_team.residual import balance, grasp_data

@@ -14,7 +14,7 @@ from discrepancy.team.candidates import in_shapes
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.causes.readings import Late
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed
 from discrepancy.team.linear.trial_linear import filtered, linearise

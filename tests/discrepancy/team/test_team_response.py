@@ -12,12 +12,11 @@ import mocobot
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.closed_loop import mean_chi2
 from discrepancy.team.diagnose import TeamOutcome, search_team
-from discrepancy.team.gain import mean_chi2
+from discrepancy.team.long import Choice, search_parts
 from discrepancy.team.long import choice as choices
 from discrepancy.team.long import left as lefts
-from discrepancy.team.long.choice import Choice
-from discrepancy.team.long.search import search_parts
 from discrepancy.team.response import as_found, confirm, write_model
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from diagnosed import check_finite
-from discrepancy.joints.json import verdict_to_dict
+from discrepancy.joints.diagnosed import verdict_to_dict
 from discrepancy.result.read import read_diagnosis
 from discrepancy.result.report import format_verdict
 from discrepancy.team import told

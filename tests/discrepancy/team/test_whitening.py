@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from discrepancy.team.linear.whitening import Whitening, whitened
+from discrepancy.team.linear.rows import Whitening, whitened
 
 MIX = np.array([[2.0, 0.0, 0.0], [0.3, 0.7, 0.0], [0.0, -3.0, 20.0]])
 AR = (1.1, -0.4)  # x_t = 1.1 x_t-1 - 0.4 x_t-2 + e

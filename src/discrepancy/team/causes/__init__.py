@@ -3,11 +3,11 @@
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.causes.cable import PayloadTether, Tether
 from discrepancy.team.causes.friction import GimbalFriction, JointFriction, SeaHysteresis
-from discrepancy.team.causes.geometry import BaseTilt, LinkLength
-from discrepancy.team.causes.grasp_play import GraspPlay
 from discrepancy.team.causes.payload import Drag, PayloadMass, Push
 from discrepancy.team.causes.readings import (
+    BaseTilt,
     ClockDelay,
+    LinkLength,
     PhiZero,
     SeaBias,
     SeaHardening,
@@ -18,7 +18,7 @@ from discrepancy.team.causes.readings import (
     TorqueSkew,
 )
 from discrepancy.team.causes.slosh import Slosh
-from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex
+from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex, GraspPlay
 
 CATALOGUE = (
     PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,

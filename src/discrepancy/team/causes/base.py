@@ -11,7 +11,7 @@ import numpy as np
 
 from discrepancy.candidate import Candidate, Parameter, Transient
 from discrepancy.numbers import Numbers, number
-from discrepancy.team.linear.patches import Patches
+from discrepancy.team.linear.rows import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.arms import Arms
