@@ -27,7 +27,7 @@ MOST_ARGUMENTS = 7
 """Arguments of one function, without ``self`` and ``cls``."""
 LONG_CALLS = {
     "discrepancy.team.diagnosis.diagnose_team": 11,
-    "discrepancy.team.laws._joint": 9,
+    "discrepancy.team.laws.places._joint": 9,
     "discrepancy.team.rig._at": 9,
     "estimator.arm.dynamics.wrench_on_payload": 8,
     "estimator.calibrate.calibrate._result": 8,

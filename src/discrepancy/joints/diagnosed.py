@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from discrepancy.evidence.findings import Finding, words_of
 from discrepancy.joints.causes import LINKS, WORDS, Said, joint_in_words, link_in_words, titled
-from discrepancy.joints.effects import write_extended
-from discrepancy.joints.model import SerialModel
+from discrepancy.joints.effects import all_effects
+from discrepancy.joints.model import SerialModel, load_spec
 from discrepancy.joints.verdict import Foretold, JointVerdict
 from discrepancy.numbers import three_digits
-from discrepancy.result.folder import REPORT, draw
+from discrepancy.result.folder import Diagnosed
 from discrepancy.result.json import ALL, Told, Values
-from discrepancy.result.read import EXTENDED, NAME
-from discrepancy.result.report import format_verdict
+from discrepancy.result.read import EXTENDED
+from discrepancy.result.remains import excess_removed
 from discrepancy.result.traces import Channel
 from estimator.arrays import Array
-from estimator.errors import InputError
-from estimator.files import write_json, write_text
+from mocobot_sim.scene.named_files import check_named
+from mocobot_sim.serial.extended import write_extended as write_model
 
 
 def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = None) -> Values:
@@ -127,7 +126,9 @@ def _gain(verdict: JointVerdict) -> Values | None:
         "held_out": {which: _means(each) for which, each in sides.items()} | {"as_found": None},
         "units": {name: unit_of(verdict.model, j) for j, name in names.items()},
         "noise": {f"{name}_rms": float(noise[j]) for j, name in names.items()},
-        "removed": _removed(foretold) if verdict.findings else None,
+        "removed": excess_removed((one.chi2_before, one.chi2_after) for one in foretold)
+        if verdict.findings
+        else None,
         "validated": verdict.validated,
         "trials": [{"name": one.trial, "before": before, "after": after} for one, before, after in both],
     }
@@ -147,20 +148,6 @@ def _known(verdict: JointVerdict) -> list[int]:
 
 def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {key: float(np.mean([one[key] for one in each])) for key in each[0]}
-
-
-def _removed(foretold: Sequence[Foretold]) -> Values | None:
-    """Share of the error beyond noise: mean over the trials, 95 % interval."""
-    shares = [1.0 - _excess(f.chi2_after) / _excess(f.chi2_before) for f in foretold if f.chi2_before > 1.0]
-    if not shares:
-        return None
-    mean, count = float(np.mean(shares)), len(shares)
-    half = float(stdtrit(count - 1, 0.975) * np.std(shares, ddof=1) / np.sqrt(count)) if count > 1 else np.inf
-    return {"share": mean, "interval": [mean - half, min(1.0, mean + half)]}
-
-
-def _excess(chi2_per_n: float) -> float:
-    return float(np.sqrt(max(chi2_per_n - 1.0, 0.0)))
 
 
 def _signature(verdict: JointVerdict, which: str) -> Values:
@@ -185,7 +172,7 @@ def _signature(verdict: JointVerdict, which: str) -> Values:
 
 
 @dataclass(frozen=True, eq=False)
-class JointDiagnosed:
+class JointDiagnosed(Diagnosed[JointVerdict]):
     """A verdict with what rollouts say.
 
     Attributes:
@@ -197,49 +184,33 @@ class JointDiagnosed:
     rollouts: Mapping[str, Any] | None = None
 
     @cached_property
-    def _values(self) -> dict[str, Any]:
+    def values(self) -> Values:
         return verdict_to_dict(self.verdict, self.rollouts)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
-        return self._values
-
-    def __str__(self) -> str:
-        """At most five sentences and a table."""
-        return format_verdict(self._values)
-
-    def verbose_text(self) -> str:
-        """All that there is to say."""
-        return format_verdict(self._values, verbose=True)
-
-    def write_into(self, folder: Path, **more: Any) -> None:
-        """Write extended model, residuals, pictures, JSON and report into an existing folder.
-
-        Args:
-            folder: where.
-            more: further keys of the JSON.
-
-        Raises:
-            InputError: something cannot be written.
-        """
-        values, model = self._values, self.verdict.model
+    def models(self) -> Iterator[tuple[str, str, Callable[[Path], None]]]:
         if self.verdict.findings:
-            try:
-                write_extended(self.verdict, folder / EXTENDED)
-            except InputError as error:  # values that no effect can have, such as a negative friction
-                note = f"There is no extended model: {error}."
-                values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        channels = [
-            Channel(f"{name} torque", "torque", None, unit_of(model, j))
-            for j, name in enumerate(model.joints)
-        ]
-        draw(values, self.verdict.traces(), channels, self._quantity_unit, folder)
-        write_json(folder / NAME, values | more)
-        write_text(folder / REPORT, f"{self.verbose_text()}\n")
+            yield EXTENDED, "extended model", lambda folder: write_extended(self.verdict, folder)
 
-    def _quantity_unit(self, name: str) -> str:
-        """Unit of a quantity that a misfit may depend on."""
+    @property
+    def channels(self) -> Sequence[Channel]:
+        model = self.verdict.model
+        names = enumerate(model.joints)
+        return [Channel(f"{name} torque", "torque", None, unit_of(model, j)) for j, name in names]
+
+    def unit(self, name: str) -> str:
         of_position = name.removeprefix("position of joint ")
         if of_position.isdigit():
             return "m" if self.verdict.model.slides[int(of_position) - 1] else "rad"
         return "typical speeds" if name == "speed" else "N m"
+
+
+def write_extended(verdict: JointVerdict, folder: Path) -> None:
+    """Write the model with the findings in it into a new folder.
+
+    Raises:
+        InputError: the folder cannot be written, MuJoCo refuses the model, or files in it are not its own.
+    """
+    effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
+    spec = load_spec(verdict.model.path)
+    check_named(verdict.model.path, assets=False)
+    write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,10 @@ from discrepancy.evidence.findings import Finding, Member
 from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, parameter_name, titled
 from discrepancy.joints.mechanics import Tree
-from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import JointProblem, horizontal
-from discrepancy.joints.verdict import JointVerdict
 from estimator.arrays import Array
-from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.serial.effects import RobotEffect
-from mocobot_sim.serial.extended import write_extended as write
 
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
 ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push")
@@ -137,18 +133,6 @@ def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[F
     """Effects in the order in which they go into a model, each with its finding."""
     pairs = [(finding, effect) for finding in findings for effect in effects_of(finding, model)]
     return sorted(pairs, key=lambda pair: pair[1].cause in LATE)
-
-
-def write_extended(verdict: JointVerdict, folder: Path) -> None:
-    """Write the model with the findings in it into a new folder.
-
-    Raises:
-        InputError: the folder cannot be written, MuJoCo refuses the model, or files in it are not its own.
-    """
-    effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
-    spec = load_spec(verdict.model.path)
-    check_named(verdict.model.path, assets=False)
-    write(spec, effects, folder, verdict.trials, reference=bool(verdict.reference))
 
 
 def label(finding: Finding) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
+# mujoco's compiled modules come without types.
+# pyright: reportAttributeAccessIssue=false
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

@@ -98,11 +98,9 @@ PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
 PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
 PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
-"""Durations of pushes that are tried [s], standard deviation of their force [N], the frequency whose noise ranks them
-[Hz], and how many are weighed exactly."""
+"""Pushes: tried durations [s] above, prior force [N], frequency whose noise ranks them [Hz], how many are weighed."""
 BEGIN_S = 1.0
-"""Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
-died to 15 %; in a stand or a soft joint it looks like a push."""
+"""Pushes are sought from here on [s]: before, free vibration of a stand or a soft joint looks like one."""
 READ_RAD = 0.02
 """Standard deviation of an unlisted error of a position."""
 UNLISTED_NATS = 5.0

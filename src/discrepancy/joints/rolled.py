@@ -203,8 +203,7 @@ HORIZONS_S = (0.1, 0.2, 0.5)
 MOST_STARTS = 60
 """Of rollouts in all trials together. Chosen: root mean squares are known to a tenth then, and it takes seconds."""
 MOST_DIVERGED = 0.5
-"""Share of the starts at which a joint may diverge for its error over the others to be told. Chosen: those left
-are the easy ones."""
+"""Share of the starts at which a joint may diverge and still have an error: those left are the easy ones."""
 EDGE_PERIODS = 2.5
 """Usable samples before a start and after an end, in periods of the smoothing. Derived: its filter remembers that."""
 

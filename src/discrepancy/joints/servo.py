@@ -19,11 +19,9 @@ from estimator.statistics import measured
 from mocobot_logs.joints.joint_log import JointLog
 
 MOTOR_SHARE, MOVES_THROUGHOUT = 0.5, 0.98
-"""Cut-off of the fit of what a volt is worth, over the rows', and the share of its filter's window in which the joint
-moves. Chosen: noise of accelerations would make the torque look smaller than it is."""
+"""Cut-off of the fit over the rows', and the share of its filter's window in which the joint moves."""
 LEAST_DRIVEN_SHARE = 0.1
-"""Least share of the square of what a drive was given that the model's torque accounts for. Chosen: nobody can tell
-what a volt is worth at a joint that only rubs."""
+"""Least share of the drive's input squared that the model's torque explains: otherwise the joint only rubs."""
 
 
 @dataclass(frozen=True)
@@ -161,9 +159,7 @@ MOST_LOOP_SHARE = 0.1
 LATE_S = 1e-3
 """Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
 CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
-"""Share of the largest duty up to which the law of a loop is fitted; the share of the time in which that law asks for
-more than the largest by as much, from which it is cut off; and samples left out around a large one. Chosen:
-resampling ripples for three samples on either side."""
+"""Saturation: share of the largest duty, share of the time above it, samples left out around it."""
 LOOP_STRETCH_S = 1.0
 """Stretches whose scatter gives a loop's standard errors. Chosen: longer than any loop remembers."""
 LEAST_ROWS = 40

@@ -30,8 +30,7 @@ CUTOFF_SHARE = 0.15
 SLOW_SHARE = 0.01
 """Share of a joint's typical speed below which the direction of friction fades. Chosen."""
 SLOW_ROUNDINGS = 2.0
-"""The same, at least, over what rounding of the positions makes of a velocity. Chosen: two standard deviations; a joint
-that creeps through the steps of a coarse encoder has no direction."""
+"""Least such speed, in standard deviations of the velocity that rounding of positions makes."""
 LEAST_SPEED = 1e-6
 """Typical speed of a joint that does not move [rad/s or m/s]. Chosen: no more than a number to divide by."""
 

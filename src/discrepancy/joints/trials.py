@@ -31,8 +31,7 @@ LEAST_S, LEAST_SAMPLES = 2.0, 40
 PARTS, PART_S = 3, 4.0
 """Parts of a single log, and their length at least: each holds most of the motion's poses."""
 LIMIT_RAD, LIMIT_M, LIMIT_S = 6e-3, 3e-3, 0.05
-"""How near to a limit its force may act, and how long what is left out fades. Derived: three tolerances of zeros and
-lengths; half a period of the fastest row."""
+"""Within this distance of a limit its force may act; fade time of what is left out [s]."""
 LEAST_SPEED = 1e-6
 RESTS = 2.0
 """Noise over which readings of a joint must scatter for it to move."""

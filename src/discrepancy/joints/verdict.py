@@ -201,7 +201,8 @@ class _JointJudge(Judge):
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
         if group.cause == "unlisted":
-            return (self._law(group).member(group.place),)
+            law = self._law(group)
+            return (Member(group.place, law.joint, *law.numbers),)
         out, (mean, covariance) = [], values
         known = {int(j) for j in self.trials.joints}
         places = (

@@ -146,7 +146,6 @@ def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> s
     return "family" if any(entry["family"] == cause["family"] for cause in causes) else "other"
 
 
-
 ERRORS = {
     "mass_percent": "mass [%]",
     "com_mm": "centre of mass [mm]",

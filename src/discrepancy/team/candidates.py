@@ -79,34 +79,17 @@ def every_candidate(
     return out
 
 
-def other_shapes(candidate: Candidate, trials: int, *, finer: bool = False) -> list[Candidate]:
-    """The candidate in every other shape of the catalogue, or in finer ones around its own, in so many trials."""
-    cause = CAUSES[candidate.cause]
-    if candidate.transient:
-        return [candidate.in_shape(shape) for shape in cause.finer(candidate.shape)] if finer else []
-    return in_shapes(candidate, cause.finer(candidate.shape) if finer else cause.shapes, trials)
-
-
-def further_shapes(candidate: Candidate, trials: int) -> list[Candidate]:
-    """The same in shapes that are far apart, in which no scan has it."""
-    if candidate.transient or candidate.cause not in CAUSES:
-        return []
-    return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), trials)
-
-
 def in_shapes(candidate: Candidate, shapes: Sequence[Shape], trials: int) -> list[Candidate]:
     """The candidate in each of some shapes but its own that there can be in so many trials."""
     cause = CAUSES[candidate.cause]
+    if candidate.transient:
+        return [candidate.in_shape(shape) for shape in shapes]
     return [
         replace(candidate, shape=dict(shape), among=cause.alike(shape))
         for shape in shapes
-        if dict(shape) != candidate.shape and _within(shape, trials)
+        if dict(shape) != candidate.shape
+        and max(shape.get("trial", 1), shape.get("last_trial", 0) + 1) <= trials
     ]
-
-
-def _within(shape: Shape, trials: int) -> bool:
-    """Whether so many trials have those that a shape names."""
-    return max(shape.get("trial", 1), shape.get("last_trial", 0) + 1) <= trials
 
 
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
@@ -151,8 +134,3 @@ def explained_by(
 def indices(candidate: Candidate) -> tuple[int, int]:
     """Its robot and joint, from 0 (0 where it has none)."""
     return (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-
-
-def is_adjusted(candidate: Candidate) -> bool:
-    """Whether it is a function of readings, taken without their noise."""
-    return candidate.cause in CAUSES and CAUSES[candidate.cause].adjusted

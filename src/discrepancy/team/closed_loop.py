@@ -1,4 +1,4 @@
-"""Recorded commands simulated again with the estimated payload and bases, and how far that is from what was recorded."""
+"""Recorded commands simulated again with the estimated team, and how far that is from the recording."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
-from scipy.special import stdtrit
 
 from discrepancy.candidate import Candidate
 from discrepancy.team.causes import CAUSES
@@ -87,23 +86,6 @@ class Gain:
     def is_better_as_found(self) -> bool:
         """Whether every trial can be simulated with all as found, and is told better so than with the causes alone."""
         return bool(self.as_found) and mean_chi2(self.as_found) < mean_chi2([b for _, b in self.pairs])
-
-    def removed(self) -> tuple[float, float, float] | None:
-        """Share of the excess error (root mean square over noise) removed: mean over trials, 95 % interval."""
-        shares = [
-            1.0 - _excess(b.chi2_per_n) / _excess(a.chi2_per_n) for a, b in self.pairs if a.chi2_per_n > 1.0
-        ]
-        if not shares:
-            return None
-        mean = float(np.mean(shares))
-        if len(shares) < 2:
-            return mean, float("-inf"), 1.0
-        half = stdtrit(len(shares) - 1, 0.975) * np.std(shares, ddof=1) / np.sqrt(len(shares))
-        return mean, mean - float(half), min(1.0, mean + float(half))
-
-
-def _excess(chi2_per_n: float) -> float:
-    return float(np.sqrt(max(chi2_per_n - 1.0, 0.0)))
 
 
 def is_worse(chi2_per_n: float, than: float) -> bool:

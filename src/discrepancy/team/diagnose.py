@@ -14,7 +14,7 @@ from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.team.candidates import beyond, explained_by, places_of
 from discrepancy.team.linear.rest import HEALTHY, limits_of
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import exact_residual, sensed_in
+from discrepancy.team.linear.start import exact_residual, linearised_trials, sensed_in
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
@@ -153,9 +153,10 @@ def around(problem: TeamProblem, state: State) -> TeamProblem | None:
         moved = replace(rig, sensed=sensed, resting=resting, kept={})
     else:
         recordings = [replace(r, metadata=replace(r.metadata, units=units)) for r in rig.recordings]
-        moved = rig._at(recordings, shared, rig.tolerances, rig.excluded, origin, resting, rig.jobs, sensed,
-                        explained_by(found.active, origin))  # fmt: skip
-    moved = replace(moved, laws=rig.laws)
+        explained = explained_by(found.active, origin)
+        linear, sensed = linearised_trials(recordings, shared, limits, rig.jobs, sensed, explained)
+        moved = replace(rig, recordings=tuple(recordings), sensed=sensed, linear=linear, origin=origin,
+                        resting=resting, kept={})  # fmt: skip
     return team_problem(moved, problem.opened, problem.catalogue if same else None)
 
 

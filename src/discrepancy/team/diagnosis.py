@@ -15,15 +15,15 @@ from discrepancy.evidence.judge import is_named
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.search import Until
 from discrepancy.evidence.settings import ODDS, SETTINGS
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.estimates import errors, seen_by
 from discrepancy.team.linear.noise import chattering
 from discrepancy.team.linear.signals import TEAM_TRIM_S
 from discrepancy.team.long import Choice, search_parts
-from discrepancy.team.response import as_found, confirm
+from discrepancy.team.response import confirm, left_by
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.verdict import judged_team
 from estimator.arm.unit import ArmUnit
 from estimator.errors import InputError
@@ -181,7 +181,7 @@ def diagnose_team(
 
     choice, notes = Choice.of(recordings, whole=whole), ()
     if choice.others:
-        parts = search_parts(choice, search, as_found, say)
+        parts = search_parts(choice, search, left_by, say)
         choice, outcome, notes = parts.choice, parts.searched, parts.notes
     else:
         outcome = search(choice.searched)

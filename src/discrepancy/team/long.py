@@ -12,14 +12,12 @@ from scipy.special import stdtrit
 
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import TEAM_TRIM_S
-from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 
 PART_S = 180.0
-"""Of a recording at most that is looked at as one trial. Chosen: what a trial leaves open costs its square, and ten of
-its overlaps are a tenth of that; longer than any trial of the experiment."""
+"""Longest part of a recording that is one trial: latent states cost the square of its length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +69,10 @@ def _parts(recording: Recording, longest_s: float) -> list[Recording]:
 
 
 SEARCHED_PARTS, SHORTEST_PART_S = 4, 40.0
-"""How many parts at least those are, and how long at least. Chosen: they can be held out of each other's fit, and are
-spread over the recording; several ways of a random motion, and twenty times what the filters leave out."""
+"""Least number of parts, and their least length: they predict each other."""
 
 SEARCHED_S, SEARCHED_POWER = 480.0, 1.4
-"""Of recordings of three robots together that is searched for causes; of N robots (3 / N)^power of it. Chosen: a
-minute and a half of CPU. Measured: a minute of three robots takes 10 s, of ten 53 s (docs/commands/performance.md)."""
+"""Length of recordings that is searched, of three robots; of N robots (3 / N)^power of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +151,7 @@ def searched_s(robots: int) -> float:
 
 
 ODD_CHANCE, ODD_FACTOR = 0.01, 1.5
-"""A part is searched, too, where in one of its windows more is left than would be by chance once in a hundred such
-diagnoses if windows were normal, and by that factor. Derived: Student's t of the windows that were searched, over all
-comparisons; the factor is chosen: what moves otherwise leaves otherwise. Measured: an hour of a random motion, 0.8."""
+"""False alarm rate of a whole diagnosis at which a part is searched, too, and a factor on that threshold."""
 
 ODD_WINDOW_S = 10.0
 """Of a part at a time that is held against what was searched. Chosen: a short push, some periods of a motion."""
@@ -238,6 +232,8 @@ ODD_NAMED = 3
 """Of such parts that were not searched all the same, how many are named. Chosen."""
 
 T = TypeVar("T")
+RowsLeft = Callable[[Recording], tuple[Reduction, Array]]
+"""Rows that what was found leaves in a part, and how they were made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +254,7 @@ class SearchedParts(Generic[T]):
 def search_parts(
     choice: Choice,
     search: Callable[[list[Recording]], T],
-    found: Callable[[T], tuple[TeamRig, AsFound]],
+    left_by: Callable[[T], RowsLeft],
     say: Callable[[str], object],
 ) -> SearchedParts[T]:
     """Search the parts that are taken, and those in which more is left than in these, too, until there are none.
@@ -266,7 +262,7 @@ def search_parts(
     Args:
         choice: the parts, not all of which are taken.
         search: of some.
-        found: the rig of a result, and what is found; it raises an ``InputError`` where there are no such robots.
+        left_by: what a result leaves in a part; it raises an ``InputError`` where there are no such robots.
         say: takes the name of the stage that begins.
     """
     most = 2 * len(choice.taken)
@@ -274,7 +270,7 @@ def search_parts(
         searched = search(choice.searched)
         say("hold against the other parts")
         try:
-            odd, ratio = _against(choice, *found(searched))
+            odd, ratio = _against(choice, left_by(searched))
         except InputError:  # no such robots
             note = "What was found is no team that can be, so it was not held against the other parts."
             return SearchedParts(choice, searched, (note,))
@@ -287,9 +283,9 @@ def search_parts(
             return SearchedParts(choice, search(choice.searched), ())
 
 
-def _against(choice: Choice, rig: TeamRig, found: AsFound) -> tuple[dict[int, float], float | None]:
+def _against(choice: Choice, left_by: RowsLeft) -> tuple[dict[int, float], float | None]:
     """Parts in which more is left than in any that was searched, by number, and by how much all others leave more."""
-    left = {k: Left.of(*rig.left_in(part, found)) for k, part in enumerate(choice.parts)}
+    left = {k: Left.of(*left_by(part)) for k, part in enumerate(choice.parts)}
     known = [left[k] for k in choice.taken]
     others = {k: left[k] for k in choice.others}
     odd = {k: by for k, by in more_left(others, known).items() if by > 1.0}

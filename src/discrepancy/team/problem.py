@@ -19,7 +19,7 @@ from discrepancy.candidate import Candidate, Transient
 from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
-from discrepancy.team.candidates import origin_of
+from discrepancy.team.candidates import in_shapes, origin_of, shape_steps
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.unlisted import OPEN_NATS, Laws
@@ -389,8 +389,15 @@ class TeamProblem:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
         out = self._stepped(candidate, group, posterior)
-        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
-        for more in self.rig.grown(candidate):  # the same columns, until its further number has moved
+        cause, trials = CAUSES[candidate.cause], len(self.rig.linear)
+        near = in_shapes(candidate, cause.finer(candidate.shape), trials)
+        further, grown = (
+            () if candidate.transient else of(candidate.shape) for of in (cause.further, cause.grown)
+        )
+        near += in_shapes(candidate, further, trials)
+        for more in in_shapes(
+            candidate, grown, trials
+        ):  # the same columns, until its further number has moved
             of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
             out += self._stepped(more, of_more, posterior)
         if near:
@@ -407,7 +414,7 @@ class TeamProblem:
 
     def slopes(self, candidate: Candidate, x: Array) -> tuple[list[int], Array, Array]:
         """Columns by the numbers of a shape that the data determine, appended; these numbers, and sizes of steps."""
-        steps = self.rig.steps(candidate)
+        steps = shape_steps(candidate)
         names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
         if not steps or len(steps) != len(names):
             return [], np.zeros(0), np.zeros(0)
@@ -516,7 +523,7 @@ class Catalogue:
         others = [Listed([], none)]
         apart: dict[Hashable, Array] = {}
         for candidate in rig.candidates():
-            shapes = rig.refinements(candidate)
+            shapes = in_shapes(candidate, CAUSES[candidate.cause].shapes, len(rig.linear))
             count, first = 1 + len(shapes), len(labels)
             if not any(candidate.tolerant):
                 others += [] if near else [plain.listing([candidate, *shapes], count)]
@@ -562,19 +569,20 @@ def team_problem(
         opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C).
         catalogue: columns of this rig, or of one with the same whitening nearby; None makes them.
     """
-    rows = rig.rows()
+    linears = list(zip(rig.linear, rig.whitening, strict=True))
+    rows = [white(linear.residual) for linear, white in linears]
     moving = [linear.reduction.moving for linear in rig.linear]
     rates = [linear.signals.rate_hz / linear.reduction.step for linear in rig.linear]
     edges = np.append(EDGES_HZ, [np.inf, np.inf])
-    bands = RowBands(rates, [len(r.residual) for r in rows], edges, moving=moving)
-    plain = TeamProblem(rig, Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows]))
+    bands = RowBands(rates, [len(r) for r in rows], edges, moving=moving)
+    plain = TeamProblem(rig, Cells.of(bands, [x.reshape(len(x), -1, 3) for x in rows]))
     if catalogue is None or catalogue.rig is not rig:
         catalogue = Catalogue.of(plain, catalogue)
     out = TeamProblem(rig, Cells(bands, []), opened=opened, catalogue=catalogue)
     out.candidates = dict(catalogue.candidates)
     out.cells = plain.cells
     columns = out.beside(catalogue.X)
-    residual = [x.reshape(len(x), -1, 3) for x in out.rows_of([r.residual for r in rows])]
+    residual = [x.reshape(len(x), -1, 3) for x in out.rows_of(rows)]
     out.cells = Cells.of(bands, residual)
     there = np.zeros(len(catalogue.labels))  # values count from the design, not from where all is linear
     for k, label in enumerate(catalogue.labels):
@@ -591,12 +599,11 @@ def team_problem(
         out.labels += [None] * len(size)
         return out.add(columns)
 
-    out.shared = unknown([r.shared for r in rows])
-    for t, r in enumerate(rows):
-        own = [
-            r.local if k == t else np.zeros((*o.residual.shape, r.local.shape[2])) for k, o in enumerate(rows)
-        ]
-        out.local.append(unknown(own))
+    out.shared = unknown([white(linear.by_shared) for linear, white in linears])
+    for t, (linear, white) in enumerate(linears):
+        local = white(np.concatenate([linear.by_bases, linear.by_clocks], axis=2))
+        none = (np.zeros((*r.shape, local.shape[2])) for r in rows)
+        out.local.append(unknown([local if k == t else x for k, x in enumerate(none)]))
     first = out.cells.count
     out.cells.add_rows(columns)
     out.there = np.append(np.zeros(first), there)

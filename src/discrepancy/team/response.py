@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -30,10 +30,12 @@ from discrepancy.team.closed_loop import (
     team_of,
 )
 from discrepancy.team.diagnose import TeamOutcome, found_in, robots_at
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arrays import Array
 from estimator.processes import ends_with_this
+from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.law import Law as LawEffect
 from mocobot_sim.extended.extended import write_extended
@@ -417,15 +419,15 @@ def _with_all_as_found(
     return replace(gain, as_found=responses([replace(found, whole=True)], jobs, simulated)[0])
 
 
-def as_found(outcome: TeamOutcome) -> tuple[TeamRig, AsFound]:
-    """The recordings; robots, payload and causes as a search found them.
+def left_by(outcome: TeamOutcome) -> Callable[[Recording], tuple[Reduction, Array]]:
+    """What robots, payload and causes as a search found them leave in the rows of a recording.
 
     Raises:
         InputError: there are no such robots.
     """
     rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
     units, _, shared = robots_at(rig, found)
-    return rig, AsFound.of(units, shared, found.active)
+    return partial(rig.left_in, found=AsFound.of(units, shared, found.active))
 
 
 def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *, whole: bool = False) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,11 @@ import numpy as np
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Finding, words_of
 from discrepancy.numbers import Numbers, three_digits
-from discrepancy.result.folder import REPORT, draw
+from discrepancy.result.folder import Diagnosed
 from discrepancy.result.json import Told, Values
-from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
-from discrepancy.result.remains import of_response
-from discrepancy.result.report import format_verdict
+from discrepancy.result.read import AS_FOUND, EXTENDED
+from discrepancy.result.remains import excess_removed, of_response
+from discrepancy.result.traces import Channel
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.closed_loop import Gain, Response
 from discrepancy.team.diagnose import TeamOutcome
@@ -26,8 +26,6 @@ from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.verdict import TeamVerdict
 from estimator.arrays import Array
-from estimator.errors import InputError
-from estimator.files import write_json, write_text
 
 
 def signature(rig: TeamRig, z: Sequence[Array]) -> dict[str, Any]:
@@ -124,23 +122,14 @@ UNDECIDABLE = (
 """What recordings of a parked team that holds one rigid payload cannot decide: what, why, and what would."""
 
 
-class TeamWords:
-    """Sentences about a mocobot team."""
+UNITS = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}
+"""Of closed-loop channels, and of quantities that a misfit may depend on."""
 
-    units = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}  # noqa: RUF012
 
-    def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
-        """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
-        cause = CAUSES[candidate.cause]
-        return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
-
-    def separate(self, candidate: Candidate) -> str:
-        """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
-        return CAUSES[candidate.cause].separate
-
-    def unit(self, name: str) -> str:
-        """Unit of a closed-loop channel, or of a quantity that a misfit may depend on."""
-        return self.units[name]
+def describe(candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+    """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+    cause = CAUSES[candidate.cause]
+    return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
 
 
 def statements(robots: int, *, aligned: bool) -> list[dict[str, Any]]:
@@ -193,7 +182,7 @@ class TeamTold(Told):
             return f"Something that no table lists acts at {place}."
         numbers = {name: entry["value"] for name, entry in parameters.items()}
         errors = {name: entry["se"] for name, entry in parameters.items() if entry["se"] is not None}
-        return TeamWords().describe(candidate, numbers, errors)
+        return describe(candidate, numbers, errors)
 
     def separate(self, cause: str) -> str:
         return CAUSES[cause].separate if cause in CAUSES else ""
@@ -203,11 +192,11 @@ class TeamTold(Told):
         return signature(self.verdict.rig, self.verdict.left[which]) | {"chi2_per_n": chi2}
 
     def undecidable(self) -> list[Values]:
-        return self.verdict.rig.undecidable()
+        return statements(self.verdict.rig.robots, aligned=self.verdict.rig.aligned)
 
 
 @dataclass(frozen=True, eq=False)
-class TeamDiagnosed:
+class TeamDiagnosed(Diagnosed[TeamVerdict]):
     """A verdict with what simulations say.
 
     Attributes:
@@ -225,7 +214,7 @@ class TeamDiagnosed:
     errors: Mapping[str, Any] | None = None
 
     @cached_property
-    def _values(self) -> Values:
+    def values(self) -> Values:
         gain = gain_to_dict(self.gain, self.verdict.rig) if self.gain else NOT_SIMULATED
         gain = gain | {"estimates": dict(self.verdict.estimates)}
         if self.errors is not None:
@@ -233,58 +222,35 @@ class TeamDiagnosed:
         values = TeamTold(self.verdict).values(gain, not_simulated=self.not_simulated)
         return values | {"remains": [*values["remains"], *of_response(values)]}
 
-    def to_dict(self) -> Values:
-        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
-        return self._values
-
-    def __str__(self) -> str:
-        """At most five sentences and a table."""
-        return format_verdict(self._values)
-
-    def verbose_text(self) -> str:
-        """All that there is to say."""
-        return format_verdict(self._values, verbose=True)
-
-    def write_into(self, folder: Path, **more: Any) -> None:
-        """Write models to take away, residuals, pictures, JSON and report into an existing folder.
-
-        Args:
-            folder: where.
-            more: further keys of the JSON.
-
-        Raises:
-            InputError: something cannot be written.
-        """
-        values, found = self._values, {(f.cause, f.place) for f in self.verdict.findings}
+    def models(self) -> Iterator[tuple[str, str, Callable[[Path], None]]]:
+        found = {(f.cause, f.place) for f in self.verdict.findings}
         chosen = [c for c in self.outcome.state.chosen if c.group.key in found]
-        models = [(EXTENDED, False)] if chosen else []
+        if chosen:
+            yield EXTENDED, "extended model", partial(write_model, self.outcome, chosen)
         if self.gain is not None and self.gain.is_better_as_found:
-            models.append((AS_FOUND, True))
-        for name, whole in models:
-            try:
-                write_model(self.outcome, chosen, folder / name, whole=whole)
-            except InputError as error:  # values that no effect can have, such as a negative friction
-                note = f"There is no {'model as found' if whole else 'extended model'}: {error}."
-                values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        draw(values, self.verdict.traces(), self.verdict.rig.channels, TeamWords().unit, folder)
-        write_json(folder / NAME, values | more)
-        write_text(folder / REPORT, f"{self.verbose_text()}\n")
+            yield AS_FOUND, "model as found", partial(write_model, self.outcome, chosen, whole=True)
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self.verdict.rig.channels
+
+    def unit(self, name: str) -> str:
+        return UNITS[name]
 
 
 def gain_to_dict(gain: Gain, rig: TeamRig) -> Values:
     """``gain`` of the JSON."""
-    channels, removed = list(next((a.rms for a, _ in gain.pairs), {})), gain.removed()
+    channels = list(next((a.rms for a, _ in gain.pairs), {}))
+    removed = excess_removed((a.chi2_per_n, b.chi2_per_n) for a, b in gain.pairs)
+    if removed is not None:
+        removed["interval"] = [x if np.isfinite(x) else None for x in removed["interval"]]
     both = zip((rig.trials[t] for t in rig.resimulated), gain.before, gain.after, strict=True)
     told = {"before": gain.before, "after": gain.after, "as_found": gain.as_found}
-    share = removed and {
-        "share": removed[0],
-        "interval": [x if np.isfinite(x) else None for x in removed[1:]],
-    }
     return {
         "held_out": {name: _mean(each) for name, each in told.items()},
-        "units": {name: TeamWords().unit(name) for name in channels},
+        "units": {name: UNITS[name] for name in channels},
         "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
-        "removed": share,
+        "removed": removed,
         "validated": gain.held_out,
         "trials": [{"name": name, "before": _response(a), "after": _response(b)} for name, a, b in both],
     }

@@ -31,9 +31,7 @@ SLAB = 16.0
 UNLISTED_NATS = 5.0
 """Log odds of a listed cause over something that no table lists."""
 OPEN_NATS = 150.0
-"""What the noise must be worth beyond that of the sensors, before something unlisted is looked for. Measured: 53 to
-110 is left of three clean teams at one and three times their tolerances, 300 to 800 of three at ten times. Beside seven
-hidden laws it is 330 to 8,900 in five, and less than 100 where a listed cause takes its place."""
+"""What the noise must be worth beyond the sensors' before unlisted laws are sought: clean teams leave up to 110."""
 LIKELIEST = 8
 """Places and signals whose exact linear gain is computed."""
 KINDS: dict[str, Kind] = {"angle": "angle", "time": "time", "travel": "way", "position": "way"}

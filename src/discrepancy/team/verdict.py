@@ -174,7 +174,8 @@ class _TeamJudge(Judge):
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
         if group.late:
-            return (self._law(group).member(group.place),)
+            law = self._law(group)
+            return (Member(group.place, law.joint, *law.numbers),)
         candidate = self.problem.candidates[group.identity]
         covariance, at = values[1], self.parts.columns_of(group.columns)
         x, C = np.zeros(len(candidate.parameters)), np.zeros((len(candidate.parameters),) * 2)

@@ -20,7 +20,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from discrepancy.evidence.findings import Event, Finding, Member
-from discrepancy.joints.effects import absolute, effects_of, physical, write_extended
+from discrepancy.joints.diagnosed import write_extended
+from discrepancy.joints.effects import absolute, effects_of, physical
 from discrepancy.joints.mechanics import Tree, inverse_torque
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.problem import Given, JointProblem, joint_problem

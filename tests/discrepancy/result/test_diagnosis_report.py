@@ -22,7 +22,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors
 from discrepancy.team.linear.rows import Whitening
-from discrepancy.team.told import TeamWords
+from discrepancy.team.told import describe
 from discrepancy.team.verdict import unwhitened
 from mocobot_sim.effects.catalogue import EFFECTS
 
@@ -195,7 +195,7 @@ def test_every_cause_has_a_sentence_with_its_numbers(cause: str) -> None:
     names = EFFECTS[cause].parameter_names()
     for sign in (1.0, -1.0):
         values = {name: sign * 0.0123 for name in names} | ({"trial": 2.0} if cause == "push" else {})
-        text = TeamWords().describe(candidate, values, dict.fromkeys(names, 1e-4) | {"trial": math.nan})
+        text = describe(candidate, values, dict.fromkeys(names, 1e-4) | {"trial": math.nan})
         assert text.endswith(".")
         assert text[0] in string.ascii_uppercase
         assert "+-" in text
@@ -211,7 +211,7 @@ def test_a_cause_of_ones_own_gets_its_docstring(monkeypatch: pytest.MonkeyPatch)
         columns = type(CAUSES["drag"]).columns
 
     monkeypatch.setitem(CAUSES, "ghost", Mine())
-    text = TeamWords().describe(Candidate("ghost", "f", None, None, ()), {"c_N": 2.0}, {"c_N": 0.1})
+    text = describe(Candidate("ghost", "f", None, None, ()), {"c_N": 2.0}, {"c_N": 0.1})
     assert text == "Payload: A ghost holds the payload back (c_N = 2.00 +- 0.10)."
 
 

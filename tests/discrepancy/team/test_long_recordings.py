@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import mocobot
-from discrepancy.team.causes import CAUSES
+from discrepancy.team import long
+from discrepancy.team.causes import CAUSES, read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.linear import filed as filing
+from discrepancy.team.linear import start as filing
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import is_filed
-from discrepancy.team.long import Choice, LaterPart, choice, parted, parts
+from discrepancy.team.long import Choice, LaterPart, parted
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload
 from patchwork import dense
 
@@ -31,8 +31,7 @@ def recording():
 
 @pytest.fixture
 def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    for owner in (choice, parts):
-        monkeypatch.setattr(owner, "PART_S", 12.0)
+    monkeypatch.setattr(long, "PART_S", 12.0)
 
 
 def test_short_recordings_stay_whole(recording) -> None:

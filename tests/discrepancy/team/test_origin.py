@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from discrepancy.team.candidates import every_candidate, explained_by, origin_of, places_of
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, default_tolerances
 from discrepancy.team.linear.start import Sensed, SignalNoise, exact_residual
 from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.arms import true_joints
 from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
 from team_case import DESIGN, exact

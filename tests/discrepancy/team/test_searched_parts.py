@@ -9,16 +9,15 @@ import pytest
 
 import mocobot
 from discrepancy.result.read import WrittenDiagnosis
+from discrepancy.team import long
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import start_shared, trial_at, without_bases
 from discrepancy.team.long import Choice, Left, more_left, searched_s, times_as_much
-from discrepancy.team.long import choice as choices
-from discrepancy.team.long import left as lefts
 from discrepancy.team.rig import AsFound, TeamRig
-from discrepancy.team.tolerances import read_tolerances
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.estimate.payload import estimate_payload
 
@@ -41,7 +40,7 @@ def recording():
 @pytest.fixture
 def little_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     for owner, name, value in (
-        (choices, "SEARCHED_S", 26.0), (choices, "SHORTEST_PART_S", 13.0), (lefts, "ODD_WINDOW_S", 2.0),
+        (long, "SEARCHED_S", 26.0), (long, "SHORTEST_PART_S", 13.0), (long, "ODD_WINDOW_S", 2.0),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, value)
 
@@ -87,12 +86,12 @@ def test_notes_of_recordings_with_one_name(recording, monkeypatch: pytest.Monkey
     notes = choice.beside(choice.others).notes
     assert len(notes) == 2
     assert all("in 5 parts" in note for note in notes)
-    monkeypatch.setattr(choices, "PART_S", 30.0)
+    monkeypatch.setattr(long, "PART_S", 30.0)
     assert all("in 3 parts" in note for note in Choice.of([recording, recording], whole=True).notes)
 
 
 def test_less_of_many_robots() -> None:
-    assert searched_s(3) == choices.SEARCHED_S
+    assert searched_s(3) == long.SEARCHED_S
     assert searched_s(2) > searched_s(3) > 3.0 * searched_s(10) > 0.0
 
 
@@ -166,7 +165,7 @@ def test_chance_is_as_stated() -> None:
             Left(means, none, none)
             for means in rng.standard_normal((24, 12, 6)) * [1.0, 1e-3, 10.0, 1.0, 1.0, 1.0]
         ]
-        called += max(more_left(dict(enumerate(parts[4:])), parts[:4]).values()) > 1.0 / lefts.ODD_FACTOR
+        called += max(more_left(dict(enumerate(parts[4:])), parts[:4]).values()) > 1.0 / long.ODD_FACTOR
     assert 0 < called < 14  # 6 are expected; 14 or more have a chance of 0.3 %
 
 

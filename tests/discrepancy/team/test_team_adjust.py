@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, default_tolerances
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.rows import Whitening
 from discrepancy.team.linear.start import Sensed, SignalNoise, noise_rows, with_adjusted_signals
 from discrepancy.team.linear.trial_linear import by_bases, by_shared, filtered
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import default_tolerances
 from estimator.rigid_team.residual import balance, grasp_data
 from team_case import DESIGN, exact, residual_of
 

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from discrepancy.candidate import Transient
 from discrepancy.team.candidates import in_shapes
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, default_tolerances
 from discrepancy.team.causes.base import Context
 from discrepancy.team.causes.readings import Late
 from discrepancy.team.linear.rows import Reduction
@@ -19,7 +19,6 @@ from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed
 from discrepancy.team.linear.trial_linear import filtered, linearise
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.rigid_team.residual import Bases, Shared

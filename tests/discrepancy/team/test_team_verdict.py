@@ -16,9 +16,9 @@ from discrepancy.joints.diagnosed import verdict_to_dict
 from discrepancy.result.read import read_diagnosis
 from discrepancy.result.report import format_verdict
 from discrepancy.team import told
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import read_tolerances
 from estimator.errors import InputError
 from hidden_team import recorded
 from joint_verdicts import joint_verdict, offset_or_spring

@@ -1,5 +1,10 @@
-"""The catalogue of a team's causes, by subject."""
+"""The catalogue of a team's causes, by subject, and how far a well-kept Omnid may be from its model."""
 
+from __future__ import annotations
+
+from pathlib import Path
+
+from discrepancy.cause_names import read_tolerances as with_file
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.causes.cable import PayloadTether, Tether
 from discrepancy.team.causes.friction import GimbalFriction, JointFriction, SeaHysteresis
@@ -27,3 +32,21 @@ CATALOGUE = (
 )  # fmt: skip
 CAUSES: dict[str, Cause] = {cause.name: cause() for cause in CATALOGUE}
 """Every cause by its name."""
+
+
+def default_tolerances() -> dict[str, dict[str, float]]:
+    """Those that the causes have, by cause and parameter."""
+    return {
+        name: dict(zip(cause.parameters, cause.tolerances, strict=True))
+        for name, cause in CAUSES.items()
+        if cause.tolerances
+    }
+
+
+def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
+    """The defaults, with what a TOML file changes; see ``discrepancy.cause_names``.
+
+    Raises:
+        InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.
+    """
+    return with_file(path, default_tolerances())

@@ -17,16 +17,13 @@ from estimator.arrays import Array
 from estimator.so3 import skew
 
 SWING_ROUNDS, SWING_FIRST_ROUNDS, SWING_SETTLED = 20, 1, 1e-4
-"""Times a pendulum that swings far is swung again, the same while shapes are only looked through, and the change from
-which it is enough. Chosen: sizes are told to a percent."""
+"""Rounds of a pendulum that swings far; the same while shapes are scanned; relative change that ends them."""
 
 SWING_MOST, SWING_START, SWING_EASED = 0.95, 0.9, 0.6
-"""How far it swings at most, over its length, the same while it is sought, and by which share its restoring force is
-less at most. Chosen: a mass beside its pivot is no pendulum."""
+"""Largest swing over the length; the same while it is sought; most that the restoring force is eased."""
 
 SWING_CALM, SWING_WEIGHT, SWING_LEAST_WEIGHT = 0.5, 0.7, 0.3
-"""Change of a round over that of the last, from which rounds go to and fro; by which a new one counts less then, and
-how much at least. Chosen."""
+"""Change of a round over the last from which rounds oscillate; damping of a new round, and its least."""
 
 
 @dataclass(frozen=True)
@@ -218,8 +215,7 @@ def _filters(pendulum: Pendulum) -> tuple[list[Array], Array]:
 
 
 SLOSH_SECONDS = 150
-"""Second modes that are told apart, each as likely as the others. Derived: thirty lengths, 10 % apart, by five headings
-or shares. Without it a second mode would always explain what a pendulum of one mode does, and noise beside it."""
+"""Distinguishable second modes: without these odds a second mode would explain noise beside the first."""
 
 SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
 """By which a heading is moved next, and the step of slopes by it. Chosen."""
@@ -228,15 +224,13 @@ SLOSH_SECOND_FINER, SLOSH_SHARES_FINER = (0.6, 0.75, 0.87, 0.95, 1.05, 1.15, 1.3
 """Shares of the second length, and of its share, tried next. Chosen."""
 
 SLOSH_SECOND, SLOSH_SHARE = (0.3, 0.55, 1.8, 3.3), 0.25
-"""Length of a second pendulum over the first's, and its share of the mass, tried first. Chosen: a quarter is what the
-second mode of two equal pendulums in a row has."""
+"""Length of a second pendulum over the first's, and its share of the mass, tried first."""
 
 SLOSH_HEADINGS_RAD = (0.0, 0.79, 1.57, 2.36)
 """Its headings, tried first. Measured, likewise: one 25 deg off still helps."""
 
 SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
-"""Length across over that along of what swings on two lengths, tried first. Measured (tuning set 99300, damping ratio
-0.04): a length 25 % off still helps."""
+"""Length across over that along, tried first: 25 % off still helps."""
 
 SLOSH_REACH_M = 1.5
 """From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""

@@ -18,9 +18,7 @@ from estimator.arrays import Array
 from estimator.rigid_team.slots import THETA
 
 RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
-"""Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds
-the rest; the first is that of a base of 60 kg that gives way by 1 to 3 um/N, critically damped. Of a grasp it is the
-least: 5 kg, a share of a payload, on 1 um/N, ten tolerances, follow within 4.5 ms."""
+"""Time constants tried first, a factor of four apart: a Gauss-Newton step finds the rest."""
 
 RELAXATION_RANGE_S = (0.001, 0.5)
 """Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
@@ -63,8 +61,7 @@ def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
 
 
 BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
-"""Compliance times the mass that moves, over the square of the lag, tried where a base gives way: a quarter is damped
-critically; and shares of it tried next. Chosen."""
+"""Compliance times moving mass over the lag squared, tried first (1/4: critical damping); finer shares."""
 
 
 class BaseCompliance(Yielding):
@@ -177,8 +174,7 @@ GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
 """Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
 
 GRASP_TURNS_M = (0.05, -0.05)
-"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first. Chosen: a flange's
-thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
+"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first [m]."""
 
 
 class GraspFlex(Yielding):
@@ -255,17 +251,13 @@ PLAY_COLUMNS_AT_A_TIME = 16
 """Of that travel. Chosen: memory."""
 
 PLAY_CONTACT_PER_N = 0.02
-"""Of a play, by which its ends give way to a newton, over which slopes are taken. Chosen: 1 um/N behind 50 um; columns
-go straight with it."""
+"""Share of a play by which its ends give way to a newton, over which slopes are taken."""
 
 PLAY_OPEN_KNOTS_S = 0.05
-"""Between knots of that travel. Measured: play of 0.8 mm leaves a chi2/n of 51 with knots every 0.2 s and forces below
-0.4 N, 12 every 0.1 s below 1 N, 1.15 every 0.05 s; nothing faster passes the rows' filter."""
+"""Between knots of that travel: nothing faster passes the rows' filter."""
 
 PLAY_OPEN_N, PLAY_OPEN_S = 1.0, 0.03
-"""Force below which a payload that is loose may travel, and for how long before and after. Measured: it travels for a
-tenth of a second, with forces of up to 1 N in the filtered signals where there should be none; and derived: so long a
-filter of 20 Hz takes to show a force that begins. With 0.4 N alone, half of the travel is outside."""
+"""Force below which a loose payload may travel, and how long before and after: filters spread the force."""
 
 
 class GraspPlay(Cause):

@@ -1,4 +1,4 @@
-"""How finely each sensor reads, found in the recording itself: rounding step, white noise, lines of a loop that chatters."""
+"""How finely each sensor reads, by the recording itself: rounding steps, white noise, and a chattering loop."""
 
 from __future__ import annotations
 
@@ -21,18 +21,14 @@ NOISE_SEED = 20250
 """Of these draws. Chosen: any will do; fixed, so that a verdict can be had again."""
 
 MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM, MODEL_HZ = 2e-6, 7e-7, 3e-4, 100.0
-"""What the model itself leaves beside any sensor, as noise of readings at ``MODEL_HZ``; as much in a band at any
-other rate. Measured: what soft rods, welds and the integrator leave of trials with ideal sensors weighs as much as 1 to
-3 urad of phi below 0.5 Hz and a third of that to 2 Hz, 0.1 to 2 urad of theta, and, at the motion's own frequencies,
-0.1 to 0.2 mN m in random trials."""
+"""Error of the model itself (soft rods, welds, integrator), as noise of readings at ``MODEL_HZ``."""
 
 NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""
 
 NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
-"""Share of the amplitude there that is between the lines, below which the lines are no noise: a joint that chatters.
-And over the torque's step, from which on that is worth a note and, where it is over the noise as well, wider filters.
-Chosen: healthy joints have no lines, and what a tenth of a newton metre does is 0.04 mN, as it goes with the square."""
+"""Share of the amplitude between spectral lines below which lines are no noise; lines over the torque's step that count
+as chatter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,28 +137,21 @@ def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
 
 
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
-"""Noise of the rates that tell rest from sliding, up to which they are smoothed as usual; signals with more are
-smoothed more, down to that cut-off. Derived: a joint that turns round at 0.3 rad/s^2 is told to do so within 1 ms, of a
-row's 80; a torque's is that of the sensors with which thresholds were chosen; rows have nothing above 5 Hz. Noise
-counts from that share of a rounding step on: with less a joint at rest repeats one reading; its error is a tenth."""
+"""Noise of rates up to which signals are smoothed as usual; least cut-off of noisier ones; share of a rounding step
+from which noise counts."""
 
 PHASE_TRAVEL = 4.0
-"""Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
-changes an encoder's speed by half at most."""
+"""Steps of travel after which a rounding error is drawn anew."""
 
 SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
-"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and how far that of the signal
-falls with it. Chosen: the trajectory need only be one that the stairs may have come from."""
+"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and octaves by which the signal's
+falls."""
 
 CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
-"""Cut-off of signals in which something chatters, over its frequency, and at most over the sampling rate. Derived: the
-mean of a torque times the angle at which it acts is that of both oscillating together, of which the square of the
-filter's gain is left: at 27 Hz and 100 Hz 0.4 % with the usual cut-off and all with 45 Hz, at 1 kHz 97 % with 54 Hz.
-Measured: of torques of +- 7 N m it is up to 49 mN."""
+"""Cut-off over the frequency of chatter, and at most over the sampling rate: the mean torque times angle must pass."""
 
 MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
-"""Up to where, and the share of it that is left above. Measured: of the same, a twentieth of the power from 3 Hz on,
-and hardly anything from 4 Hz."""
+"""Frequency up to which the model's own error lies, and its share above."""
 
 
 @dataclass(frozen=True, eq=False)

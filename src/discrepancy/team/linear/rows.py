@@ -18,12 +18,10 @@ from estimator.filtering import differentiate, low_pass
 from estimator.held import doubtful
 
 PATCH_COLUMNS = 48
-"""Of what a cause leaves open that are kept together. Chosen: a few seconds of friction at rest; of fewer, calls cost
-more than numbers, of more, most numbers are nought."""
+"""Columns of a latent state that are kept together: a compromise of calls and zeros."""
 
 PATCH_SHOWS = 1e-6
-"""Of what a cause leaves open, trace of one column over the largest from which it counts. Derived: the largest is some
-hundred times the noise, so that one dropped is a ten-thousandth of it."""
+"""Trace of a latent column over the largest below which it is dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,8 +309,7 @@ SHRINKAGE_SHARE = 0.05
 """By which the channels' covariance is drawn to its diagonal at least. Chosen."""
 
 LOUD_POWER = 2.25
-"""Noise of a row, in squares of that of the others, above which it has a weight of its own. Derived: four standard
-deviations of a mean square of 24 draws (a team's ``NOISE_DRAWS``), sqrt(2/24) = 0.29, above 1."""
+"""Power of a row's noise over the others' from which it has its own weight: four standard errors of 24 draws."""
 
 ROWS_PER_COEFFICIENT = 10
 """A series must have more rows than so many for each coefficient, or stays as it is. Chosen."""

@@ -48,8 +48,7 @@ from estimator.rigid_team.slots import PHI, TAU, THETA
 from estimator.signals.grasp_data import GraspData
 
 INERTIA_OFF = 0.3
-"""Share by which the inertia that turns noise into moments may be off. Chosen: then these are off by as much at most;
-with none at all, a healthy log of 12 bits left twice its noise."""
+"""Relative error of the inertia up to which noise in moments is not drawn again."""
 
 
 def held_inertia(p_1i: Array, mass: float, p_1c: Array) -> Array:

@@ -124,8 +124,7 @@ SHIFT_REACH_S = 0.5
 """Before and after a displacement in which its accelerations show. Derived: a filter of 20 Hz has died to 1e-6."""
 
 CHATTER_JACOBIAN_HZ = 10.0
-"""Cut-off of signals at which slopes are taken where something chatters. Derived: below half of
-``TEAM_JACOBIAN_HZ``."""
+"""Cut-off of signals at which slopes are taken where something chatters: below half of their rate."""
 
 
 @dataclass(frozen=True, eq=False)
