@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from discrepancy.team.laws import places_of
-from sealed.law_score import FORMULAS, PLACES, VARIABLES, score_laws
+from sealed.law_score import FORMULAS, VARIABLES, score_laws
 from sealed.law_truth import SHAPES
 from sealed.registry import OUTSIDE, UNLISTED
 from team_case import exact
@@ -26,15 +25,6 @@ def test_every_unlisted_effect_can_be_scored():
     assert NAMES - {"shifting_load", "cross_talk"} <= set(VARIABLES)
 
 
-def test_places_are_called_as_verdicts_call_them():
-    known = {place.title.replace("{", "").replace("}", "") for place in places_of(1)}
-    known.add("torque in driven joint")
-    for words in PLACES.values():
-        for word in words:
-            plain = word.replace(" {joint}", "").removesuffix(" of robot {robot}")
-            assert any(name.startswith(plain) for name in known), word
-
-
 def unlisted(place=TORQUE_1, signal="tau_2_1", law=None):
     kind = f"something unlisted by its {signal}"
     return {"cause": "unlisted", "kind": kind, "place": place, "law": law}
@@ -54,19 +44,6 @@ def scored(monkeypatch, *causes):
     truth = {"effects": [EFFECT], "gimbal_axes_1": np.tile(np.eye(3), (3, 1, 1)).tolist()}
     (one,) = score_laws({"truth": truth, "verdict": {"causes": list(causes)}}, ["one"])
     return one
-
-
-def test_what_is_located_without_a_formula(monkeypatch):
-    one = scored(monkeypatch, unlisted())
-    assert (one.which, one.located, one.formula, one.size) == ((0,), True, False, None)
-    assert not scored(monkeypatch, unlisted(signal="tau_2_2")).located
-    assert not scored(monkeypatch, unlisted(place=TORQUE.format(2))).place
-    assert not scored(monkeypatch).located
-
-
-def test_the_nearest_of_several_counts(monkeypatch):
-    one = scored(monkeypatch, unlisted(place=TORQUE.format(3)), unlisted())
-    assert (one.which, one.located) == ((1,), True)
 
 
 def test_a_force_is_one_law_for_each_axis(monkeypatch):
@@ -121,10 +98,3 @@ def test_a_law_of_another_signal_is_not_located(monkeypatch):
     one = scored(monkeypatch, unlisted(law=law(exact().carried.recording, of="tau_2_2")))
     assert one.place
     assert not one.located
-
-
-def test_of_two_hidden_effects_each_has_its_own(monkeypatch):
-    other = {**EFFECT, "law": {"of": "tau reading", "place": {"robot": 2, "joint": 2}}}
-    truth = {"effects": [EFFECT, other], "gimbal_axes_1": []}
-    scores = score_laws({"truth": truth, "verdict": {"causes": [unlisted()]}}, [])
-    assert [one.located for one in scores] == [True, False]

@@ -21,26 +21,13 @@ from estimator.filtering import differentiate
 from estimator.rigid_team.slots import TAU, THETA
 
 
-def free_while(
-    where: NDArray[np.bool_], rate_hz: float, knots_s: float, shortest_s: float = 0.0
-) -> list[Array]:
-    """Columns (Q,): per interval of ``where`` (Q,), straight lines between knots at most ``knots_s`` apart.
-
-    Intervals shorter than ``shortest_s`` have none.
-    """
-    out = []
-    for at, units in pieces_while(where, rate_hz, knots_s, shortest_s):
-        for unit in units.T:
-            column = np.zeros(len(where))
-            column[at] = unit
-            out.append(column)
-    return out
-
-
 def pieces_while(
     where: NDArray[np.bool_], rate_hz: float, knots_s: float, shortest_s: float = 0.0
 ) -> Iterator[tuple[slice, Array]]:
-    """The same, interval by interval: its s samples, and its k columns there, shape (s, k)."""
+    """Per interval of ``where`` (Q,): its s samples, and k hats between knots at most ``knots_s`` apart, shape (s, k).
+
+    Intervals shorter than ``shortest_s`` have none.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int))).reshape(-1, 2)
     for start, stop in edges:
         if stop - start < shortest_s * rate_hz:
