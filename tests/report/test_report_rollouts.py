@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from discrepancy.result.report import rollout_lines
+from discrepancy.result.tables import rollout_lines
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
 from mocobot_report.diagnosis.evidence import rollout_section

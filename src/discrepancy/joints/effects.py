@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from discrepancy.evidence.findings import Finding, Member
 from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, parameter_name, titled
-from discrepancy.joints.mechanics import Tree
+from discrepancy.joints.mechanics import Tree, horizontal
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import JointProblem, horizontal
+from discrepancy.joints.problem import JointProblem
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 

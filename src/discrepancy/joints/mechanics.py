@@ -401,3 +401,21 @@ def _force(motion: Motion, body: int) -> Array:
     lever = motion.rotation[body] @ motion.tree.com[body]
     a = motion.acceleration[body] + rigid(motion.omega[body], motion.alpha[body], lever)
     return motion.tree.mass[body] * a
+
+
+def horizontal(gravity: Array) -> Array:
+    """Two horizontal axes, shape (2, 3)."""
+    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
+
+
+def with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
+    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
+    total = max(mass + float(load[0]), 0.05 * mass)
+    centre = (mass * com + load[1:4]) / total
+    xx, yy, zz, xy, xz, yz = load[4:]
+    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def about(c: Array) -> Array:
+        return c @ c * np.eye(3) - np.outer(c, c)
+
+    return total, centre, inertia + mass * about(com) + more - total * about(centre)

@@ -22,9 +22,11 @@ from discrepancy.joints.mechanics import (
     by_acceleration,
     by_displacement,
     force_torque,
+    horizontal,
     inertial_parameters,
     rigid_torque,
     torque_of,
+    with_load,
 )
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.signals import Signals, along
@@ -57,24 +59,6 @@ class Given:
     tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     noise: Sequence[Array] | None = None
     kept: Sequence[Array] = ()
-
-
-def horizontal(gravity: Array) -> Array:
-    """Two horizontal axes, shape (2, 3)."""
-    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
-
-
-def with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
-    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
-    total = max(mass + float(load[0]), 0.05 * mass)
-    centre = (mass * com + load[1:4]) / total
-    xx, yy, zz, xy, xz, yz = load[4:]
-    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-    def about(c: Array) -> Array:
-        return c @ c * np.eye(3) - np.outer(c, c)
-
-    return total, centre, inertia + mass * about(com) + more - total * about(centre)
 
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])

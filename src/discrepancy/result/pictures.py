@@ -14,7 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from discrepancy.numbers import fitting
-from discrepancy.result.report import drawn, floor_words, foretold_torques, label, relation, response_units
+from discrepancy.result.report import drawn, label, relation
+from discrepancy.result.tables import floor_words, foretold_torques, response_units
 from discrepancy.result.traces import Group, Trace, binned, group_units, groups, multiples, spectrum
 from estimator.arrays import Array
 from mocobot_sim.plots_plain import plain_numbers, plain_words

@@ -261,7 +261,11 @@ class TeamProblem:
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
             # In learnt noise a law hides that is told beside that of the sensors.
             quiet = replace(posterior, variance=np.minimum(v, self.sensors))
-            out += self.laws_of.proposed(self.left(quiet), self._white) if noise > least else []
+            out += (
+                self.laws_of.proposed(self.left(quiet.mean, quiet.variance), self._white)
+                if noise > least
+                else []
+            )
         if self.listed is not None:
             gains, most = self.gains(posterior, self.listed), len(out) + LIKELIEST
             for i in np.argsort(-gains):
@@ -312,7 +316,9 @@ class TeamProblem:
             return []
         found: dict[tuple[int, int, int], float] = {}
         windows = 0
-        for t, (score, D) in enumerate(zip(self.left(posterior), self.wrenches, strict=True)):
+        for t, (score, D) in enumerate(
+            zip(self.left(posterior.mean, posterior.variance), self.wrenches, strict=True)
+        ):
             m, rate = self.rig.linear[t].reduction.moving, self.cells.bands.rates_hz[t]
             Q = np.einsum("nck,nc->nk", D[:m], score[:m, -6:])
             R = np.einsum("nck,ncl->nkl", D[:m], D[:m])
@@ -346,29 +352,27 @@ class TeamProblem:
         given = self.rig.tolerances.get("push", {})
         return [self.group_of(CAUSES["push"].event(given, when), -math.log(windows)) for when in events]
 
-    @property
+    @cached_property
     def wrenches(self) -> list[Array]:
         """Whitened balance rows of forces along {b1} and moments in {1}, shape (n, 6, 6) a trial."""
-        if "wrenches" not in self.__dict__:
-            out = []
-            for linear, white in zip(self.rig.linear, self.rig.whitening, strict=True):
-                R = linear.data.R_bi[:, 0]
-                eye = np.broadcast_to(np.eye(3), R.shape)
-                force = linear.of_wrench(np.swapaxes(R, 1, 2), np.zeros_like(R))
-                moment = linear.of_wrench(np.zeros_like(R), eye)
-                out.append(white(np.concatenate([force, moment], axis=2)))
-            self.__dict__["wrenches"] = [x[:, -6:] for x in self.rows_of(out)]
-        return self.__dict__["wrenches"]
+        out = []
+        for linear, white in zip(self.rig.linear, self.rig.whitening, strict=True):
+            R = linear.data.R_bi[:, 0]
+            eye = np.broadcast_to(np.eye(3), R.shape)
+            force = linear.of_wrench(np.swapaxes(R, 1, 2), np.zeros_like(R))
+            moment = linear.of_wrench(np.zeros_like(R), eye)
+            out.append(white(np.concatenate([force, moment], axis=2)))
+        return [x[:, -6:] for x in self.rows_of(out)]
 
-    def left(self, posterior: Posterior) -> list[Array]:
-        """Rows that a posterior leaves over their variance, shape (n, C) a trial."""
+    def left(self, x: Array, variance: Array | None = None) -> list[Array]:
+        """Rows that values of the columns leave, over variances where these are given, shape (n, C) a trial."""
         parts = []
-        for channel, own in zip(self.cells.channels, posterior.variance, strict=True):
-            left = (channel.y - channel.X @ posterior.mean[channel.columns]) / np.repeat(
-                own, np.diff(channel.starts)
+        for c, channel in enumerate(self.cells.channels):
+            known, rows = channel.columns < len(x), np.empty_like(channel.y)
+            left = channel.y - channel.X[:, known] @ x[channel.columns[known]]
+            rows[self.cells.order] = (
+                left if variance is None else left / np.repeat(variance[c], np.diff(channel.starts))
             )
-            rows = np.empty_like(left)
-            rows[self.cells.order] = left
             parts.append(self.bands.rows(rows))
         return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
 

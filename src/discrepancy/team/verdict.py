@@ -23,7 +23,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.estimates import Estimate, to_dict
 from discrepancy.team.linear.rows import Whitening
-from discrepancy.team.problem import RowBands, TeamProblem
+from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
 
@@ -60,18 +60,6 @@ def _each(problem: TeamProblem, state: State) -> Iterator[tuple[Array, Array, fl
             yy += float(np.sum(y**2 / variance[band]))
             rows.append(np.bincount(band, minlength=len(variance)))
         yield G, b, yy, np.array(rows, dtype=float)
-
-
-def left_of(problem: TeamProblem, x: Array) -> list[Array]:
-    """Whitened rows that values of the columns leave, shape (n, C) a trial."""
-    bands, parts = problem.cells.bands, []
-    assert isinstance(bands, RowBands)
-    for channel in problem.cells.channels:
-        rows = np.empty_like(channel.y)
-        known = channel.columns < len(x)
-        rows[problem.cells.order] = channel.y - channel.X[:, known] @ x[channel.columns[known]]
-        parts.append(bands.rows(rows))
-    return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
 
 
 STEPS = 10.0
@@ -130,7 +118,7 @@ class _TeamJudge(Judge):
         prior[fitted] = self.state.posterior.prior[fitted]
         plain = Posterior(problem.cells, prior, self.search.floor).mean
         values = {"before": plain, "after": self.state.posterior.mean}
-        left = {name: left_of(problem, x) for name, x in values.items()}
+        left = {name: problem.left(x) for name, x in values.items()}
         return TeamVerdict(
             **told,
             trials=tuple(rig.trials),

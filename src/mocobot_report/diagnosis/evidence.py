@@ -9,7 +9,8 @@ import plotly.graph_objects as go
 
 from discrepancy.numbers import Shown
 from discrepancy.result.read import is_of_joints
-from discrepancy.result.report import blocks, diverged_sentences, drawn, label, lost, relation, shown_units
+from discrepancy.result.report import drawn, label, relation
+from discrepancy.result.tables import blocks, diverged_sentences, lost, shown_units
 from discrepancy.result.traces import Group, Trace, binned, group_units, groups, multiples, spectrum
 from estimator.arrays import Array
 from mocobot_report.blocks.book import Book, section, tabs

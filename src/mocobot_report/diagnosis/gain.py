@@ -6,13 +6,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.result.remains import all_as_found
-from discrepancy.result.report import (
-    ERRORS,
-    floor_words,
-    foretold_torques,
-    response_units,
-    something_is_off,
-)
+from discrepancy.result.tables import ERRORS, floor_words, foretold_torques, response_units, something_is_off
 from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
 from mocobot_report.blocks.html import Node, el

@@ -19,7 +19,8 @@ from discrepancy.result.read import (
     read_diagnosis,
 )
 from discrepancy.result.remains import farthest, remedy, sizes_of
-from discrepancy.result.report import NEAREST, NOTHING_WRONG_HERE, SAID, foretold_torques, label
+from discrepancy.result.report import NEAREST, NOTHING_WRONG_HERE, SAID, label
+from discrepancy.result.tables import foretold_torques
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate

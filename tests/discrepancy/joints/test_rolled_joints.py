@@ -26,7 +26,7 @@ from discrepancy.joints.rolled import (
     rolled_out,
 )
 from discrepancy.joints.signals import Signals
-from discrepancy.result.report import rollout_lines
+from discrepancy.result.tables import rollout_lines
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import step

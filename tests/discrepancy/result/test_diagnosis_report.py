@@ -13,7 +13,8 @@ from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
 from discrepancy.result.pictures import file_names
 from discrepancy.result.remains import of_response
-from discrepancy.result.report import ERRORS, format_verdict, response_units
+from discrepancy.result.report import format_verdict
+from discrepancy.result.tables import ERRORS, response_units
 from discrepancy.result.traces import Channel, Trace, group_units, groups
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.told import describe

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from discrepancy.result.report import gain_lines, rollout_lines
+from discrepancy.result.tables import gain_lines, rollout_lines
 
 SIZES = (0.0128, 0.00152, 0.000339)
 
