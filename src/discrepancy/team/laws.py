@@ -1,135 +1,55 @@
-"""Where something may be wrong that no table lists, what it may be a function of, and what it does to the rows."""
+"""What no table lists of a team: where something may be wrong, of which signal it may be a function, and its rows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import rankdata
 
+from discrepancy.evidence.posterior import Group
+from discrepancy.formulas.formula import Curve, Kind, Piece, formula_of
+from discrepancy.formulas.law import Law, Of, traces
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import moment_about_axes
 from estimator.arrays import Array
 from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 
-LAW_SLOW_RAD_PER_S = 4e-3
-"""Below which a direction of motion fades. Chosen: as in the friction of the catalogue."""
-
-Kind = Literal[
-    "time", "angle", "travel", "rate", "acceleration", "torque", "direction", "position", "velocity", "tilt", "vector"
-]  # fmt: skip
+XYZ = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
-class Variable:
-    """One signal.
+class Variable(Of):
+    """A signal that an error may be a function of; ``kind`` decides which functions make sense."""
 
-    Attributes:
-        name: as in the JSON and in the simulator's effect ``law``, such as ``phi_2_1``.
-        words: for people, such as ``angle of driven joint 1 of robot 2``.
-        symbol: in a formula.
-        unit: of its values.
-        kind: decides which functions of it make sense.
-        slow: of a rate, below which its direction fades [``unit``].
-        wave: of an angle or a travel, by which the phase of its slowest sine grows [rad per ``unit``]: once a turn, or
-            once over the whole way.
-        parts: of a vector, its components; a law by all of them has no direction that was chosen beforehand.
-        turns: of what is felt at the origin, the turn accelerations that change it elsewhere, component by component.
-    """
-
-    name: str
-    words: str
-    symbol: str
-    unit: str
     kind: Kind
-    slow: float = LAW_SLOW_RAD_PER_S
-    wave: float = 1.0
-    parts: tuple[Variable, ...] = ()
-    turns: tuple[Variable, ...] = ()
-
-    @property
-    def each(self) -> tuple[Variable, ...]:
-        """Its components, or itself."""
-        return (*self.parts, *self.turns) or (self,)
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """Of a vector, what its components' names end with."""
-        return tuple(part.name.removeprefix(f"{self.name}_") for part in self.parts)
 
 
 TIME = Variable("time", "time", "t", "s", "time")
 """Since the trial began."""
-
-
-_JOINTS: dict[str, tuple[slice, str, str, str, Kind]] = {
-    "phi": (PHI, "angle of driven joint {j} of robot {i}", "phi", "rad", "angle"),
-    "phi_rate": (PHI_DOT, "rate of driven joint {j} of robot {i}", "phi'", "rad/s", "rate"),
-    "phi_acceleration": (PHI_DDOT, "acceleration of driven joint {j} of robot {i}", "phi''", "rad/s^2", "acceleration"),
-    "theta": (THETA, "angle of gimbal axis {j} of robot {i}", "theta", "rad", "angle"),
-    "theta_rate": (THETA_DOT, "rate of gimbal axis {j} of robot {i}", "theta'", "rad/s", "rate"),
-    "theta_acceleration": (
-        THETA_DDOT, "acceleration of gimbal axis {j} of robot {i}", "theta''", "rad/s^2", "acceleration",
-    ),
-    "tau": (TAU, "torque of driven joint {j} of robot {i}", "tau", "N m", "torque"),
-}  # fmt: skip
-_PAYLOAD: dict[str, tuple[str, str, str, Kind]] = {
-    "payload_position": ("position of the payload along {axis}", "p", "m", "position"),
-    "payload_velocity": ("velocity of the payload along {axis}", "v", "m/s", "velocity"),
-    "payload_acceleration": ("acceleration of the payload along {axis}", "a", "m/s^2", "acceleration"),
-    "payload_felt": (
-        "acceleration that the payload feels, less gravity, along its {axis}", "f", "m/s^2", "acceleration",
-    ),
-    "payload_rate": ("turn rate of the payload about its {axis}", "omega", "rad/s", "rate"),
-    "payload_turn": ("turn acceleration of the payload about its {axis}", "alpha", "rad/s^2", "acceleration"),
-    "payload_up": ("tilt of the payload, component of up along its {axis}", "up", "1", "tilt"),
-}  # fmt: skip
-
-
-def joint_variable(name: str, robot: int, joint: int) -> Variable:
-    """A signal of one joint (robot and joint from 1)."""
-    _, words, symbol, unit, kind = _JOINTS[name]
-    said = words.format(i=robot, j=joint)
-    return Variable(f"{name}_{robot}_{joint}", said, f"{symbol}_{robot}{joint}", unit, kind)
-
-
-def payload_variable(name: str, axis: str) -> Variable:
-    """A signal of the payload: position and velocity in {b1}, the others in {1}."""
-    words, symbol, unit, kind = _PAYLOAD[name]
-    return Variable(f"{name}_{axis}", words.format(axis=axis), f"{symbol}_{axis}", unit, kind)
-
-
-def payload_felt() -> Variable:
-    """What something in the payload feels, wherever it sits."""
-    parts, turns = (
-        tuple(payload_variable(n, axis) for axis in "xyz") for n in ("payload_felt", "payload_turn")
-    )
-    words = "acceleration felt in the payload, less gravity"
-    return Variable("payload_felt", words, "f", parts[0].unit, "vector", parts=parts, turns=turns)
-
-
-def signals_of(linear: TrialLinear) -> dict[str, Array]:
-    """Values of all of them in one trial, shape (Q,) each."""
-    signals, out = linear.signals, {TIME.name: linear.signals.time - linear.signals.time[0]}
-    for name, (slots, *_) in _JOINTS.items():
-        for i in range(linear.robots):
-            for j in range(3):
-                out[f"{name}_{i + 1}_{j + 1}"] = linear.s[:, i, slots][:, j]
-    motion = linear.motion
-    position = linear.data.p_bi[:, 0]
-    vectors = {
-        "payload_position": position,
-        "payload_velocity": signals.with_rates(position)[1],
-        "payload_acceleration": motion.acceleration,
-        "payload_felt": motion.acceleration + linear.data.gravity_mps2 * motion.up,
-        "payload_rate": motion.omega,
-        "payload_turn": motion.alpha,
-        "payload_up": motion.up,
-    }
-    for name, vector in vectors.items():
-        for axis, values in zip("xyz", np.asarray(vector).T, strict=True):
-            out[f"{name}_{axis}"] = np.ascontiguousarray(values)
-    return out
+JOINTS: dict[str, tuple[slice, str, str, str, Kind]] = {
+    "phi": (PHI, "angle of driven joint", "phi", "rad", "angle"),
+    "phi_rate": (PHI_DOT, "rate of driven joint", "phi'", "rad/s", "other"),
+    "phi_acceleration": (PHI_DDOT, "acceleration of driven joint", "phi''", "rad/s^2", "other"),
+    "tau": (TAU, "torque of driven joint", "tau", "N m", "other"),
+    "theta": (THETA, "angle of gimbal axis", "theta", "rad", "angle"),
+    "theta_rate": (THETA_DOT, "rate of gimbal axis", "theta'", "rad/s", "other"),
+    "theta_acceleration": (THETA_DDOT, "acceleration of gimbal axis", "theta''", "rad/s^2", "other"),
+}
+"""Signals of a joint: slots, words, symbol, unit and kind."""
+PAYLOAD: dict[str, tuple[str, str, str, Kind]] = {
+    "payload_position": ("position of the payload along", "p", "m", "way"),
+    "payload_velocity": ("velocity of the payload along", "v", "m/s", "other"),
+    "payload_felt": ("acceleration that the payload feels, less gravity, along its", "f", "m/s^2", "other"),
+    "payload_acceleration": ("acceleration of the payload along", "a", "m/s^2", "other"),
+    "payload_rate": ("turn rate of the payload about its", "omega", "rad/s", "other"),
+    "payload_up": ("tilt of the payload, component of up along its", "up", "1", "other"),
+}
+"""Signals of the payload: words, symbol, unit and kind; position and velocity in {b1}, the others in {1}."""
 
 
 @dataclass(frozen=True)
@@ -141,15 +61,9 @@ class Place:
         robot, joint: where, from 1, or None.
         targets: the simulator's name of what each component adds to, such as ``tau_2_1``.
         axes: names of the components in words; one empty name where there is one.
-        unit: of the error.
-        title: in words, with the part in braces as in ``Candidate.title``.
+        units: of each component.
+        title: in words.
         own: signals of the same joint or robot: those that it most likely depends on.
-        offset: whether a constant has to go with every law, because no cause of the catalogue is one here.
-        without: signals that hold the error itself, such as the very torque that is read; it is no function of those.
-        where: the place in words, of what sits at no robot and no joint.
-        called: what the part is called besides its number, such as `` (elbow)``.
-        units: of each component where they differ from ``unit``; empty where they do not.
-        twin: name of a place whose rows are the same, minus these; only the response to the commands separates them.
     """
 
     name: str
@@ -157,15 +71,9 @@ class Place:
     joint: int | None
     targets: tuple[str, ...]
     axes: tuple[str, ...]
-    unit: str
+    units: tuple[str, ...]
     title: str
     own: tuple[Variable, ...] = ()
-    offset: bool = False
-    units: tuple[str, ...] = ()
-    twin: str | None = None
-    without: tuple[Variable, ...] = ()
-    where: str = "payload"
-    called: str = ""
 
     @property
     def key(self) -> tuple[str, int | None, int | None]:
@@ -173,8 +81,17 @@ class Place:
         return self.name, self.robot, self.joint
 
 
-XYZ = ("x", "y", "z")
-READINGS = {"phi reading": "phi", "theta reading": "theta", "tau reading": "tau"}
+def joint_variable(name: str, robot: int, joint: int) -> Variable:
+    """A signal of one joint (robot and joint from 1)."""
+    _, words, symbol, unit, kind = JOINTS[name]
+    said = f"{words} {joint} of robot {robot}"
+    return Variable(f"{name}_{robot}_{joint}", said, f"{symbol}_{robot}{joint}", unit, kind)
+
+
+def payload_variable(name: str, axis: str) -> Variable:
+    """A signal of the payload along one axis."""
+    words, symbol, unit, kind = PAYLOAD[name]
+    return Variable(f"{name}_{axis}", f"{words} {axis}", f"{symbol}_{axis}", unit, kind)
 
 
 def places_of(robots: int) -> list[Place]:
@@ -182,62 +99,58 @@ def places_of(robots: int) -> list[Place]:
     out = []
     for i in range(1, robots + 1):
         for j in (1, 2, 3):
-            driven = tuple(joint_variable(n, i, j) for n in ("phi", "phi_rate", "phi_acceleration", "tau"))
-            gimbal = tuple(joint_variable(n, i, j) for n in ("theta", "theta_rate", "theta_acceleration"))
+            driven = tuple(joint_variable(name, i, j) for name in JOINTS if not name.startswith("theta"))
+            gimbal = tuple(joint_variable(name, i, j) for name in JOINTS if name.startswith("theta"))
             out += [
-                _joint("tau reading", i, j, "tau", "N m", "reading of the torque sensor of {driven joint}", driven,
-                       twin="driven torque"),
-                _joint("phi reading", i, j, "phi", "rad", "reading of the angle of {driven joint}", driven),
-                _joint("theta reading", i, j, "theta", "rad", "reading of the angle of {gimbal axis}", gimbal),
-                _joint("gimbal torque", i, j, "gimbal_torque", "N m", "torque in {gimbal axis}", gimbal, offset=True),
-            ]  # fmt: skip
-        out.append(
-            Place("base position", i, None, tuple(f"base_position_{i}_{a}" for a in XYZ), XYZ, "m",
-                  "displacement of {base}")
-        )  # fmt: skip
-        out.append(
-            Place("grasp position", i, None, tuple(f"grasp_position_{i}_{a}" for a in XYZ), XYZ, "m",
-                  "displacement of {grasp}")
-        )  # fmt: skip
-    own = tuple(payload_variable(n, a) for n in ("payload_position", "payload_velocity") for a in XYZ)
-    inner = tuple(
-        payload_variable(n, a)
-        for n in ("payload_felt", "payload_acceleration", "payload_rate", "payload_up")
-        for a in XYZ
-    )
-    inner += (payload_felt(),)
-    out += [
-        _at_payload("force on payload", (*(f"payload_force_{a}" for a in XYZ), *(f"payload_moment_{a}" for a in XYZ)),
-                 ("force x", "force y", "force z", "moment x", "moment y", "moment z"), "N",
-                 "force and moment on the payload, in the world", own, units=("N",) * 3 + ("N m",) * 3),
-        _at_payload("payload mass", ("payload_mass",), ("",), "kg", "mass of the payload", ()),
-        _at_payload("payload centre", tuple(f"payload_first_moment_{a}" for a in XYZ), XYZ, "kg m",
-                 "first moment of the payload's mass", inner),
-        _at_payload("payload spin", tuple(f"payload_spin_{a}" for a in XYZ), XYZ, "kg m^2/s",
-                 "angular momentum inside the payload", ()),
+                Place(name, i, j, (f"{target}_{i}_{j}",), ("",), (unit,), title, own)
+                for name, target, unit, title, own in (
+                    ("tau reading", "tau", "N m", "reading of the torque sensor of driven joint", driven),
+                    ("phi reading", "phi", "rad", "reading of the angle of driven joint", driven),
+                    ("theta reading", "theta", "rad", "reading of the angle of gimbal axis", gimbal),
+                    ("gimbal torque", "gimbal_torque", "N m", "torque in gimbal axis", gimbal),
+                )
+            ]
+        for what in ("base", "grasp"):
+            targets = tuple(f"{what}_position_{i}_{a}" for a in XYZ)
+            out.append(
+                Place(f"{what} position", i, None, targets, XYZ, ("m",) * 3, f"displacement of {what}")
+            )
+    outer, inner = list(PAYLOAD)[:2], list(PAYLOAD)[2:]
+    own, felt = (tuple(payload_variable(n, a) for n in names for a in XYZ) for names in (outer, inner))
+    targets = tuple(f"payload_{kind}_{a}" for kind in ("force", "moment") for a in XYZ)
+    axes = tuple(f"{kind} {a}" for kind in ("force", "moment") for a in XYZ)
+    moments, spins = (tuple(f"payload_{kind}_{a}" for a in XYZ) for kind in ("first_moment", "spin"))
+    return [
+        *out,
+        Place("force on payload", None, None, targets, axes, ("N",) * 3 + ("N m",) * 3,
+              "force and moment on the payload, in the world", own),
+        Place("payload mass", None, None, ("payload_mass",), ("",), ("kg",), "mass of the payload"),
+        Place("payload centre", None, None, moments, XYZ, ("kg m",) * 3, "first moment of the payload's mass", felt),
+        Place("payload spin", None, None, spins, XYZ, ("kg m^2/s",) * 3, "angular momentum inside the payload"),
     ]  # fmt: skip
+
+
+def signals_of(linear: TrialLinear) -> dict[str, Array]:
+    """Values of all of them in one trial, shape (Q,) each."""
+    signals, out = linear.signals, {TIME.name: linear.signals.time - linear.signals.time[0]}
+    for name, (slots, *_) in JOINTS.items():
+        for i in range(linear.robots):
+            for j in range(3):
+                out[f"{name}_{i + 1}_{j + 1}"] = linear.s[:, i, slots][:, j]
+    motion = linear.motion
+    position = linear.data.p_bi[:, 0]
+    vectors = {
+        "payload_position": position,
+        "payload_velocity": signals.with_rates(position)[1],
+        "payload_acceleration": motion.acceleration,
+        "payload_felt": motion.acceleration + linear.data.gravity_mps2 * motion.up,
+        "payload_rate": motion.omega,
+        "payload_up": motion.up,
+    }
+    for name, vector in vectors.items():
+        for axis, values in zip("xyz", np.asarray(vector).T, strict=True):
+            out[f"{name}_{axis}"] = np.ascontiguousarray(values)
     return out
-
-
-def _joint(
-    name: str, robot: int, joint: int, target: str, unit: str, title: str, own: tuple[Variable, ...], *,
-    offset: bool = False, twin: str | None = None,
-) -> Place:  # fmt: skip
-    return Place(
-        name, robot, joint, (f"{target}_{robot}_{joint}",), ("",), unit, title, own, offset, twin=twin
-    )
-
-
-def _at_payload(
-    name: str,
-    targets: tuple[str, ...],
-    axes: tuple[str, ...],
-    unit: str,
-    title: str,
-    own: tuple[Variable, ...],
-    units: tuple[str, ...] = (),
-) -> Place:
-    return Place(name, None, None, targets, axes, unit, title, own, units=units)
 
 
 def directions_at(linear: TrialLinear, place: Place) -> Array:
@@ -340,3 +253,244 @@ def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
 
 def _crossed(a: Array, b: Array) -> Array:
     return np.asarray(np.cross(a, b), dtype=np.float64)
+
+
+TERMS = 7
+"""Cosines of a function: periods down to a quarter of the signal's range."""
+SIZES = {
+    "tau reading": 5e-3, "phi reading": 1e-4, "theta reading": 1e-4, "gimbal torque": 2e-3, "base position": 1e-5,
+    "grasp position": 1e-5, "force on payload": 0.02, "payload mass": 0.01, "payload centre": 3e-3,
+    "payload spin": 0.01,
+}  # fmt: skip
+"""Typical small errors of a place, in its unit: the tolerances of the listed causes there."""
+SLAB = 16.0
+"""Largest such error that is expected, in these."""
+UNLISTED_NATS = 5.0
+"""Log odds of a listed cause over something that no table lists."""
+OPEN_NATS = 150.0
+"""What the noise must be worth beyond the sensors' before unlisted laws are sought: clean teams leave up to 110."""
+LIKELIEST = 8
+"""Places and signals whose exact linear gain is computed."""
+OWN_CONSTANT = ("gimbal torque", "force on payload", "payload spin")
+"""Places where no listed cause is a constant."""
+HUM_HZ = (0.3, 6.0)
+"""Frequencies of a hum: slower it is a function of time, and rows come 12.5 times a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unlisted:
+    """An error at a place that is a function of a signal.
+
+    Attributes:
+        place, variable: which.
+        component: of the place.
+        times: a signal that multiplies it, or None.
+        terms: cosines of the function.
+        hz: frequency, of a hum.
+        among: how many laws it is one of that are as likely.
+    """
+
+    place: Place
+    component: int
+    variable: Variable
+    times: Variable | None = None
+    terms: int = TERMS
+    hz: float | None = None
+    among: int = 1
+
+    @property
+    def where(self) -> str:
+        """The place in words."""
+        own = self.place
+        where = f"{own.title} {own.joint}" if own.joint else own.title
+        where += f" of robot {own.robot}" if own.robot else ""
+        return f"{where} {own.axes[self.component]}".strip()
+
+    @property
+    def first(self) -> int:
+        """Number of the first cosine: a constant is one where nothing listed is."""
+        return 0 if self.place.name in OWN_CONSTANT and self.hz is None else 1
+
+    @property
+    def group(self) -> Group:
+        """The law as a group of the engine, without columns."""
+        k = np.append(np.arange(self.first, self.terms + 1.0), 1.0) if self.hz is None else np.zeros(2)
+        falling = 1.0 / (1.0 + k)
+        sizes = SLAB * SIZES[self.place.name] * falling / np.sqrt(np.sum(falling**2))
+        shape = [(self.variable.name, float(self.component))]
+        shape += [(f"times {self.times.name}", 1.0)] if self.times else []
+        shape += [("terms", float(self.terms))] if self.terms != TERMS else []
+        shape += [("hz", self.hz)] if self.hz is not None else []
+        odds = -UNLISTED_NATS - math.log(self.among)
+        return Group("unlisted", self.where, (), tuple(sizes.tolist()), odds, tuple(shape), late=True)
+
+
+@dataclass(eq=False)
+class Laws:
+    """All that may be wrong of a team's places as functions of their own signals.
+
+    Attributes:
+        linear: trials.
+        laws: by the identity of their groups.
+    """
+
+    linear: Sequence[TrialLinear]
+    laws: dict[object, Unlisted] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for place in places_of(self.linear[0].robots):
+            for component in range(len(place.targets)):
+                for variable, times in self._variables(place):
+                    law = Unlisted(place, component, variable, times)
+                    self.laws[law.group.identity] = law
+
+    def of(self, group: Group) -> Unlisted:
+        """The law that is a group."""
+        shape = dict(group.shape)
+        plain = tuple(item for item in group.shape if item[0] not in ("terms", "hz"))
+        law = self.laws[group.cause, group.place, plain]
+        among = len(self._hums[0]) if "hz" in shape else 1
+        return replace(law, terms=int(shape.get("terms", TERMS)), hz=shape.get("hz"), among=among)
+
+    def _variables(self, place: Place) -> Iterator[tuple[Variable, Variable | None]]:
+        yield from ((v, None) for v in place.own)
+        yield TIME, None
+        if place.name == "tau reading" and place.robot and place.joint:
+            torques = [joint_variable("tau", place.robot, j) for j in (1, 2, 3)]
+            yield from ((v, None) for j, v in enumerate(torques) if j + 1 != place.joint)
+            yield TIME, torques[place.joint - 1]  # a scale that drifts
+
+    @cached_property
+    def _signals(self) -> list[dict[str, Array]]:
+        return [signals_of(t) for t in self.linear]
+
+    def _split(self, x: Array) -> list[Array]:
+        return np.split(x, np.cumsum([len(s[TIME.name]) for s in self._signals])[:-1])
+
+    def signal(self, variable: Variable) -> Array:
+        """A signal in all trials one after another."""
+        return np.concatenate([s[variable.name] for s in self._signals])
+
+    def functions(self, law: Unlisted) -> Array:
+        """Functions of the signal that a law is made of, shape (Q, k): cosines of its rank and itself, or a hum.
+
+        Cosines alone have no slope at their ends, and what a joint's angle is off by acts through its rate, too.
+        """
+        x = self.signal(law.variable)
+        if law.hz is not None:
+            turned = 2.0 * np.pi * law.hz * x
+            return np.stack([np.sin(turned), np.cos(turned)], axis=1)
+        u = (rankdata(x) - 0.5) / len(x)
+        waves = np.cos(np.pi * np.outer(u, np.arange(law.first, law.terms + 1.0)))
+        return np.column_stack([waves, (x - x.mean()) / (math.sqrt(2.0) * np.std(x) + 1e-300)])
+
+    def basis(self, law: Unlisted) -> list[Array]:
+        """The law's terms, shape (Q, k) a trial."""
+        f = self.functions(law)
+        return self._split(f if law.times is None else f * self.signal(law.times)[:, None])
+
+    def columns(self, law: Unlisted) -> list[Array]:
+        """What the terms of a law add to the residual, shape (n, C, k) a trial."""
+        out = []
+        for linear, errors in zip(self.linear, self.basis(law), strict=True):
+            D = directions_at(linear, law.place)[:, law.component]  # (n, parts, C)
+            parts = linear.signals.with_rates(errors)[: D.shape[1]]
+            rows = np.stack([linear.reduction(part) for part in parts], axis=1)
+            out.append(np.einsum("npc,npk->nck", D, rows))
+        return out
+
+    def finer(self, group: Group) -> list[Group]:
+        """The law with more cosines, or the hum a little faster and slower."""
+        law = self.of(group)
+        if law.hz is None:
+            return [replace(law, terms=2 * TERMS).group] if law.terms == TERMS else []
+        step = 0.125 / max(float(s[TIME.name][-1]) for s in self._signals)
+        return [replace(law, hz=law.hz + d).group for d in (-step, step)]
+
+    def proposed(self, left: Sequence[Array], white: Callable[[list[Array]], list[Array]]) -> list[Group]:
+        """The likeliest laws by what rows leave along the direction of their place.
+
+        Args:
+            left: rows over their variance, shape (n, C) a trial.
+            white: whitens rows (n, C, 1) one by one.
+        """
+        directions: dict[tuple[object, int], list[Array]] = {}
+        bases: dict[object, list[Array]] = {}
+        found = []
+        for law in self.laws.values():
+            key = law.place.key, law.component
+            if key not in directions:
+                each = [directions_at(t, law.place)[:, law.component, 0] for t in self.linear]
+                directions[key] = white([d[..., None] for d in each])
+                found.append(self._hum(law, directions[key], left))
+            which = law.variable.name, law.times and law.times.name, law.first
+            if which not in bases:
+                pairs = zip(self.linear, self.basis(law), strict=True)
+                bases[which] = [b[t.reduction.sample] for t, b in pairs]
+            slab = np.array(law.group.slab)
+            A, b = np.eye(len(slab)), np.zeros(len(slab))
+            for D, z, f in zip(directions[key], left, bases[which], strict=True):
+                d, g = D[..., 0], (f if law.first == 0 else f - f.mean(axis=0)) * slab
+                A += (g * np.sum(d**2, axis=1)[:, None]).T @ g
+                b += g.T @ np.sum(d * z, axis=1)
+            found.append((0.5 * float(b @ np.linalg.solve(A, b) - np.linalg.slogdet(A)[1]), law))
+        best = sorted(found, key=lambda pair: -pair[0])[:LIKELIEST]
+        return [law.group for gain, law in best if gain > 0.0]
+
+    @cached_property
+    def _hums(self) -> tuple[Array, list[NDArray[np.complex64]]]:
+        """Frequencies, four in each that a trial tells from the next, and waves of them at each trial's rows."""
+        time = [s[TIME.name][t.reduction.sample] for s, t in zip(self._signals, self.linear, strict=True)]
+        hz = np.arange(HUM_HZ[0], HUM_HZ[1], 0.25 / max(float(t[-1]) for t in time))
+        return hz, [np.exp(-2j * np.pi * np.outer(hz, t)).astype(np.complex64) for t in time]
+
+    def _hum(
+        self, law: Unlisted, directions: Sequence[Array], left: Sequence[Array]
+    ) -> tuple[float, Unlisted]:
+        """The likeliest hum of a place, and its gain beside the odds of its frequency."""
+        hz, waves = self._hums
+        score, size = np.zeros(len(hz), dtype=complex), 0.0
+        for E, D, z in zip(waves, directions, left, strict=True):
+            score += E @ np.sum(D[..., 0] * z, axis=1)
+            size += 0.5 * float(np.sum(D**2))
+        gain = 0.5 * np.abs(score) ** 2 / max(size, 1e-300)
+        best = int(np.argmax(gain))
+        own = Unlisted(law.place, law.component, TIME, hz=float(hz[best]), among=len(hz))
+        return float(gain[best]) - math.log(own.among) - math.log1p(own.group.slab[0] ** 2 * size), own
+
+    def told(self, group: Group, mean: Array, covariance: Array, prior: Array) -> Law:
+        """A law with its formula.
+
+        Args:
+            group: the law, in the model.
+            mean, covariance: of its terms, shapes (k,) and (k, k).
+            prior: variances with which these were fitted, shape (k,).
+        """
+        law = self.of(group)
+        place, x, f = law.place, self.signal(law.variable), self.functions(law)
+        formula = formula_of(Curve(x, f, mean, covariance, prior, law.variable.kind), law.hz)
+        se = np.sqrt(np.maximum(np.einsum("qk,kl,ql->q", f, covariance, f), 0.0))
+        w = np.ones(len(x)) if law.times is None else self.signal(law.times)
+        time = [s[TIME.name] for s in self._signals]
+        own = traces(time, x, w, f @ mean, se, formula, shift=law.first > 0)
+        target, unit = (each[law.component] for each in (place.targets, place.units))
+        return Law(
+            place.name, place.robot, place.joint, target, unit, law.variable, law.times, formula, own
+        )  # fmt: skip
+
+    def pieces(self, group: Group, law: Law, mean: Array) -> Iterator[Piece]:
+        """A law, its terms (k,) as other data have them, as functions of one amplitude each, as simulators take it.
+
+        Where the constant is not its own it has none: that is what zeros, biases and places are found beside.
+        """
+        own = self.of(group)
+        x = self.signal(own.variable)
+        formula = law.formula.through(x, self.functions(own), mean)
+        yield from replace(law, formula=formula).pieces()
+        if own.first and own.times is None:
+            yield {
+                "target": law.target,
+                "function": "constant",
+                "of": TIME.name,
+                "amplitude": -float(np.mean(formula.at(x))),
+            }

@@ -21,8 +21,8 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.candidates import in_shapes, origin_of, shape_steps
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.laws import OPEN_NATS, Laws
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.unlisted import OPEN_NATS, Laws
 from estimator.arrays import Array
 
 TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)

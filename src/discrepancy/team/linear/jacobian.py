@@ -79,11 +79,6 @@ class BySignals:
         whole[:, self.moved[robot]] = J[low] + (after - J[low]) * (rest / self.every)[:, None, None]
         return whole
 
-    def dense(self, slots: slice = slice(None)) -> Array:
-        """At every sample, shape (N, Q, C, s)."""
-        every = np.arange(self.samples)
-        return np.array([self.at(robot, slots, every) for robot in range(len(self.knots))])
-
 
 def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> BySignals:
     """Derivative of the residual by every robot's signals.
