@@ -82,9 +82,9 @@ class Finding:
         unlisted: probability that something is there that no table lists.
         rivals: what else may be there, the likeliest first.
         told: causes and places of the smallest set that holds 90 %, the likeliest first.
-        folds: by how much each trial, foretold by the others, is likelier with it beside the findings before [nats].
+        folds: by how much each trial, predicted by the others, is likelier with it beside the findings before [nats].
         in_sample: share of the model's misfit that it removes beyond the findings before it.
-        held_out: the same in trials foretold by the others; None of a single trial and of events.
+        held_out: the same in trials predicted by the others; None of a single trial and of events.
     """
 
     cause: str

@@ -1,4 +1,4 @@
-"""Parts of the logs that foretell each other: what each says of a found set's columns, with the noise of the search."""
+"""Parts of the logs that predict each other: what each says of a found set's columns, with the noise of the search."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Parts:
         G, b, yy = (v[at].sum(axis=0) for v in (self.grams, self.products, self.squares))
         return max(float(yy - 2.0 * b @ x + x @ G @ x), 0.0)
 
-    def foretold(self, prior: Array, part: int) -> Array:
+    def predicted(self, prior: Array, part: int) -> Array:
         """Values for one part as the others have them; what is its own comes from itself, shape (K,)."""
         x = np.where(self.local, 0.0, self.mean(prior, part))
         return self.step(x, np.where(self.local, prior, 0.0), [part])

@@ -411,7 +411,7 @@ class Search:
             else 0.0
         )
 
-    def is_usual(self, state: State, own: Chosen) -> bool:
+    def is_within_tolerance(self, state: State, own: Chosen) -> bool:
         """Whether all values of a cause are within three of the tolerances that its kind, or else the machine, has."""
         plain = next((g for g in self.problem.groups if g.key == own.group.key), None)
         if plain is None or len(plain.columns) != len(own.group.columns) or own.group.members:

@@ -14,7 +14,7 @@ from discrepancy.evidence.findings import Finding, words_of
 from discrepancy.joints.causes import LINKS, WORDS, Said, joint_in_words, link_in_words, titled
 from discrepancy.joints.effects import all_effects
 from discrepancy.joints.model import SerialModel, load_spec
-from discrepancy.joints.verdict import Foretold, JointVerdict
+from discrepancy.joints.verdict import JointVerdict, Prediction
 from discrepancy.numbers import three_digits
 from discrepancy.result.folder import Diagnosed
 from discrepancy.result.json import ALL, Told, Values
@@ -33,10 +33,10 @@ def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = 
         verdict: what was found.
         rollouts: what rollouts said, or None.
     """
-    return JointTold(verdict).values(_gain(verdict), rollouts=rollouts)
+    return JointValues(verdict).values(_gain(verdict), rollouts=rollouts)
 
 
-class JointTold(Told):
+class JointValues(Told):
     """A verdict on a robot of joints as values with words."""
 
     machine = "joints"
@@ -107,13 +107,13 @@ class JointTold(Told):
 
 
 def _gain(verdict: JointVerdict) -> Values | None:
-    """Torques foretold without and with the findings."""
+    """Torques predicted without and with the findings."""
     if not verdict.foretold:
         return None
     foretold, known = verdict.foretold, _known(verdict)
     names = {j: f"{verdict.model.joints[j]} torque" for j in known}
 
-    def errors(one: Foretold, which: str) -> dict[str, float]:
+    def errors(one: Prediction, which: str) -> dict[str, float]:
         rms = getattr(one, which)
         sizes = {f"{name}_rms": float(rms[j]) for j, name in names.items()}
         sizes |= {f"{name}_nrmse": float(rms[j] / one.torque[j]) for j, name in names.items()}
@@ -140,7 +140,7 @@ def unit_of(model: SerialModel, joint: int) -> str:
 
 
 def _known(verdict: JointVerdict) -> list[int]:
-    """Joints whose torques were foretold in all trials."""
+    """Joints whose torques were predicted in all trials."""
     sizes = np.array([[f.before, f.after, f.noise, f.torque] for f in verdict.foretold])
     there = np.isfinite(sizes).all(axis=(0, 1)) & (sizes[:, 2:] > 0.0).all(axis=(0, 1))
     return [int(j) for j in np.flatnonzero(there)]

@@ -163,7 +163,7 @@ def rigid(omega: Array, alpha: Array, lever: Array) -> Array:
 
 
 def vectors(*shape: int) -> Array:
-    """Vectors of nought, shape (..., Q, 3); a component's samples follow each other: faster for all made of them."""
+    """Vectors of zero, shape (..., Q, 3); a component's samples follow each other: faster for all made of them."""
     return np.swapaxes(np.zeros((*shape[:-1], 3, shape[-1])), -1, -2)
 
 
@@ -290,7 +290,7 @@ def _rigid_torque(motion: Motion) -> Array:
     force, moment = vectors(len(tree.parent), samples), vectors(len(tree.parent), samples)
     out = np.zeros((len(tree.joint_body), samples)).T
     for b in range(len(tree.parent) - 1, 0, -1):
-        if tree.mass[b]:  # a fit may pass through masses below nought
+        if tree.mass[b]:  # a fit may pass through masses below zero
             R, w, al = motion.rotation[b], motion.omega[b], motion.alpha[b]
             own = R.swapaxes(1, 2)
             lever = turned(R, tree.com[b])

@@ -1,4 +1,4 @@
-"""From logs to trials: torques of every drive, smooth signals, and parts that foretell each other."""
+"""From logs to trials: torques of every drive, smooth signals, and parts that predict each other."""
 
 from __future__ import annotations
 

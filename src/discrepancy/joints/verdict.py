@@ -14,7 +14,7 @@ import numpy as np
 from discrepancy.cause_names import excluded_from
 from discrepancy.evidence.findings import Event, Finding, Member, Verdict, with_held
 from discrepancy.evidence.judge import Judge
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Until
@@ -35,12 +35,12 @@ from mocobot_logs.joints.joint_log import JointLog
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
-    """How well the torques of one trial are foretold by the others.
+class Prediction:
+    """How well the torques of one trial are predicted by the others.
 
     Attributes:
         trial: its name.
-        before, after: root mean squares of measured minus foretold torque without and with the findings, as the other
+        before, after: root mean squares of measured minus predicted torque without and with the findings, as the other
             trials have them, shape (J,) [N m or N].
         noise: of the rows, shape (J,).
         torque: root mean square of the measured torque, shape (J,).
@@ -64,14 +64,14 @@ class JointVerdict(Verdict):
         model: the robot as described.
         parts: the trials: smoothed logs, or parts of one.
         motors: drives that tell no torque, and what they give by what they were given.
-        foretold: one a trial, each by the others; by all of them where there is one trial only (``validated``).
+        foretold: one a trial, predicted by the others; by all of them where there is one trial only (``validated``).
         by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
     """
 
     model: SerialModel
     parts: Sequence[Signals]
     motors: tuple[Motor, ...]
-    foretold: tuple[Foretold, ...]
+    foretold: tuple[Prediction, ...]
     by_the_others: Callable[[int], tuple[Finding, ...]]
 
 
@@ -117,7 +117,7 @@ def judged(
     )
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
-    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
+    outcome = replace(outcome, state=without_unfounded(outcome.search, outcome.state))
     return _JointJudge(model, trials, outcome).verdict([*notes_of([*logs, *reference])])
 
 
@@ -152,7 +152,7 @@ class _JointJudge(Judge):
             model=self.model,
             parts=self.trials.signals,
             motors=self.trials.motors,
-            foretold=tuple(self._foretold([o.chosen for o in self.named])),
+            foretold=tuple(self._predicted([o.chosen for o in self.named])),
             by_the_others=self.by_the_others,
         )
         return with_held(verdict, held_in(self.model, self.trials))
@@ -238,17 +238,17 @@ class _JointJudge(Judge):
         values = self.parts.values(prior, trial)
         return tuple(f for o in named for f in self.findings(o, values))
 
-    def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
+    def _predicted(self, kept: Sequence[Chosen]) -> Iterator[Prediction]:
         both, parts = (self.prior((), tolerated=False), self.prior(kept)), self.parts
         for t, name in enumerate(self.trials.names[: self._changed]):
             sides, chi2 = [], []
             for prior in both:
-                x = parts.foretold(prior, t)
+                x = parts.predicted(prior, t)
                 sides.append(self._wide(np.sqrt(np.mean(self.series[t].left(x) ** 2, axis=0))))
                 chi2.append(float(parts.left(x, t) / parts.rows[t].sum()))
             own = self.trials.signals[t].torque
             torque = self._wide(np.sqrt(np.mean(own**2, axis=0))[self.trials.joints])
-            yield Foretold(name, sides[0], sides[1], self._wide(self._noise(t)), torque, chi2[0], chi2[1])
+            yield Prediction(name, sides[0], sides[1], self._wide(self._noise(t)), torque, chi2[0], chi2[1])
 
     def _wide(self, sizes: Array) -> Array:
         """Numbers of the joints with torques as ones of all joints."""

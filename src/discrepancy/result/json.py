@@ -27,7 +27,7 @@ causes              list, in the order of discovery, of
     instead                        {nothing, unlisted}: probabilities that nothing is there, or something that is not
                                    in the catalogue and looks like it; with ``probability`` and those of the
                                    alternatives they add up to 1
-    folds                          nats by which every trial is likelier with it, foretold by the others; of a team
+    folds                          nats by which every trial is likelier with it, predicted by the others; of a team
                                    beside everything that is off within its tolerance
     law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
                                    formula, units of the parameters}: an error at ``targets`` that is a function of

@@ -240,7 +240,7 @@ def _gain(values: Values) -> Iterable[str]:
 
 
 def _likelier(folds: Sequence[Sequence[float]]) -> Iterable[str]:
-    """What findings that last are worth to trials that the others foretell."""
+    """What findings that last are worth to trials that the others predict."""
     if folds:
         each = [sum(gains) for gains in zip(*folds, strict=True)]
         better = sum(gain > 0.0 for gain in each)

@@ -73,7 +73,7 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
 
 
 def foretold_torques(gain: Values) -> bool:
-    """Whether the channels are torques of a serial robot, foretold from its motion: no commands are needed for them."""
+    """Whether the channels are torques of a robot of joints, predicted from its motion without commands."""
     return all(channel.endswith(" torque") for channel in gain["units"])
 
 

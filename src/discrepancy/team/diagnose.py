@@ -176,7 +176,7 @@ def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
     return replace(problem, cells=new), miss / sum(len(c.y) for c in cells.channels)
 
 
-def opened_by(problem: TeamProblem, state: State) -> list[Array] | None:
+def latent_whitening(problem: TeamProblem, state: State) -> list[Array] | None:
     """What makes rows white beside what chosen causes leave open, shape (n, C, C) a trial; None where nothing is."""
     rig, covariance = problem.rig, None
     for candidate, values in found_in(problem, state).active:
@@ -288,7 +288,7 @@ def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
 
 def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem, Search, State, bool]:
     """The same set in a problem that is linear around it, and whether that is the same problem but for little."""
-    opened, moved = opened_by(old, state), _moved(old, state)
+    opened, moved = latent_whitening(old, state), _moved(old, state)
     problem, same = old, True
     if opened is not None or moved is not None or old.opened is not None:
         near = moved or old

@@ -12,7 +12,7 @@ import numpy as np
 
 from discrepancy.evidence.findings import Event, HeldReadings, with_held
 from discrepancy.evidence.judge import is_named
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.search import Until
 from discrepancy.evidence.settings import ODDS, SETTINGS
 from discrepancy.team.causes import read_tolerances
@@ -186,7 +186,7 @@ def diagnose_team(
     else:
         outcome = search(choice.searched)
     say("weighing what else each cause may be")
-    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
+    outcome = replace(outcome, state=without_unfounded(outcome.search, outcome.state))
     weighed = odds_of(outcome.search, outcome.state)
     rig = outcome.rig
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"

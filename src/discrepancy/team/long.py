@@ -203,7 +203,7 @@ def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int,
         count = sum(x.size for x in each.values())
         if len(known) < 2 or not count:
             continue
-        # Means are about nought; how loud windows are, about what they are on average, in shares of it.
+        # Means are about zero; how loud windows are, about what they are on average, in shares of it.
         middle = known.mean(axis=0) if name == "rms" else np.zeros(known.shape[1])
         scale = np.sqrt(np.sum((known - middle) ** 2, axis=0) / (len(known) - (name == "rms")))
         allowed = -ODD_FACTOR * stdtrit(len(known) - 1, 0.5 * ODD_CHANCE / count)

@@ -155,7 +155,7 @@ NOT_SIMULATED: Values = {
 """What ``gain`` has where nothing was simulated."""
 
 
-class TeamTold(Told):
+class TeamValues(Told):
     """A verdict on a team as values with words."""
 
     machine = "team"
@@ -219,7 +219,7 @@ class TeamDiagnosed(Diagnosed[TeamVerdict]):
         gain = gain | {"estimates": dict(self.verdict.estimates)}
         if self.errors is not None:
             gain["errors"] = dict(self.errors)
-        values = TeamTold(self.verdict).values(gain, not_simulated=self.not_simulated)
+        values = TeamValues(self.verdict).values(gain, not_simulated=self.not_simulated)
         return values | {"remains": [*values["remains"], *of_response(values)]}
 
     def models(self) -> Iterator[tuple[str, str, Callable[[Path], None]]]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from estimator.arrays import Array
@@ -158,7 +158,7 @@ def test_of_two_causes_that_are_nearly_alike_one_stays() -> None:
     machine = Machine(cells, [Group(name, "joint", (k,), (1.0,)) for k, name in enumerate(("one", "twin"))])
     search = Search(machine, np.full((1, 3), 0.05**2))
     both = search.settled(search.value([Chosen(g, 1.0) for g in machine.groups], None))
-    state = borne_out(search, both)
+    state = without_unfounded(search, both)
     assert len(state.chosen) == 1
     (only,) = odds_of(search, state)
     assert only.over_nothing > 100.0
@@ -185,4 +185,4 @@ def test_laws_of_other_causes_leave_nothing_that_is_larger_than_they_are() -> No
     small = odds_of(search, state)[1]
     assert 0.0 < small.over_nothing < 9.5
     assert small.probability > 0.7
-    assert len(borne_out(search, state).chosen) == 2
+    assert len(without_unfounded(search, state).chosen) == 2

@@ -35,7 +35,7 @@ def parts() -> Parts:
 
 def test_shared_values_come_from_the_others_and_own_ones_from_the_part(parts: Parts) -> None:
     for t in (0, 1):
-        x = parts.foretold(parts.prior, t)
+        x = parts.predicted(parts.prior, t)
         by_the_other = parts.mean(parts.prior, t)
         assert x[0] == pytest.approx(by_the_other[0], abs=1e-12)
         assert x[0] == pytest.approx(SHARED, abs=0.05)

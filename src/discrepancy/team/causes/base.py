@@ -151,7 +151,7 @@ class Cause(ABC):
         return []
 
     def grown(self, shape: Shape) -> Sequence[Shape]:
-        """The same shape with a number more that the data determine, nought so far; none where that is all."""
+        """The same shape with a number more that the data determine, zero so far; none where that is all."""
         return []
 
     def around(self, values: Array, shape: Shape) -> Shape:

@@ -41,7 +41,7 @@ def pieces_while(
 
 
 def in_parts(pieces: Iterator[tuple[slice, Array]], most: int) -> Iterator[tuple[slice, Array]]:
-    """The same with at most so many columns at a time, and of the samples those between which they are not nought."""
+    """The same with at most so many columns at a time, and of the samples those between which they are not zero."""
     for at, values in pieces:
         for first in range(0, values.shape[1], most):
             some = values[:, first : first + most]

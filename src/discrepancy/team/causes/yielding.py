@@ -284,7 +284,7 @@ class GraspPlay(Cause):
         return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis{behind}"
 
     def slope_step(self, name, number):
-        return self.determined[name]  # from nought on, and straight
+        return self.determined[name]  # from zero on, and straight
 
     def physical(self, values, context):
         play_m = float(values[0])

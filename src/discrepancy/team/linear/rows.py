@@ -26,7 +26,7 @@ PATCH_SHOWS = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Some columns where they are not nought.
+    """Some columns where they are not zero.
 
     Attributes:
         rows: in which they are, increasing.
