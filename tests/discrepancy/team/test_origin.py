@@ -63,12 +63,12 @@ def test_values_are_counted_from_where_the_robots_were_believed_to_be(case, name
     origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
     rig = team(case, origin)
     candidate = next(c for c in CANDIDATES if c.cause == name and c.robot == 3)
-    (rows,), (columns,) = rig.rows(), rig.columns(candidate)
+    (columns,), residual = rig.columns(candidate), rig.whitening[0](rig.linear[0].residual)
     nothing = np.zeros(rig.linear[0].by_shared.shape[2]), [np.zeros(rig.local_unknowns)]
     value = origin_of(candidate, origin)
     np.testing.assert_array_equal(value, origin.x[places_of(candidate)])
     (at,) = rig.residual_there(*nothing, [(candidate, value)])
-    np.testing.assert_allclose(at, rows.residual, atol=1e-9)
+    np.testing.assert_allclose(at, residual, atol=1e-9)
     step = 1e-3 * candidate.units
     (away,) = rig.residual_there(*nothing, [(candidate, value + step)])
     np.testing.assert_allclose(away - at, -columns @ step, atol=0.02 * np.abs(columns @ step).max())

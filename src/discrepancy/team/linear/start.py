@@ -121,6 +121,9 @@ def with_adjusted_signals(
 ) -> TrialLinear:
     """The trial linear at its signals moved the likeliest way that leaves no residual but what causes explain.
 
+    Columns of scales, lengths and masses are functions of the signals. At measured signals their noise is in column
+    and residual alike and biases them; at adjusted ones it is not (Deming, Statistical Adjustment of Data, 1943).
+
     Args:
         linear: the trial.
         noise: what its residual tells of its signals.
