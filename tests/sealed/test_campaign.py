@@ -7,10 +7,8 @@ import pytest
 
 from discrepancy.team.causes import CAUSES
 from hidden.schedule import Schedule
-from mocobot.campaign.summary import interval
 from mocobot_sim.effects import EFFECTS
 from sealed import store
-from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
 from sealed.registry import FORMS, LISTED, UNLISTED
 from sealed.score import score
@@ -142,73 +140,3 @@ def test_a_wrong_cause_is_wrong(named, family, member, place):
     assert (one.family, one.member, one.place) == (family, member, place)
     assert scored.whole is place
     assert all(not right for _, right in scored.stated)
-
-
-def test_a_mass_is_right_in_its_trials_and_at_its_size():
-    """Put on from trial 3, or leaking out; where it sits is no part of its size."""
-    put_on, leak = MassOfTrials(3, 0.02), MassDrift(-1e-3)
-    named = {"mass_kg": (0.021, 1e-3), "rate_kgps": (0.0, None), "trial": (3, None), "last_trial": (0, None)}
-
-    def scored(form, **other):
-        effect = _effect("payload_mass", None, None, **form.known())
-        return score(_result([effect], [_named("payload_mass", None, None, **(named | other))]))
-
-    assert scored(put_on).whole
-    assert scored(put_on).scores[0].error == pytest.approx(0.05)
-    assert scored(put_on).scores[0].deviations == pytest.approx((1.0,))
-    assert not scored(put_on, trial=(2, None)).whole
-    assert not scored(put_on, last_trial=(3, None)).whole
-    assert not scored(leak).whole
-    drift = {"mass_kg": (0.0, None), "rate_kgps": (-1.1e-3, 1e-4), "trial": (1, None)}
-    assert scored(leak, **drift).scores[0].error == pytest.approx(0.1)
-    assert scored(leak, **drift).whole
-    assert not scored(put_on, **drift).whole
-    effect = _effect("payload_mass", None, None, **put_on.known(), point_x_m=0.3)
-    away = _result([effect], [_named("payload_mass", None, None, **named, point_x_m=(0.1, 0.1))])
-    assert score(away).scores[0].error == pytest.approx(0.05)
-    assert score(away).scores[0].deviations == pytest.approx((1.0, -2.0))
-
-
-def test_of_two_effects_each_gets_its_own_and_a_stranger_is_an_extra():
-    effects = [_effect(), _effect("sea_bias", 1, 3, bias_Nm=0.1)]
-    bias = _named("sea_bias", 1, 3, bias_Nm=(0.1, 0.01))
-    assert score(_result(effects, [bias, _named()], kind="pairs")).whole
-    scored = score(_result(effects, [_named(), _named("push", None, None, probability=0.8)], kind="pairs"))
-    assert [one.right for one in scored.scores] == [True, False]
-    assert [item["cause"] for item in scored.extras] == ["push"]
-    assert scored.stated == ((0.8, False),)
-
-
-UNLISTED_ONE = {"cause": "unlisted", "name": "something unlisted", "probability": 0.95}
-
-
-def test_what_nobody_lists_is_right_where_it_is_located():
-    effect = _effect() | {"cause": "cross_talk", "law": {"of": "tau reading"}}
-    effect["answer"] = {"cause": None, "robot": 2, "joint": 1, "known": {}}
-    for which, named, whole, certain in (
-        ((0,), [UNLISTED_ONE], True, 0),
-        ((), [UNLISTED_ONE], False, 1),
-        ((), [], False, 0),
-        ((), [_named(probability=0.95)], False, 1),
-        ((0,), [UNLISTED_ONE, _named(probability=0.5)], False, 0),
-        ((0, 1), [UNLISTED_ONE, UNLISTED_ONE], True, 0),
-        ((0,), [UNLISTED_ONE, UNLISTED_ONE], False, 1),
-    ):
-        law = {"which": which, "formula": False}
-        scored = score(_result([effect], named, "unexplained", "unlisted", laws=[law]))
-        assert (scored.whole, scored.certain, scored.right) == (whole, certain, int(bool(which)))
-
-
-def test_a_left_out_cause_is_nobodys():
-    """It is right where something is told as unlisted, or the verdict stays open."""
-    wrong = _result([_effect()], [_named("sea_hysteresis", probability=0.4)], kind="left-out")
-    assert not score(wrong).scores[0].listed
-    assert not score(wrong).whole
-    assert score(_result([_effect()], [UNLISTED_ONE], kind="left-out")).whole
-    assert score(_result([_effect()], [], "unexplained", kind="left-out")).whole
-
-
-def test_interval_of_none_is_clopper_and_pearsons():
-    """1 - 0.025^(1/n)."""
-    assert interval(0, 20) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 20)))
-    assert interval(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))

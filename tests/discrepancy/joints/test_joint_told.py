@@ -34,7 +34,6 @@ from joint_verdicts import (
     offset_or_spring,
 )  # fmt: skip
 from mocobot.api.diagnosis import Diagnosis
-from mocobot.comparison.diagnoses import changes_of, groups_of
 from mocobot_view.replay.replay_trial import replay_trial
 from recordings import small_recording
 
@@ -274,35 +273,6 @@ def test_why_there_is_no_extended_model(tmp_path: Path, monkeypatch: pytest.Monk
     made(tmp_path, [friction_everywhere()]).write(tmp_path / "out")
     said = (tmp_path / "out" / "report.txt").read_text()
     assert "There is no extended model: the friction would be negative." in said
-
-
-def test_rivals_are_told_on_the_page_and_in_notebooks(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], writes_models: list[Path]
-) -> None:
-    diagnosis = made(tmp_path, [offset_or_spring()])
-    assert "It may as well be spring at joint 2." in diagnosis._repr_html_()
-    diagnosis.write(tmp_path / "out")
-    assert run(capsys, "report", tmp_path / "out")[0] == 0
-    assert "It may as well be spring at joint 2." in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_two_days_are_compared_place_by_place(tmp_path: Path) -> None:
-    """All joints rub on one day, one of them on the other; links that have no number are no one place."""
-    kind = values(tmp_path, [friction_everywhere(), finding("link_mass", member("arm", None, excess_kg=0.3))])
-    one = finding("friction", member("joint2", 2, coulomb_Nm=0.9, viscous_Nms_per_rad=0.1))
-    other = values(tmp_path, [one, finding("link_mass", member("carriage", None, excess_kg=0.3))])
-    assert [group.name for group in groups_of(kind, other)] == [
-        "friction in joint 2, coulomb_Nm", "friction in joint 2, viscous_Nms_per_rad"
-    ]  # fmt: skip
-    said = [line.split(", ")[0] for line in changes_of(kind, other)]
-    assert said == [
-        "Named in A alone: friction in joint 1 (turn)", "Named in A alone: friction in joint 3 (lift)",
-        "Named in A alone: mass of link arm", "Named in B alone: mass of link carriage",
-    ]  # fmt: skip
-    alone = changes_of(values(tmp_path, [friction_everywhere()]), values(tmp_path, [a_push()]))
-    assert [line.split(", ")[0] for line in alone] == [
-        "Named in A alone: friction in all joints", "Named in B alone: push on the last link"
-    ]  # fmt: skip
 
 
 def test_a_team_and_a_robot_of_joints_are_not_mixed(

@@ -204,20 +204,6 @@ def test_what_is_found_foretells_the_other_trial(two_links: SerialModel, rubbing
     assert "Rolled out from measured states under the logged torques (on blocks left out of the fit)" in text
 
 
-@pytest.mark.usefixtures("few_starts")
-def test_nothing_named_has_no_after(two_links: SerialModel, rubbing: JointLog) -> None:
-    rolled = rolled_out(verdict(two_links, [signals(two_links, rubbing)]))
-    assert rolled is not None
-    assert not rolled["validated"]
-    assert {(h["after"], h["removed"]) for h in rolled["horizons"]} == {(None, None)}
-
-
-def test_no_rollouts_with_a_reference(two_links: SerialModel, rubbing: JointLog) -> None:
-    made = verdict(two_links, [signals(two_links, rubbing)], [rubs()])
-    made.reference = ("before",)
-    assert rolled_out(made) is None
-
-
 def test_what_rollouts_lack_is_listed(two_links: SerialModel, rubbing: JointLog) -> None:
     push = finding("push", "last link", None, {"x_N": 1.0}, event=Event(0, 2.0, 9.0))
     bends = finding("elasticity", "elbow", 2, {"compliance_rad_per_Nm": 1e-3})
@@ -225,16 +211,6 @@ def test_what_rollouts_lack_is_listed(two_links: SerialModel, rubbing: JointLog)
     assert rolled is not None
     assert rolled["not_simulated"] == ["elasticity of elbow", "push on the last link"]
     assert 8 <= rolled["horizons"][0]["starts"] <= 15  # no start in the 9 s of the push
-
-
-@pytest.mark.usefixtures("few_starts")
-def test_what_mujoco_refuses_is_said(two_links: SerialModel, rubbing: JointLog) -> None:
-    lost = finding("link_mass", "link of elbow", None, {"excess_kg": float("nan")})
-    rolled = rolled_out(verdict(two_links, [signals(two_links, rubbing)], [lost]))
-    assert rolled is not None
-    assert rolled["refused"][0].startswith("trial 1: MuJoCo refuses the model")
-    assert rolled["horizons"][0]["after"]["rms"] == [None, None]
-    assert rolled["horizons"][0]["before"]["rms"] != [None, None]
 
 
 def test_a_joint_without_torques_is_named(two_links: SerialModel, rubbing: JointLog) -> None:
@@ -344,18 +320,3 @@ def test_dry_friction_of_the_stepper_stops_a_joint_and_never_drives_it() -> None
     data.qvel[0] = 0.3
     step(model, data, [less], np.zeros(1))
     assert data.qvel[0] == pytest.approx(0.3, abs=1e-9)
-
-
-@pytest.mark.parametrize("viscous", [-0.2, -0.05])
-def test_viscous_friction_of_the_stepper_never_drives_a_joint(viscous: float) -> None:
-    """What the model has and what it is found to have less: together never below zero."""
-    model = mujoco.MjModel.from_xml_string(TURNTABLE)
-    model.opt.timestep, model.opt.integrator = 1e-3, int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-    model.dof_damping[:] = 0.1
-    data = mujoco.MjData(model)
-    data.qvel[0] = 1.0
-    for _ in range(1000):
-        step(model, data, [RobotEffect("friction", 1, None, {"coulomb_Nm": 0.0, "viscous_Nms_per_rad": viscous})],
-             np.zeros(1))  # fmt: skip
-    expected = np.exp(-max(0.1 + viscous, 0.0) / INERTIA)
-    assert data.qvel[0] == pytest.approx(expected, rel=1e-3)

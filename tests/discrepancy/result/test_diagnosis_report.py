@@ -11,7 +11,6 @@ import pytest
 
 from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
-from discrepancy.result.pictures import file_names
 from discrepancy.result.remains import of_response
 from discrepancy.result.report import format_verdict
 from discrepancy.result.tables import ERRORS, response_units
@@ -170,11 +169,6 @@ def test_every_cause_has_a_sentence_with_its_numbers(cause: str) -> None:
         assert "+-" in text
         assert ("Robot 2" in text) == (robot is not None)
         assert "_" not in text
-
-
-def test_file_names_are_distinct_and_safe() -> None:
-    names = file_names(["/x/rec.parquet", "y/rec.parquet", "a b/c:d", "against", ""])
-    assert names == ["rec", "rec_2", "c_d", "against_2", "trial"]
 
 
 def test_one_unit_for_all_channels_of_a_kind() -> None:

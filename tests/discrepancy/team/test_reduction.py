@@ -6,7 +6,6 @@ from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.team.linear.rows import TEAM_ROWS_HZ, Reduction
 from discrepancy.team.linear.signals import TEAM_TRIM_S, Signals
-from patchwork import dense
 
 QUANTUM = 2 * np.pi / 2**16
 
@@ -43,10 +42,6 @@ def test_map_is_linear_and_the_same_for_every_column(trial, reduction):
     assert reduction(x).shape == (len(reduction.time), 2, 3)
     np.testing.assert_allclose(reduction(x)[:, 1, 2], reduction(x[:, 1, 2]), atol=1e-15)
     np.testing.assert_allclose(reduction.operator.toarray() @ x[:, 0, 0], reduction(x[:, 0, 0]), atol=1e-12)
-
-
-def test_constant_stays_constant(trial, reduction):
-    np.testing.assert_allclose(reduction(np.full(len(trial.time), 7.0)), 7.0, rtol=1e-12)
 
 
 def test_hold_is_one_row_its_mean(trial, reduction):
@@ -96,22 +91,3 @@ def test_short_recording(duration):
     assert len(reduction.time) == pytest.approx((duration - 4.0) * 12.5, abs=1.0)
     x = np.random.default_rng(5).standard_normal(round(100 * duration))
     assert np.all(np.isfinite(reduction(x)))
-
-
-def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, reduction):
-    """The same as whole columns of samples; those that show in no row are left out."""
-    rng, samples = np.random.default_rng(5), len(trial.time)
-    direction = rng.standard_normal((samples, 2))
-    spans = [slice(0, 1), slice(300, 420), slice(410, 411), slice(samples - 200, samples)]
-    pieces = [(at, rng.standard_normal((at.stop - at.start, 3))) for at in spans]
-    whole = np.zeros((samples, 2, 3 * len(spans)))
-    for k, (at, values) in enumerate(pieces):
-        whole[at, :, 3 * k : 3 * k + 3] = direction[at, :, None] * values[:, None]
-    expected = reduction(whole)
-    shown = expected.any(axis=(0, 1))
-    assert not shown[0]  # before the first row
-    assert shown.sum() >= 9
-    np.testing.assert_allclose(
-        dense(reduction.of_pieces(direction, pieces)), expected[..., shown], atol=1e-12
-    )
-    assert dense(reduction.of_pieces(direction, [])).shape == (len(reduction.time), 2, 0)

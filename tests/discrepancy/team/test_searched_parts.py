@@ -10,14 +10,10 @@ import pytest
 import mocobot
 from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team import long
-from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.long import Choice, Left, more_left, times_as_much
-from discrepancy.team.rig import AsFound, TeamRig
-from estimator.arm.unit import COUNT, ArmUnit
-from estimator.estimate.payload import estimate_payload
 
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
 PUSH = {
@@ -102,38 +98,6 @@ def test_chance_is_as_stated() -> None:
         ]
         called += max(more_left(dict(enumerate(parts[4:])), parts[:4]).values()) > 1.0 / long.ODD_FACTOR
     assert 0 < called < 14  # 6 are expected; 14 or more have a chance of 0.3 %
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("cause", "parameters", "place"),
-    [("drag", {"coefficient_Ns_per_m": 8.0}, (None, None)), ("joint_friction", FRICTION, (2, 1))],
-)
-def test_what_was_found_is_out_of_what_another_part_leaves(cause, parameters, place) -> None:
-    """A cause at the simulator's own size: with it about as little is left as where it is not; without it far more.
-
-    Friction while a joint rests is left open, and remains.
-    """
-    robot, joint = place
-    where = {} if robot is None else {"robot": robot, "joint": joint}
-    effect = mocobot.make_effect(cause, parameters, **where)
-    clean, other = (mocobot.simulate("b", "random", vias=14, seed=7, effects=e) for e in ([], [effect]))
-    rig = TeamRig.of([clean], estimate_payload([clean]), read_tolerances(None))
-    (candidate,) = (c for c in rig.candidates() if c.key == (cause, robot, joint))
-    values = np.array([parameters.get(p.name, 0.0) for p in candidate.parameters])
-    units = ArmUnit(rig.linear[0].design, np.zeros((3, COUNT)))
-    there = units, rig.linear[0].shared
-    healthy = rms_of(rig.left_in(clean, AsFound(*there, [])))
-    with_it = rms_of(rig.left_in(other, AsFound(*there, [(candidate, values)])))
-    without = rms_of(rig.left_in(other, AsFound(*there, [])))
-    assert np.all(with_it < 1.5 * healthy)
-    assert np.any(without > 5.0 * healthy)
-
-
-def rms_of(left) -> np.ndarray:
-    """Of every channel in motion, shape (C,)."""
-    reduction, rows = left
-    return np.sqrt(np.mean(rows[: reduction.moving] ** 2, axis=0))
 
 
 @pytest.mark.slow

@@ -16,13 +16,11 @@ from discrepancy.team.causes.readings import Late
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed
-from discrepancy.team.linear.trial_linear import filtered, linearise
+from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.rigid_team.residual import Bases, Shared
-from mocobot_sim.effects.catalogue import EFFECTS
-from patchwork import dense
 from team_case import DESIGN, assert_close, exact, rate_of, residual_of
 
 ROBOTS = (0, 2)
@@ -241,29 +239,6 @@ def test_undo_takes_the_error_out_again(case, name):
     np.testing.assert_array_equal(without.phi, signals.phi)
 
 
-def test_friction_at_rest_takes_any_force_that_passes_the_filter(case):
-    """A joint stands still from 6 s to 8 s: a torque that changes then is an unknown, and none while it moves on."""
-    s = case.signals
-    frozen = s.phi.copy()
-    start, stop = 600, 800
-    frozen[start:stop, 1, 0] = frozen[start, 1, 0]
-    frozen[stop:, 1, 0] += frozen[start, 1, 0] - s.phi[stop, 1, 0]
-    still = replace(s, phi=frozen)
-    linear = replace(case.linear, signals=still, s=filtered(still))
-    cause = CAUSES["joint_friction"]
-    unknowns = dense(cause.unknowns(linear, 1, 0, {"slow_rad_per_s": 1e-3}))
-    moves = dense(cause.unknowns(case.linear, 1, 0, {"slow_rad_per_s": 1e-3}))
-    assert moves.shape[2] + 30 < unknowns.shape[2] <= moves.shape[2] + 42  # 2 s, a knot every twentieth
-    added = unknowns.reshape(-1, unknowns.shape[2])
-    since = np.linspace(0.0, 2.0, stop - start - 10)
-    for force in (np.ones_like(since), 1.0 - 0.35 * since, np.cos(8.0 * np.pi * since)):
-        torque = np.zeros((len(s.time), 3))
-        torque[start + 5 : stop - 5, 0] = force
-        expected = case.linear.of_signals(1, tau=torque).ravel()
-        left = expected - added @ np.linalg.lstsq(added, expected, rcond=None)[0]
-        assert np.linalg.norm(left) < 0.15 * np.linalg.norm(expected)
-
-
 def team_of(case, robots):
     """A team of any size from the robots at hand; it need not be in balance."""
     which = [(0, 1, 2, 1, 2)[k] for k in range(robots)]
@@ -303,20 +278,6 @@ def test_every_cause_has_finite_columns_and_an_effect(case, robots):
         assert effect.cause == candidate.cause
         place = getattr(effect, "robot", None), getattr(effect, "joint", None)
         assert place == (candidate.robot, candidate.joint)
-
-
-def test_catalogue_is_complete():
-    assert set(CAUSES) == set(EFFECTS) - {"law"}  # what no catalogue lists
-    for name, cause in CAUSES.items():
-        assert cause.name == name
-        assert cause.separate
-        place = set(EFFECTS[name].place_names())
-        assert place == {"joint": {"robot", "joint"}, "robot": {"robot"}, "payload": set()}[cause.per]
-        if cause.tolerances:
-            assert len(cause.tolerances) == len(cause.parameters)
-            assert not cause.scales
-        else:
-            assert len(cause.scales) == len(cause.parameters)
 
 
 def test_negative_friction_is_no_effect_but_none(case):
