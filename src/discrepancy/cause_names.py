@@ -34,7 +34,7 @@ TEAM = (
     "slosh",
     "payload_mass",
 )
-"""Of a team, in the order of the documentation: those of ``discrepancy.team.causes``."""
+"""A team's causes in the order of the documentation: those of ``discrepancy.team.causes``."""
 
 JOINTS = (
     "friction",
@@ -64,7 +64,7 @@ JOINTS = (
     "gravity_compensation",
     "push",
 )
-"""Of a robot of joints, as the tables of ``discrepancy.joints.causes`` have them."""
+"""Causes of a robot of joints, as the tables of ``discrepancy.joints.causes`` have them."""
 
 
 def excluded_from(catalogue: Collection[str], names: Iterable[str]) -> frozenset[str]:

@@ -12,10 +12,7 @@ from independent.effects.on_payload import Pendulum
 from independent.effects.registry import FORMS, NAMES, PLAIN
 from independent.generate import generate
 from independent.motion import random_motion
-from independent.numerics import (
-    FINE_HZ,
-    derivative,
-)
+from independent.numerics import FINE_HZ, derivative
 from independent.payload import MODELS, load_payload
 from independent.team import Truth, carry, place_bases, scene_of
 

@@ -26,7 +26,7 @@ class Tolerant(Linear, Protocol):
 
     @property
     def tolerance(self) -> Sequence[float]:
-        """Of every column, 0 of those that a healthy machine does not have."""
+        """One for each column, 0 where a healthy machine does not have it."""
         ...
 
 

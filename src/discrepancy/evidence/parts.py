@@ -15,7 +15,7 @@ from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array
 
 Values = tuple[Array, Array]
-"""Of the active columns, and their covariance, shapes (K,) and (K, K)."""
+"""Values of the active columns, and their covariance, shapes (K,) and (K, K)."""
 
 
 @dataclass(frozen=True, eq=False)

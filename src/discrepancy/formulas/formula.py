@@ -19,7 +19,7 @@ KNOTS, TRIED = 8, 40
 STEP_S = 0.05
 """In which a step is told to rise."""
 SIGN_SHARES = (0.03, 0.06, 0.12, 0.25, 0.5)
-"""Of the spread of a signal, up to which its sign fades; the first is what the terms of a curve tell from a jump."""
+"""Shares of a signal's spread up to which its sign fades; a curve's terms resolve the first."""
 Numbers = Sequence[float]
 
 
@@ -95,7 +95,7 @@ SIGNED = (
     _plain("signed_square", lambda x: x * np.abs(x), "{a} {x} |{x}|", 2),
     _knee("beyond", _beyond, "{a} ({x} beyond +-{n})", lambda x: _within(np.abs(x))),
 )  # fmt: skip
-"""Of a signal of both signs."""
+"""Terms of a signal that has both signs."""
 OF_TIME = (
     Shape("warming", lambda x, n: -np.expm1(-x / n[0])[:, None], "{a} (1 - exp(-{x} / {n} s))", 0, 1, ("time_s",),
           lambda x: [(float(t),) for t in np.max(x) * np.geomspace(0.05, 2.0, TRIED)], fitted=True),

@@ -101,7 +101,7 @@ def _rotations(quaternions: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Of Q samples; vectors in the world's axes, origins those of the bodies' frames.
+    """Motion at Q samples; vectors in the world's axes, origins those of the bodies' frames.
 
     Attributes:
         tree: what moves.

@@ -201,7 +201,7 @@ class Robot:
 HORIZONS_S = (0.1, 0.2, 0.5)
 """How far ahead a robot is rolled out. Chosen: from where friction tells to where an arm has turned round."""
 MOST_STARTS = 60
-"""Of rollouts in all trials together. Chosen: root mean squares are known to a tenth then, and it takes seconds."""
+"""Most rollouts in all trials together: root mean squares are known to a tenth then."""
 MOST_DIVERGED = 0.5
 """Share of the starts at which a joint may diverge and still have an error: those left are the easy ones."""
 EDGE_PERIODS = 2.5
@@ -336,7 +336,7 @@ def roll_freely(trial: Trial, horizons: Sequence[Horizon], passed_s: float, tota
 
 
 MOST_LOOP_S = 100.0
-"""Of closed loops in all trials together, each as long as the others. Chosen: they take seconds, too."""
+"""Longest closed loops in all trials together, equally long in each [s]."""
 
 
 @dataclass(frozen=True, eq=False)

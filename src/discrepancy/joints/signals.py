@@ -37,7 +37,7 @@ LEAST_SPEED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Of W samples at the rate of the mechanics, J joints.
+    """W samples at the rate of the mechanics, J joints.
 
     Attributes:
         log: what they are of.
@@ -100,7 +100,7 @@ class Signals:
 
     @cached_property
     def motion(self) -> Motion:
-        """Of the nominal tree's bodies."""
+        """Motion of the nominal tree's bodies."""
         return Motion.of(self.tree, self.q, self.dq, self.ddq)
 
     @property
@@ -145,7 +145,7 @@ TORQUE_BAND_HZ = (30.0, 120.0)
 TOP_SHARES, FILTERED_SHARES = (0.25, 0.45), (0.1, 0.2)
 """Where the noise of positions is read off, over the rate; the second of a log that was resampled."""
 SEGMENT_S = 0.5
-"""Of the spectra whose median over time is the noise: bursts, such as reversals, are not."""
+"""Length of the spectra whose median over time is the noise: bursts, such as reversals, are not [s]."""
 STILL_S, STILL_STEPS = 0.1, 0.3
 """How long a position's reading must be the same, within which share of its step, to be without noise."""
 LEAST_SHARE = 1e-3
@@ -203,7 +203,7 @@ def _density(x: Array, rate_hz: float, low: float, high: float) -> Array:
 
 
 STEP_RAD, STEP_M = 1e-4, 1e-5
-"""Of differences by joint positions. Derived: squares of the step and rounding are both below 1e-6."""
+"""Steps of differences by joint positions: their squares and rounding are both below 1e-6."""
 
 
 def along(signals: Signals, at: int, way: Array) -> Array:

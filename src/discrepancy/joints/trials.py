@@ -65,7 +65,7 @@ class Trials:
 
     @property
     def signals(self) -> tuple[Signals, ...]:
-        """Of each part."""
+        """Signals of each part."""
         return tuple(part_of(self.runs[k], at) for k, at in self.parts)
 
 

@@ -308,7 +308,7 @@ def _with_errors(member: Member) -> Values:
 
 
 def _medians(members: Iterable[Member]) -> Values:
-    """Of the members that have a parameter; joints that slide have others than joints that turn."""
+    """Medians over members that have a parameter: joints that slide have others than joints that turn."""
     each: dict[str, list[float]] = {}
     for member in members:
         for name, value in member.values.items():

@@ -10,7 +10,7 @@ from discrepancy.numbers import one_each, parameter, three_digits
 from discrepancy.result.read import is_of_joints, kind_of
 
 VISIBLE_CHI2_PER_N = 3.0
-"""Of the closed loop, from which something is said of it beside the verdict. Chosen."""
+"""chi2/n of the closed loop from which it is reported beside the verdict."""
 
 RESPONSE_SHARE = 0.8
 """Share of the response's excess error that causes must remove; with less the rest is reported."""

@@ -154,7 +154,7 @@ MOST_PLACES = 12
 PLACES, WHATS, LEAST_WHAT, SIZES, GAP = 24, 34, 22, 38, "  "
 """Widest columns of places and of what there is, the narrowest of that, room for sizes, and what is between columns."""
 PARTS = "two joints|a (?:driven joint|joint|link|leg|robot|base|grasp)"
-"""Of a machine, as titles name them, where the place tells which."""
+"""Parts of a machine, as titles name them, where the place says which."""
 COUNTS = ("trial", "last_trial")
 """Numbers that count."""
 TOGETHER = "\N{NO-BREAK SPACE}"

@@ -102,10 +102,10 @@ LEAST_MOMENT_RATIO = 1e-3
 """Least principal moment of a simulated payload over the largest: a body needs some. Chosen."""
 
 TEAM_TIMESTEP_S = 1e-3
-"""Of the closed loop's simulation. Measured: with it the integrator's error stays below the sensors' noise."""
+"""Step of the closed loop's simulation: the integrator's error stays below the sensors' noise."""
 
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
-"""Of the closed loop. Measured: integrator at 1 and 0.25 ms."""
+"""Integration errors of the closed loop, measured at steps of 1 and 0.25 ms."""
 
 
 def team_of(

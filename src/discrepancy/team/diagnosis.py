@@ -39,7 +39,7 @@ GOOD_S = 30.0
 """With which a diagnosis starts to be of use; only said. Chosen."""
 
 LEAST_S = 5.0
-"""Of all recordings together below which nothing is diagnosed. Chosen."""
+"""Least length of all recordings together that is diagnosed [s]."""
 
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
@@ -181,8 +181,7 @@ def diagnose_team(
 
     choice, notes = Choice.of(recordings, whole=whole), ()
     if choice.others:
-        parts = search_parts(choice, search, left_by, say)
-        choice, outcome, notes = parts.choice, parts.searched, parts.notes
+        choice, outcome, notes = search_parts(choice, search, left_by, say)
     else:
         outcome = search(choice.searched)
     say("weighing what else each cause may be")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import stdtrit
@@ -154,7 +154,7 @@ ODD_CHANCE, ODD_FACTOR = 0.01, 1.5
 """False alarm rate of a whole diagnosis at which a part is searched, too, and a factor on that threshold."""
 
 ODD_WINDOW_S = 10.0
-"""Of a part at a time that is held against what was searched. Chosen: a short push, some periods of a motion."""
+"""Length of the windows that are compared with searched parts [s]: a short push, some periods of a motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ class Left:
 
     @classmethod
     def of(cls, reduction: Reduction, rows: Array) -> Left:
-        """Of rows, shape (n, C), in any unit."""
+        """From rows, shape (n, C), in any unit."""
         moving, time = rows[: reduction.moving], reduction.time[: reduction.moving]
         lasts_s = time[-1] - time[0] if len(time) else 0.0
         count = max(1, int(lasts_s / ODD_WINDOW_S))  # equal ones: none is left over at the end
@@ -214,7 +214,7 @@ def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int,
 
 
 def _of(name: str, lefts: Sequence[Left]) -> Array:
-    """Of all windows of some parts, shape (w, C)."""
+    """One statistic of all windows of some parts, shape (w, C)."""
     x = np.concatenate([getattr(left, name) for left in lefts])
     return np.log(np.maximum(x, 1e-300)) if name == "rms" else x
 
@@ -229,26 +229,11 @@ def times_as_much(others: Sequence[Left], searched: Sequence[Left]) -> float | N
 
 
 ODD_NAMED = 3
-"""Of such parts that were not searched all the same, how many are named. Chosen."""
+"""How many odd parts that were not searched are named."""
 
 T = TypeVar("T")
 RowsLeft = Callable[[Recording], tuple[Reduction, Array]]
 """Rows that what was found leaves in a part, and how they were made."""
-
-
-@dataclass(frozen=True, eq=False)
-class SearchedParts(Generic[T]):
-    """What a search of some parts found.
-
-    Attributes:
-        choice: the parts.
-        searched: the result.
-        notes: sentences about the others.
-    """
-
-    choice: Choice
-    searched: T
-    notes: tuple[str, ...]
 
 
 def search_parts(
@@ -256,8 +241,10 @@ def search_parts(
     search: Callable[[list[Recording]], T],
     left_by: Callable[[T], RowsLeft],
     say: Callable[[str], object],
-) -> SearchedParts[T]:
+) -> tuple[Choice, T, tuple[str, ...]]:
     """Search the parts that are taken, and those in which more is left than in these, too, until there are none.
+
+    Returns the parts that were searched, the result, and sentences about the others.
 
     Args:
         choice: the parts, not all of which are taken.
@@ -273,14 +260,14 @@ def search_parts(
             odd, ratio = _against(choice, left_by(searched))
         except InputError:  # no such robots
             note = "What was found is no team that can be, so it was not held against the other parts."
-            return SearchedParts(choice, searched, (note,))
+            return choice, searched, (note,)
         room = most - len(choice.taken)
         if not odd or room <= 0:
-            return SearchedParts(choice, searched, _said(choice, odd, ratio))
+            return choice, searched, _said(choice, odd, ratio)
         worst = sorted(odd, key=lambda k: -odd[k])[:room]
         choice = choice.beside(worst)
         if not choice.others:
-            return SearchedParts(choice, search(choice.searched), ())
+            return choice, search(choice.searched), ()
 
 
 def _against(choice: Choice, left_by: RowsLeft) -> tuple[dict[int, float], float | None]:

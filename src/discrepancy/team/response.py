@@ -46,7 +46,7 @@ TOLD_NATS = 5.0
 CONTRADICTED = 0.5
 """By which causes lose probability that make the response worse. Chosen: as likely wrong as not."""
 VISIBLE_CHI2_PER_N = 3.0
-"""Of the closed loop, from which healthy parts are simulated as they are found, too. Chosen."""
+"""chi2/n of the closed loop from which healthy parts are simulated as they are found, too."""
 Active = list[tuple[Candidate, Array]]
 """Candidates and the values of their parameters."""
 

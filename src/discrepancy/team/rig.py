@@ -12,13 +12,7 @@ import numpy as np
 from discrepancy.candidate import Candidate
 from discrepancy.cause_names import excluded_from
 from discrepancy.result.traces import Channel
-from discrepancy.team.candidates import (
-    beyond,
-    every_candidate,
-    indices,
-    origin_of,
-    places_of,
-)
+from discrepancy.team.candidates import beyond, every_candidate, indices, origin_of, places_of
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
@@ -125,7 +119,7 @@ class TeamRig:
 
     @property
     def whitening(self) -> tuple[Whitening, ...]:
-        """Of every trial."""
+        """One for each trial."""
         return self.sensed.whitening
 
     @property
@@ -280,7 +274,7 @@ class TeamRig:
         effects: list[Effect] = []
         for candidate, values in healthy:
             if (as_designed or places_of(candidate) is None) and candidate.key not in there:
-                # Of what is found to be less than nothing there is nothing.
+                # Skip unphysical values.
                 effects += self.effects(candidate, values) or []
         return effects
 

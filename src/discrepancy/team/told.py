@@ -123,7 +123,7 @@ UNDECIDABLE = (
 
 
 UNITS = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}
-"""Of closed-loop channels, and of quantities that a misfit may depend on."""
+"""Units of closed-loop channels, and of quantities that a misfit may depend on."""
 
 
 def describe(candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:

@@ -51,11 +51,7 @@ def by_rest(trial):
 
 
 @pytest.mark.parametrize(
-    ("tolerances", "moves"),
-    [
-        (JOINT, "phi"),
-        ({"sea_hysteresis": {"friction_Nm": LIMIT_NM}}, "tau"),
-    ],
+    ("tolerances", "moves"), [(JOINT, "phi"), ({"sea_hysteresis": {"friction_Nm": LIMIT_NM}}, "tau")]
 )
 def test_draws_are_torques_at_rest_of_the_tolerances_size(one_rest, tolerances, moves):
     others = {name: np.linspace(0.0, 3.0, len(one_rest.signals.time))[:, None, None] * np.ones((1, 3, 3))

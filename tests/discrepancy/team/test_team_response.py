@@ -123,12 +123,7 @@ def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.Monkey
     tau[np.searchsorted(recording.time, choice.parts[odd].time[300]) :, 1, 0] += 0.5
     choice = Choice.of([replace(recording, tau=tau)])
     said: list[str] = []
-    parts = search_parts(
-        choice,
-        lambda some: searched(some, "phi_zero"),
-        left_by,
-        said.append,
-    )
+    taken, found, _ = search_parts(choice, lambda some: searched(some, "phi_zero"), left_by, said.append)
     assert odd not in choice.taken
-    assert odd in parts.choice.taken
-    assert choice.parts[odd].name in parts.searched.problem.rig.trials
+    assert odd in taken.taken
+    assert choice.parts[odd].name in found.problem.rig.trials

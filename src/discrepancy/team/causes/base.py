@@ -159,7 +159,7 @@ class Cause(ABC):
         return shape
 
     def alike(self, shape: Shape) -> int:
-        """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
+        """Number of equally likely ones that differ by their shapes alone; 0 where places are listed."""
         return self.among
 
     def slope_step(self, name: str, number: float) -> float:

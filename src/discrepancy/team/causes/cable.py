@@ -139,7 +139,7 @@ def strap(shape: Shape) -> list[Shape]:
 
 
 def alike(shape: Shape) -> int:
-    """Of how many cables, told apart by their shapes alone, one is one."""
+    """Number of equally likely cables that differ by their shapes alone."""
     return CABLES * (STRAPS if STIFFENS in shape else 1)
 
 
@@ -251,10 +251,7 @@ class PayloadTether(Cause):
         *(_at(sign * TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
         *(through(np.zeros(3), way) for way in first_ways()),
     )
-    determined: ClassVar[Mapping[str, float]] = {
-        **dict.fromkeys(LEVERS, TETHER_STEP_M),
-        **SLOPE_STEPS,
-    }
+    determined: ClassVar[Mapping[str, float]] = {**dict.fromkeys(LEVERS, TETHER_STEP_M), **SLOPE_STEPS}
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 

@@ -44,7 +44,7 @@ class Pendulum:
 
     @property
     def damping_per_s(self) -> float:
-        """Of its speed, what slows it down."""
+        """Damping over the speed [1/s]."""
         return float(2.0 * self.damping_ratio * np.sqrt(self.gravity / self.length_m))
 
     def restored(self, steeper: float) -> Pendulum:

@@ -248,7 +248,7 @@ def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
 
 
 PLAY_COLUMNS_AT_A_TIME = 16
-"""Of that travel. Chosen: memory."""
+"""Columns of that travel at a time: a limit of memory."""
 
 PLAY_CONTACT_PER_N = 0.02
 """Share of a play by which its ends give way to a newton, over which slopes are taken."""

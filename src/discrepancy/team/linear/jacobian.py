@@ -71,7 +71,7 @@ class BySignals:
         return whole
 
     def at(self, robot: int, slots: slice, samples: NDArray[np.intp]) -> Array:
-        """Of one robot at some samples, shape (k,) -> (k, C, s)."""
+        """Derivative by one robot's signals at some samples, shape (k,) -> (k, C, s)."""
         J = self.knots[robot][..., slots].astype(np.float64)
         low, rest = np.divmod(samples, self.every)
         after = J[np.minimum(low + 1, len(J) - 1)]

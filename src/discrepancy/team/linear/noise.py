@@ -18,7 +18,7 @@ from estimator.recording.sampling import SENSORS
 from mocobot_logs.resample.resampling import Resampling
 
 NOISE_SEED = 20250
-"""Of these draws. Chosen: any will do; fixed, so that a verdict can be had again."""
+"""Seed of the noise draws, fixed so that verdicts can be reproduced."""
 
 MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM, MODEL_HZ = 2e-6, 7e-7, 3e-4, 100.0
 """Error of the model itself (soft rods, welds, integrator), as noise of readings at ``MODEL_HZ``."""
@@ -48,7 +48,7 @@ class Fast:
 
     @classmethod
     def of(cls, signals: Signals) -> Fast:
-        """Of one trial."""
+        """What one trial has."""
         high, x = _high(signals), columns_of(signals)
         frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
         fast = density[frequency > high]

@@ -168,7 +168,7 @@ def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear,
 
 
 def _residual(data: GraspData, shared: Shared, bases: Bases) -> Array:
-    """Of every sample, shape (Q, 6 N)."""
+    """Residual of every sample, shape (Q, 6 N)."""
     return np.concatenate([pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1)
 
 
@@ -180,7 +180,7 @@ def _noise_in(
     noise: SignalNoise,
     explained: Array | float = 0.0,
 ) -> Array:
-    """Of every sample's signals, shape (Q, N, 21)."""
+    """Noise of every sample's signals, shape (Q, N, 21)."""
     residual = _residual(data, shared, bases) - explained
     held = np.zeros(len(residual), dtype=bool)
     held[reduction.operator[reduction.moving :].indices] = True
@@ -189,7 +189,7 @@ def _noise_in(
 
 
 LINEAR_BYTES = 1.5e8
-"""Of all linear trials, from which they are kept in files. Chosen: memory; those of seven minutes of three robots."""
+"""Size of all linear trials from which they are kept in files: seven minutes of three robots."""
 
 
 def held(trials: Iterable[TrialLinear]) -> tuple[TrialLinear, ...]:

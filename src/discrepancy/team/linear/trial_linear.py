@@ -72,7 +72,7 @@ def _pages(x: object) -> mmap.mmap | None:
 
 
 STEP = 1e-5
-"""Of grasps [rad, m], both ways, by which the balance of wrenches is differenced."""
+"""Step of grasps [rad, m], both ways, by which the balance of wrenches is differenced."""
 
 
 def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
@@ -167,7 +167,7 @@ class TrialLinear:
 
     @cached_property
     def motion(self) -> BodyMotion:
-        """Of the payload, as all robots tell it."""
+        """Motion of the payload, fused from all robots."""
         return fuse(self.data, self.shared.grasps)
 
     @cached_property
@@ -178,7 +178,7 @@ class TrialLinear:
 
     @cached_property
     def wrist_accelerations(self) -> Array:
-        """Of every wrist in {b_i} [m/s^2], shape (Q, N, 3)."""
+        """Acceleration of every wrist in {b_i} [m/s^2], shape (Q, N, 3)."""
         each = [
             wrist_motion(leg_geometry(s[:, PHI], self.arm(i)), s[:, PHI_DOT], s[:, PHI_DDOT])[1]
             for i, s in enumerate(np.moveaxis(self.s, 1, 0))
@@ -235,11 +235,7 @@ class TrialLinear:
         angles = self.signals.with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0))
         # (3, Q, N, 2, 3, D) to slots, which are value, rate and acceleration of phi, then of theta, then tau
         parts = np.concatenate(
-            [
-                np.moveaxis(angles, 0, 3).reshape(samples, N, 18, D),
-                np.moveaxis(tau, 0, -1),
-            ],
-            axis=2,
+            [np.moveaxis(angles, 0, 3).reshape(samples, N, 18, D), np.moveaxis(tau, 0, -1)], axis=2
         )
         total = self.J(0, slice(None), parts[:, 0])
         for i in range(1, N):
