@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -233,6 +233,30 @@ class HeldReadings:
             f"{first.start_s:.2f} s of trial {first.trial + 1}. Rows that it "
             "reaches are left out."
         )
+
+
+def held_readings(
+    found: Iterable[tuple[int, Sequence[Event], float]],
+    total_s: float,
+    words: Callable[[int], tuple[str, int, str]],
+) -> list[HeldReadings]:
+    """What all encoders do in some trials.
+
+    Args:
+        found: encoder, events and nats, for each trial.
+        total_s: duration of all trials [s].
+        words: place and joint of an encoder, and what it reads.
+    """
+    events: dict[int, list[Event]] = {}
+    nats: dict[int, float] = {}
+    for encoder, times, worth in found:
+        events.setdefault(encoder, []).extend(times)
+        nats[encoder] = nats.get(encoder, 0.0) + worth
+    return [
+        HeldReadings(*words(k), own, sum(event.duration_s for event in own) / total_s, nats[k])
+        for k, own in sorted(events.items())
+        if own
+    ]
 
 
 def with_held(verdict: V, held: Sequence[HeldReadings]) -> V:

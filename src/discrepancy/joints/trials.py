@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from discrepancy.evidence.findings import Event, HeldReadings
+from discrepancy.evidence.findings import Event, HeldReadings, held_readings
 from discrepancy.joints.mechanics import Tree, inverse_torque
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.servo import Motor, with_torques
@@ -130,23 +130,14 @@ def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array
 
 def held_in(model: SerialModel, trials: Trials) -> list[HeldReadings]:
     """Encoders that hold their last value for a while in any of the trials."""
-    events: dict[int, list[Event]] = {}
-    nats: dict[int, float] = {}
+    found = []
     for trial, s in enumerate(trials.signals):
         for held in s.held:
-            log = s.log
-            times = [Event(trial, float(log.time[a]), (b - a) / log.rate_hz) for a, b in held.spans]
+            times = [Event(trial, float(s.log.time[a]), (b - a) / s.log.rate_hz) for a, b in held.spans]
             times = [event for event in times if s.time[0] <= event.start_s <= s.time[-1]]
-            events.setdefault(held.column, []).extend(times)
-            nats[held.column] = nats.get(held.column, 0.0) + held.nats * len(times) / len(held.spans)
+            found.append((held.column, times, held.nats * len(times) / len(held.spans)))
     total_s = sum(len(s.time) / s.rate_hz for s in trials.signals)
-    return [
-        HeldReadings(
-            model.joints[j], j + 1, model.joints[j], own, sum(e.duration_s for e in own) / total_s, nats[j]
-        )
-        for j, own in sorted(events.items())
-        if own
-    ]
+    return held_readings(found, total_s, lambda j: (model.joints[j], j + 1, model.joints[j]))
 
 
 def part_of(s: Signals, at: slice) -> Signals:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discrepancy.evidence.findings import Event, HeldReadings, with_held
+from discrepancy.evidence.findings import Event, HeldReadings, held_readings, with_held
 from discrepancy.evidence.judge import is_named
 from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.search import Until
@@ -105,22 +105,20 @@ KINDS = ("driven joint", "gimbal axis")
 
 
 def held_in(recordings: Sequence[Recording]) -> list[HeldReadings]:
-    """Those that do so in any of a team's trials."""
-    events: dict[int, list[Event]] = {}
-    nats: dict[int, float] = {}
+    """Encoders that hold their last value for a while in any of a team's trials."""
+    found = []
     for trial, recording in enumerate(recordings):
         rate_hz = recording.metadata.rate_hz
         for held in without_held(recording)[1]:
             times = [Event(trial, float(recording.time[a]), (b - a) / rate_hz) for a, b in held.spans]
-            events.setdefault(held.column, []).extend(times)
-            nats[held.column] = nats.get(held.column, 0.0) + held.nats
-    total_s, out = sum(len(r.time) / r.metadata.rate_hz for r in recordings), []
-    for column, own in sorted(events.items()):
+            found.append((held.column, times, held.nats))
+
+    def words(column: int) -> tuple[str, int, str]:
         kind, robot, joint = angle_of(column, recordings[0].metadata.robots)
         place = f"{KINDS[kind]} {joint + 1} of robot {robot + 1}"
-        share = sum(event.duration_s for event in own) / total_s
-        out.append(HeldReadings(place, joint + 1, f"the angle of {place}", own, share, nats[column]))
-    return out
+        return place, joint + 1, f"the angle of {place}"
+
+    return held_readings(found, sum(len(r.time) / r.metadata.rate_hz for r in recordings), words)
 
 
 When = Literal["auto", "always", "never"]
