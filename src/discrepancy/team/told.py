@@ -226,7 +226,7 @@ class TeamDiagnosed(Diagnosed[TeamVerdict]):
         found = {(f.cause, f.place) for f in self.verdict.findings}
         chosen = [c for c in self.outcome.state.chosen if c.group.key in found]
         if chosen:
-            yield EXTENDED, "extended model", partial(write_model, self.outcome, chosen)
+            yield EXTENDED, "extended model", partial(write_model, self.outcome, chosen, whole=False)
         if self.gain is not None and self.gain.is_better_as_found:
             yield AS_FOUND, "model as found", partial(write_model, self.outcome, chosen, whole=True)
 
