@@ -22,9 +22,9 @@ from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints import problem
 from discrepancy.joints.causes import Span
 from discrepancy.joints.diagnose import MOVED, Outcome, diagnose
-from discrepancy.joints.given import Given
-from discrepancy.joints.mechanics.regressor import body_regressor
+from discrepancy.joints.mechanics import body_regressor
 from discrepancy.joints.model import SerialModel, load_model
+from discrepancy.joints.problem import Given
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import trials_of
 from discrepancy.joints.verdict import judged

@@ -18,15 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from discrepancy.evidence.findings import Finding
-from discrepancy.evidence.member import Member
-from discrepancy.joints.findings import JointVerdict
+from discrepancy.evidence.findings import Finding, Member
 from discrepancy.joints.model import load_model
-from discrepancy.joints.rolled.closed import LoopDrive
-from discrepancy.joints.rolled.robot import Robot
-from discrepancy.joints.servo.commanded import Servo, servo_of
-from discrepancy.joints.servo.loop import LoopLaw, loop_laws
-from discrepancy.joints.verdict import judged
+from discrepancy.joints.rolled import LoopDrive, Robot
+from discrepancy.joints.servo import LoopLaw, Servo, loop_laws, servo_of
+from discrepancy.joints.verdict import JointVerdict, judged
 from mocobot.serial import read_logs
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.extended import Start, rollout

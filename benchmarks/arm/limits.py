@@ -13,9 +13,8 @@ from arm.forms import Form
 from discrepancy.evidence.cells import Cells
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Search, floor_of
-from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import JointProblem, joint_problem
+from discrepancy.joints.problem import Given, JointProblem, joint_problem
 from discrepancy.joints.trials import trials_of
 from mocobot_logs.joints.joint_log import JointLog
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import mocobot
 from discrepancy.joints.model import load_model
-from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.causes import read_tolerances
 from estimator.errors import InputError
 from mocobot.cli import COMMANDS
 from mocobot.comparison.compare import compare

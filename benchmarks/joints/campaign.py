@@ -28,11 +28,11 @@ import tyro
 from arm import machine
 from arm.sets import ArmSet, Kind
 from arm.sets import make as make_arm
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import diagnose, labels_of
-from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import Given
 from joints.foreign import make, thinned
 from mocobot_logs.joints.joint_log import JointLog
 from scoring import SURE, changed_settings, log_score, median_and_most
@@ -134,7 +134,7 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Sett
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
     outcome = diagnose(model, logs, settings, say=lambda line: steps.append(str(line)), given=given)
-    state, causes = borne_out(outcome.search, outcome.state), []
+    state, causes = without_unfounded(outcome.search, outcome.state), []
     for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import default_tolerances
 from hidden.limits import LIMITS
 from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED, cheaper, draw_background
 from mocobot_sim.effects import EFFECTS, Effect

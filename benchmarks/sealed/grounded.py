@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import default_tolerances
 from mocobot.campaign.summary import match
 
 Item = Mapping[str, Any]

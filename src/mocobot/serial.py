@@ -8,16 +8,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from discrepancy.cause_names import read_tolerances
 from discrepancy.joints.diagnosed import JointDiagnosed
-from discrepancy.joints.mechanics.motion import Motion
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.regressor import body_regressor
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.effects import NAMES
+from discrepancy.joints.mechanics import Motion, Tree, body_regressor, inverse_torque
 from discrepancy.joints.model import SerialModel, load_model
-from discrepancy.joints.rolled.told import rolled_out
-from discrepancy.joints.values import NAMES
+from discrepancy.joints.rolled import rolled_out
 from discrepancy.joints.verdict import judged
-from discrepancy.tolerances_file import read_tolerances
 from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.api.look import Look

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from command import refused, run
-from discrepancy.team.causes import CAUSES
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import CAUSES, default_tolerances
 from estimator.errors import InputError
 from invented import LIMITS, quiet
 from mocobot.campaign.draw import draw_at

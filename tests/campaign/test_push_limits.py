@@ -2,8 +2,8 @@
 
 import pytest
 
+from discrepancy.team.causes import default_tolerances
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.tolerances import default_tolerances
 from hidden.generator import HiddenSet, generate
 from hidden.limits import LIMITS
 from hidden.schedule import Schedule

@@ -13,7 +13,7 @@ import pytest
 
 from diagnose_run import BIAS_NM, Edit, refused, run
 from diagnosed import check_schema
-from discrepancy.result.traces_file import load_traces
+from discrepancy.result.traces import load_traces
 from estimator.files import holds
 from mocobot_sim.extended.extended import load_extended
 

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.evidence.findings import Event, Finding, Limit, Offer, Rival, Scatter
-from discrepancy.evidence.member import Member
-from discrepancy.joints.findings import Foretold, JointVerdict
+from discrepancy.evidence.findings import Event, Finding, Limit, Member, Offer, Rival, Scatter
 from discrepancy.joints.model import SerialModel, load_model
+from discrepancy.joints.verdict import JointVerdict, Prediction
 from discrepancy.result.traces import Trace
 
 ROBOT = """<mujoco><worldbody>
@@ -78,11 +77,11 @@ def a_push() -> Finding:
     )  # fmt: skip
 
 
-def foretold(trial: str, better: bool) -> Foretold:
+def foretold(trial: str, better: bool) -> Prediction:
     before = np.array([0.8, 0.5, 9.0])
     noise = np.array([0.02, 0.02, 0.4])
     after = 1.02 * noise if better else before
-    return Foretold(
+    return Prediction(
         trial, before, after, noise, np.array([5.0, 9.0, 40.0]), 900.0, 1.05 if better else 900.0
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.team.linear.patches import Patches
+from discrepancy.team.linear.rows import Patches
 
 
 def patchwork(rng, rows, channels, spans, firsts):

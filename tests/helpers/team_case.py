@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise

@@ -131,8 +131,7 @@ def rows_of(page: str, heading: str) -> list[tuple[str, str]]:
 
 
 def test_guide_lists_every_cause_with_its_family_and_tolerance() -> None:
-    from discrepancy.team.causes import CAUSES
-    from discrepancy.team.tolerances import read_tolerances
+    from discrepancy.team.causes import CAUSES, read_tolerances
 
     families = {cause: family for family, listed in rows_of("diagnosis/guide.md", "Families")
                 for cause in CODE.findall(listed)}  # fmt: skip

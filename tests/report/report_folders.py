@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnosed import small_diagnosis
-from discrepancy.channel import Channel
-from discrepancy.result.traces import Trace
-from discrepancy.result.traces_file import save_traces
+from discrepancy.result.traces import Channel, Trace, save_traces
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.parquet import write_recording

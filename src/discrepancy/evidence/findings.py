@@ -1,18 +1,33 @@
-"""What a search found, place by place, in physical values."""
+"""What a search found, place by place, in physical values, and encoders that hold their last value."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
-
-from discrepancy.evidence.member import Member
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 if TYPE_CHECKING:
     from discrepancy.formulas.law import Law
     from discrepancy.result.traces import Trace
 
 Word = Literal["consistent", "miscalibrated", "explained", "partly_explained", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Member:
+    """One place of a finding.
+
+    Attributes:
+        place: name of the joint, link or base.
+        joint: which joint, from 1; None of links and of the base.
+        values: by parameter name, with the unit as suffix.
+        errors: standard errors by the same names.
+    """
+
+    place: str
+    joint: int | None
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -67,9 +82,9 @@ class Finding:
         unlisted: probability that something is there that no table lists.
         rivals: what else may be there, the likeliest first.
         told: causes and places of the smallest set that holds 90 %, the likeliest first.
-        folds: by how much each trial, foretold by the others, is likelier with it beside the findings before [nats].
+        folds: by how much each trial, predicted by the others, is likelier with it beside the findings before [nats].
         in_sample: share of the model's misfit that it removes beyond the findings before it.
-        held_out: the same in trials foretold by the others; None of a single trial and of events.
+        held_out: the same in trials predicted by the others; None of a single trial and of events.
     """
 
     cause: str
@@ -173,3 +188,96 @@ class Verdict:
     notes: tuple[str, ...]
     finished: bool
     traces: Callable[[], list[Trace]]
+
+
+V = TypeVar("V", bound=Verdict)
+KIND = "held readings"
+
+
+@dataclass(frozen=True)
+class HeldReadings:
+    """What one encoder does.
+
+    Attributes:
+        place, joint: of which joint, from 1.
+        of: what it reads, in words, with its place.
+        events: every time that it holds its value, the first one first.
+        share: of the time of all trials.
+        nats: by how much that is likelier than a joint that moves so.
+    """
+
+    place: str
+    joint: int
+    of: str
+    events: Sequence[Event]
+    share: float
+    nats: float
+
+    @property
+    def finding(self) -> Finding:
+        """As a finding."""
+        return Finding(
+            cause="unlisted", place=self.place, joint=self.joint, members=(), probability=1.0, nothing=0.0,
+            unlisted=1.0, over_nothing=self.nats, event=self.events[0],
+            shape={"held": float(len(self.events)), "share": self.share},
+        )  # fmt: skip
+
+    @property
+    def note(self) -> str:
+        """A sentence on how often, how long and when."""
+        lengths = [1e3 * event.duration_s for event in self.events]
+        first = self.events[0]
+        return (
+            f"The encoder of {self.of} holds its last value {len(lengths)} times, for {min(lengths):.0f} to "
+            f"{max(lengths):.0f} ms, in all {100.0 * self.share:.1f} % of the time, first from "
+            f"{first.start_s:.2f} s of trial {first.trial + 1}. Rows that it "
+            "reaches are left out."
+        )
+
+
+def held_readings(
+    found: Iterable[tuple[int, Sequence[Event], float]],
+    total_s: float,
+    words: Callable[[int], tuple[str, int, str]],
+) -> list[HeldReadings]:
+    """What all encoders do in some trials.
+
+    Args:
+        found: encoder, events and nats, for each trial.
+        total_s: duration of all trials [s].
+        words: place and joint of an encoder, and what it reads.
+    """
+    events: dict[int, list[Event]] = {}
+    nats: dict[int, float] = {}
+    for encoder, times, worth in found:
+        events.setdefault(encoder, []).extend(times)
+        nats[encoder] = nats.get(encoder, 0.0) + worth
+    return [
+        HeldReadings(*words(k), own, sum(event.duration_s for event in own) / total_s, nats[k])
+        for k, own in sorted(events.items())
+        if own
+    ]
+
+
+def with_held(verdict: V, held: Sequence[HeldReadings]) -> V:
+    """The verdict with a finding and a note for every encoder that holds its value.
+
+    Rows that held readings reach are none of the verdict's, so that what else it finds is not due to them.
+    """
+    if not held:
+        return verdict
+    word = "explained" if verdict.verdict in ("consistent", "miscalibrated") else verdict.verdict
+    findings, notes = (
+        (*verdict.findings, *(h.finding for h in held)),
+        (*verdict.notes, *(h.note for h in held)),
+    )
+    return replace(verdict, verdict=word, findings=findings, notes=notes)
+
+
+def words_of(finding: Finding, place: str) -> dict[str, Any]:
+    """What such a finding is, at its place in words; of any other, nothing."""
+    if "held" not in finding.shape:
+        return {}
+    times, share = finding.shape["held"], 100.0 * finding.shape["share"]
+    sentence = f"{place}: the encoder holds its last value {times:.0f} times, for {share:.1f} % of the time."
+    return {"kind": KIND, "name": f"{KIND} at {place}", "place": place, "sentence": sentence}

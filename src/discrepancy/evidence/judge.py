@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from discrepancy.evidence.findings import Finding, Limit, Offer, Rival, Scatter, Word
-from discrepancy.evidence.member import Member
+from discrepancy.evidence.findings import Finding, Limit, Member, Offer, Rival, Scatter, Word
 from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Parts, Values
 from discrepancy.evidence.posterior import Group, Posterior
@@ -27,7 +26,7 @@ class Tolerant(Linear, Protocol):
 
     @property
     def tolerance(self) -> Sequence[float]:
-        """Of every column, 0 of those that a healthy machine does not have."""
+        """One for each column, 0 where a healthy machine does not have it."""
         ...
 
 
@@ -185,7 +184,7 @@ class Judge(ABC):
         left = [parts.left(parts.mean(self.prior(own, tolerated=False, events=False))) for own in sets]
         several, rows = parts.count > 1, float(parts.rows.sum())
         kinds = sorted({False, self.tolerated}) if several else []
-        sides = [self._foretold_each(sets, tolerated=kind) for kind in kinds]
+        sides = [self._predicted_each(sets, tolerated=kind) for kind in kinds]
         held, each = [sum(one) for one in sides[0]] if several else [], sides[-1] if several else []
         done = []
         for k, o in enumerate(kept):
@@ -197,11 +196,11 @@ class Judge(ABC):
             done += [replace(f, in_sample=share, held_out=out, folds=folds) for f in self.findings(o)]
         return done
 
-    def _foretold_each(self, sets: Sequence[Sequence[Chosen]], *, tolerated: bool) -> list[list[float]]:
-        """Squares left in each part, foretold by the others with each of some sets in the model."""
+    def _predicted_each(self, sets: Sequence[Sequence[Chosen]], *, tolerated: bool) -> list[list[float]]:
+        """Squares left in each part, predicted by the others with each of some sets in the model."""
         priors = [self.prior(own, tolerated=tolerated) for own in sets]
         return [
-            [self.parts.left(self.parts.foretold(prior, t), t) for t in range(self.parts.count)]
+            [self.parts.left(self.parts.predicted(prior, t), t) for t in range(self.parts.count)]
             for prior in priors
         ]
 

@@ -53,7 +53,7 @@ class Odds:
         return tuple(out)
 
 
-def borne_out(search: Search, state: State) -> State:
+def without_unfounded(search: Search, state: State) -> State:
     """The set without causes that are likelier what the other causes' laws leave, the weakest taken out first."""
     while len(state.chosen) > 1:
         shorter = [_without(search, state, c) for c in state.chosen]
@@ -106,7 +106,7 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     logs = np.array([state.evidence, *(w[0] for w in weighed)])
     share = np.exp(logs - logs.max())
     share /= share.sum()
-    if search.is_usual(state, own):
+    if search.is_within_tolerance(state, own):
         share = np.eye(len(share))[1]  # what its tolerances are for is no fault
     merged: dict[tuple[str, str] | None, Rival] = {}
     for (_, group), p in zip(weighed, share[1:], strict=True):

@@ -1,4 +1,4 @@
-"""Parts of the logs that foretell each other: what each says of a found set's columns, with the noise of the search."""
+"""Parts of the logs that predict each other: what each says of a found set's columns, with the noise of the search."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array
 
 Values = tuple[Array, Array]
-"""Of the active columns, and their covariance, shapes (K,) and (K, K)."""
+"""Values of the active columns, and their covariance, shapes (K,) and (K, K)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,20 +79,24 @@ class Parts:
         """Places of a problem's columns among these."""
         return np.searchsorted(self.active, chosen).tolist()
 
-    def _but(self, part: int | None) -> list[int]:
+    def others(self, part: int | None) -> list[int]:
         """All parts but one, where there is another."""
         return [k for k in range(self.count) if k != part] or list(range(self.count))
 
+    def step(self, x: Array, prior: Array, parts: Sequence[int]) -> Array:
+        """Values x and what they leave in some parts, fitted with variances of the columns, shape (K,)."""
+        G, b = self.grams[parts].sum(axis=0), self.products[parts].sum(axis=0)
+        return x + _mean(G, b - G @ x, prior)
+
     def mean(self, prior: Array, but: int | None = None) -> Array:
         """Values of the columns by all parts but one, shape (K,)."""
-        at = self._but(but)
-        return _mean(self.grams[at].sum(axis=0), self.products[at].sum(axis=0), prior)
+        return self.step(np.zeros(len(prior)), prior, self.others(but))
 
     def values(self, prior: Array, but: int | None = None) -> Values:
         """The same with their covariance."""
         on = np.flatnonzero(prior > 0.0)
         s = np.sqrt(prior[on])
-        factor = _factor(self.grams[self._but(but)].sum(axis=0)[np.ix_(on, on)], s)
+        factor = _factor(self.grams[self.others(but)].sum(axis=0)[np.ix_(on, on)], s)
         covariance = np.zeros((len(prior),) * 2)
         covariance[np.ix_(on, on)] = s[:, None] * cho_solve(factor, np.diag(s))
         return self.mean(prior, but), covariance
@@ -103,11 +107,10 @@ class Parts:
         G, b, yy = (v[at].sum(axis=0) for v in (self.grams, self.products, self.squares))
         return max(float(yy - 2.0 * b @ x + x @ G @ x), 0.0)
 
-    def foretold(self, prior: Array, part: int) -> Array:
+    def predicted(self, prior: Array, part: int) -> Array:
         """Values for one part as the others have them; what is its own comes from itself, shape (K,)."""
         x = np.where(self.local, 0.0, self.mean(prior, part))
-        G = self.grams[part]
-        return x + _mean(G, self.products[part] - G @ x, np.where(self.local, prior, 0.0))
+        return self.step(x, np.where(self.local, prior, 0.0), [part])
 
 
 def _mean(G: Array, b: Array, prior: Array) -> Array:

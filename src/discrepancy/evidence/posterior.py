@@ -85,13 +85,7 @@ class Arrow:
     beside: list[Array]
 
     @classmethod
-    def of(
-        cls,
-        G: Array,
-        s: Array,
-        parts: list[NDArray[np.intp]],
-        last: NDArray[np.intp],
-    ) -> Arrow:
+    def of(cls, G: Array, s: Array, parts: list[NDArray[np.intp]], last: NDArray[np.intp]) -> Arrow:
         """Factor of I + s G s for the columns' scales s."""
 
         def block(i: NDArray[np.intp], k: NDArray[np.intp]) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -409,7 +411,7 @@ class Search:
             else 0.0
         )
 
-    def is_usual(self, state: State, own: Chosen) -> bool:
+    def is_within_tolerance(self, state: State, own: Chosen) -> bool:
         """Whether all values of a cause are within three of the tolerances that its kind, or else the machine, has."""
         plain = next((g for g in self.problem.groups if g.key == own.group.key), None)
         if plain is None or len(plain.columns) != len(own.group.columns) or own.group.members:
@@ -456,3 +458,29 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
             break
     log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
     return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])
+
+
+@dataclass
+class Until:
+    """When a search ends with what it has: after some time, or when the user breaks it off.
+
+    Attributes:
+        end_s: on the monotonic clock [s].
+        broken: whether it has been broken off.
+    """
+
+    end_s: float = math.inf
+    broken: bool = False
+
+    def __call__(self) -> bool:
+        """Whether to end."""
+        self.broken = self.broken or time.monotonic() > self.end_s
+        return self.broken
+
+    def run(self, search: Search, state: State, bent: Bent = lambda state, new: False) -> State:
+        """The likeliest set; the best so far where it is broken off."""
+        try:
+            return search.run(state, bent)
+        except KeyboardInterrupt:
+            self.broken = True
+            return search.best or state

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.evidence.member import Member
 from discrepancy.formulas.formula import Formula, Piece
 from discrepancy.numbers import SMALL, fitting
 from estimator.arrays import Array
@@ -60,11 +59,12 @@ class Law:
     formula: Formula
     traces: Sequence[Mapping[str, Any]] = ()
 
-    def member(self, place: str) -> Member:
-        """Its numbers at its place."""
-        numbers = self.formula.parameters
-        errors = {name: se for name, (_, se) in numbers.items() if se is not None}
-        return Member(place, self.joint, {name: value for name, (value, _) in numbers.items()}, errors)
+    @property
+    def numbers(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Its numbers by name, and their standard errors."""
+        known = self.formula.parameters
+        errors = {name: se for name, (_, se) in known.items() if se is not None}
+        return {name: value for name, (value, _) in known.items()}, errors
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values; ``discrepancy.result.json`` documents the keys."""

@@ -1,26 +1,178 @@
-"""A verdict on a robot of joints with all that is told, drawn and written of it."""
+"""A verdict on a robot of joints as JSON values with words, text and folder."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from discrepancy.channel import Channel
-from discrepancy.joints.effects import write_extended
-from discrepancy.joints.findings import JointVerdict
-from discrepancy.joints.json import unit_of, verdict_to_dict
-from discrepancy.result.folder import REPORT, draw
-from discrepancy.result.read import EXTENDED, NAME
-from discrepancy.result.report import format_verdict
-from estimator.errors import InputError
-from estimator.files import write_json, write_text
+import numpy as np
+
+from discrepancy.evidence.findings import Finding, words_of
+from discrepancy.joints.causes import LINKS, WORDS, Said, joint_in_words, link_in_words, titled
+from discrepancy.joints.effects import all_effects
+from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.verdict import JointVerdict, Prediction
+from discrepancy.numbers import three_digits
+from discrepancy.result.folder import Diagnosed
+from discrepancy.result.json import ALL, Told, Values
+from discrepancy.result.read import EXTENDED
+from discrepancy.result.remains import excess_removed
+from discrepancy.result.traces import Channel
+from estimator.arrays import Array
+from mocobot_sim.scene.named_files import check_named
+from mocobot_sim.serial.extended import write_extended as write_model
+
+
+def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = None) -> Values:
+    """The verdict as plain JSON values.
+
+    Args:
+        verdict: what was found.
+        rollouts: what rollouts said, or None.
+    """
+    return JointValues(verdict).values(_gain(verdict), rollouts=rollouts)
+
+
+class JointValues(Told):
+    """A verdict on a robot of joints as values with words."""
+
+    machine = "joints"
+    verdict: JointVerdict
+
+    def __init__(self, verdict: JointVerdict) -> None:
+        super().__init__(verdict)
+        self.model = verdict.model
+        self.than = "than in the reference" if verdict.reference else "than modelled"
+
+    def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
+        """Cause and place, in words too."""
+        title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
+        if "{pair}" in title and joint is not None and partner is None:
+            partner = joint - 1  # a drive is shared with the joint before
+        where = self.where(cause, place, joint, partner)
+        return {"cause": cause, "kind": titled(title), "name": titled(title, where), "family": cause, "robot": None,
+                "joint": joint, "place": where}  # fmt: skip
+
+    def where(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> str:
+        """A place in words."""
+        if joint is not None and partner is not None:
+            return f"joints {min(joint, partner)} and {max(joint, partner)}"
+        if cause in LINKS:
+            return place if place.startswith("all ") else link_in_words(place)
+        if joint is None and place in self.model.joints:
+            joint = self.model.joints.index(place) + 1
+        return place if joint is None else joint_in_words(joint, self.model.joints[joint - 1])
+
+    def finding(self, f: Finding) -> Values:
+        return super().finding(f) | words_of(f, self.where(f.cause, f.place, f.joint))
+
+    def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
+        """What a finding does, with its numbers; for a kind with their medians."""
+        if f.law is not None:
+            what = "position reading" if f.law.place == "joint position" else "torque"
+            return f"{f.law.sentence(f'The {what} of {place}')}."
+        numbers = {name: entry["value"] for name, entry in parameters.items()}
+        errors = {name: entry["se"] for name, entry in parameters.items() if entry["se"] is not None}
+        when = {"start_s": f.event.start_s, "duration_s": f.event.duration_s} if f.event else {}
+        slides = [
+            bool(self.model.slides[member.joint - 1]) for member in f.members if member.joint is not None
+        ]
+        if len(slides) > 1:
+            mixed = len({tuple(member.values) for member in f.members}) > 1  # slides have other units
+            count = slides.count(False) if mixed else len(slides)
+            place = f"the typical joint{' that turns' if mixed else ''} (median of {count})"
+        said = Said({**numbers, **f.shape, **when}, errors, place, bool(slides) and all(slides), self.than)
+        cause = WORDS.get(f.cause)
+        if cause is None or cause.sentence is None:
+            listed = ", ".join(f"{name} {value:.3g}" for name, value in numbers.items())
+            text = f"{titled(cause.title if cause else f.cause, place)}: {listed}"
+        else:
+            text = cause.sentence(said)
+        if cause and len(slides) > 1:
+            text = f"{titled(cause.title, ALL)}: {text}"
+        if f.of:
+            text = f"{text} and goes with its {f.of}"
+        trials = self.verdict.trials
+        trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
+        return f"{text[:1].upper()}{text[1:]}{trial}."
+
+    def separate(self, cause: str) -> str:
+        return WORDS[cause].separate if cause in WORDS else ""
+
+    def signature(self, which: str) -> Values:
+        return _signature(self.verdict, which)
+
+
+def _gain(verdict: JointVerdict) -> Values | None:
+    """Torques predicted without and with the findings."""
+    if not verdict.foretold:
+        return None
+    foretold, known = verdict.foretold, _known(verdict)
+    names = {j: f"{verdict.model.joints[j]} torque" for j in known}
+
+    def errors(one: Prediction, which: str) -> dict[str, float]:
+        rms = getattr(one, which)
+        sizes = {f"{name}_rms": float(rms[j]) for j, name in names.items()}
+        sizes |= {f"{name}_nrmse": float(rms[j] / one.torque[j]) for j, name in names.items()}
+        return sizes | {"chi2_per_n": float(getattr(one, f"chi2_{which}"))}
+
+    sides = {which: [errors(one, which) for one in foretold] for which in ("before", "after")}
+    both = zip(foretold, sides["before"], sides["after"], strict=True)
+    noise = np.sqrt(np.mean([np.square(one.noise) for one in foretold], axis=0))
+    return {
+        "held_out": {which: _means(each) for which, each in sides.items()} | {"as_found": None},
+        "units": {name: unit_of(verdict.model, j) for j, name in names.items()},
+        "noise": {f"{name}_rms": float(noise[j]) for j, name in names.items()},
+        "removed": excess_removed((one.chi2_before, one.chi2_after) for one in foretold)
+        if verdict.findings
+        else None,
+        "validated": verdict.validated,
+        "trials": [{"name": one.trial, "before": before, "after": after} for one, before, after in both],
+    }
+
+
+def unit_of(model: SerialModel, joint: int) -> str:
+    """Unit of a joint's torque, by its number from 0."""
+    return "N" if model.slides[joint] else "N m"
+
+
+def _known(verdict: JointVerdict) -> list[int]:
+    """Joints whose torques were predicted in all trials."""
+    sizes = np.array([[f.before, f.after, f.noise, f.torque] for f in verdict.foretold])
+    there = np.isfinite(sizes).all(axis=(0, 1)) & (sizes[:, 2:] > 0.0).all(axis=(0, 1))
+    return [int(j) for j in np.flatnonzero(there)]
+
+
+def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {key: float(np.mean([one[key] for one in each])) for key in each[0]}
+
+
+def _signature(verdict: JointVerdict, which: str) -> Values:
+    """Where the misfit is, by joint and trial; ``before`` or ``after``."""
+    known, joints = _known(verdict) if verdict.foretold else [], verdict.model.joints
+    squares: list[Array] = [
+        np.square(getattr(f, which) / np.where(f.noise > 0, f.noise, 1.0)) for f in verdict.foretold
+    ]
+    channel = {j: float(np.mean([square[j] for square in squares])) for j in known}
+    worst = max(known, key=lambda j: channel[j], default=None)
+    said = "No torque was foretold."
+    if worst is not None:
+        place = joint_in_words(worst + 1, joints[worst])
+        said = f"The torque of {place} is off most, by chi2/n {three_digits(channel[worst])}."
+    return {
+        "chi2_per_n": verdict.chi2_per_n[0 if which == "before" else 2],
+        "kind": {},
+        "channel": {f"{joints[j]} torque": size for j, size in channel.items()},
+        "trial": {f.trial: float(getattr(f, f"chi2_{which}")) for f in verdict.foretold},
+        "sentence": said,
+    }
 
 
 @dataclass(frozen=True, eq=False)
-class JointDiagnosed:
+class JointDiagnosed(Diagnosed[JointVerdict]):
     """A verdict with what rollouts say.
 
     Attributes:
@@ -32,49 +184,33 @@ class JointDiagnosed:
     rollouts: Mapping[str, Any] | None = None
 
     @cached_property
-    def _values(self) -> dict[str, Any]:
+    def values(self) -> Values:
         return verdict_to_dict(self.verdict, self.rollouts)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
-        return self._values
-
-    def __str__(self) -> str:
-        """At most five sentences and a table."""
-        return format_verdict(self._values)
-
-    def verbose_text(self) -> str:
-        """All that there is to say."""
-        return format_verdict(self._values, verbose=True)
-
-    def write_into(self, folder: Path, **more: Any) -> None:
-        """Write extended model, residuals, pictures, JSON and report into an existing folder.
-
-        Args:
-            folder: where.
-            more: further keys of the JSON.
-
-        Raises:
-            InputError: something cannot be written.
-        """
-        values, model = self._values, self.verdict.model
+    def models(self) -> Iterator[tuple[str, str, Callable[[Path], None]]]:
         if self.verdict.findings:
-            try:
-                write_extended(self.verdict, folder / EXTENDED)
-            except InputError as error:  # values that no effect can have, such as a negative friction
-                note = f"There is no extended model: {error}."
-                values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        channels = [
-            Channel(f"{name} torque", "torque", None, unit_of(model, j))
-            for j, name in enumerate(model.joints)
-        ]
-        draw(values, self.verdict.traces(), channels, self._quantity_unit, folder)
-        write_json(folder / NAME, values | more)
-        write_text(folder / REPORT, f"{self.verbose_text()}\n")
+            yield EXTENDED, "extended model", lambda folder: write_extended(self.verdict, folder)
 
-    def _quantity_unit(self, name: str) -> str:
-        """Unit of a quantity that a misfit may depend on."""
+    @property
+    def channels(self) -> Sequence[Channel]:
+        model = self.verdict.model
+        names = enumerate(model.joints)
+        return [Channel(f"{name} torque", "torque", None, unit_of(model, j)) for j, name in names]
+
+    def unit(self, name: str) -> str:
         of_position = name.removeprefix("position of joint ")
         if of_position.isdigit():
             return "m" if self.verdict.model.slides[int(of_position) - 1] else "rad"
         return "typical speeds" if name == "speed" else "N m"
+
+
+def write_extended(verdict: JointVerdict, folder: Path) -> None:
+    """Write the model with the findings in it into a new folder.
+
+    Raises:
+        InputError: the folder cannot be written, MuJoCo refuses the model, or files in it are not its own.
+    """
+    effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
+    spec = load_spec(verdict.model.path)
+    check_named(verdict.model.path, assets=False)
+    write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference))

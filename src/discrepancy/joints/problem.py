@@ -16,22 +16,50 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
-from discrepancy.joints.given import Given, horizontal, with_load
-from discrepancy.joints.mechanics.along import along
-from discrepancy.joints.mechanics.regressor import (
+from discrepancy.joints.mechanics import (
+    Tree,
     body_regressor,
+    by_acceleration,
+    by_displacement,
     force_torque,
+    horizontal,
     inertial_parameters,
     rigid_torque,
     torque_of,
+    with_load,
 )
-from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
-from discrepancy.joints.mechanics.tree import Tree
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.signals import Signals
+from discrepancy.joints.signals import Signals, along
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
 from estimator.filtering import low_pass
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a problem takes besides logs and values.
+
+    Attributes:
+        changed: signals in which causes act; those after them are a reference, in which the model may be wrong, too.
+            None: all.
+        joints: which have torques, from 0; None: all.
+        motors: joints whose torque per unit is fitted to the model.
+        back_emf: joints whose drives lose torque to the speed while they are on.
+        excluded: causes that are left out.
+        tolerances: standard deviations by cause and parameter in place of the usual ones.
+        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
+        kept: weight of each sample, shape (W, J) a log; empty: all count.
+    """
+
+    changed: int | None = None
+    joints: tuple[int, ...] | None = None
+    motors: frozenset[int] = frozenset()
+    back_emf: frozenset[int] = frozenset()
+    excluded: frozenset[str] = frozenset()
+    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    noise: Sequence[Array] | None = None
+    kept: Sequence[Array] = ()
+
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
 """Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
@@ -54,11 +82,9 @@ PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
 PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
 PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
-"""Durations of pushes that are tried [s], standard deviation of their force [N], the frequency whose noise ranks them
-[Hz], and how many are weighed exactly."""
+"""Pushes: tried durations [s] above, prior force [N], frequency whose noise ranks them [Hz], how many are weighed."""
 BEGIN_S = 1.0
-"""Pushes are looked for from here on. Derived: what swings at 3 Hz when a log begins, with a damping ratio of 0.1, has
-died to 15 %; in a stand or a soft joint it looks like a push."""
+"""Pushes are sought from here on [s]: before, free vibration of a stand or a soft joint looks like one."""
 READ_RAD = 0.02
 """Standard deviation of an unlisted error of a position."""
 UNLISTED_NATS = 5.0
@@ -76,7 +102,6 @@ class JointProblem:
     Attributes:
         model: the robot as described.
         parts: smoothed logs, around which columns are made.
-        cut: samples of each that are rows.
         cells, groups, families, laws: of the engine.
         withheld: groups of causes that are left out, whose tolerances stay.
         labels: names of the columns.
@@ -96,7 +121,6 @@ class JointProblem:
 
     model: SerialModel
     parts: list[Signals]
-    cut: list[slice]
     cells: Cells
     groups: list[Group] = field(default_factory=list)
     withheld: list[Group] = field(default_factory=list)
@@ -220,8 +244,8 @@ class JointProblem:
     def _swaying(self, group: Group, compliance: float) -> list[Series]:
         """Free vibrations of an elastic joint at the begin of each log, as large as it gives way under its torque."""
         joint, out = self.model.joints.index(group.place), []
-        for t, (s, cut) in enumerate(zip(self.parts, self.cut, strict=True)):
-            time = np.maximum(s.time - s.time[cut.start], 0.0)
+        for t, s in enumerate(self.parts):
+            time = np.maximum(s.time - s.time[0], 0.0)
             size = 10.0 * compliance * float(np.sqrt(np.mean(s.inverse[:, joint] ** 2)))
             for hz in SWAY_HZ:
                 for wave in (np.sin, np.cos):
@@ -232,7 +256,7 @@ class JointProblem:
 
     def displaced(self, joint: int, way: Sequence[Array]) -> Series:
         """Torques of a joint that is where the model does not have it, a series (W,) a log."""
-        moved = [along(s, joint, x)[c] for s, x, c in zip(self.parts, way, self.cut, strict=True)]
+        moved = [along(s, joint, x) for s, x in zip(self.parts, way, strict=True)]
         return {
             c: [m[:, c] for m in moved] for c in range(len(self.joints)) if any(m[:, c].any() for m in moved)
         }
@@ -305,7 +329,6 @@ class _Builder:
         self.given = smooth[0].tree
         self.tree = self._tree()
         zero = np.array([values.get(f"{n} zero", 0.0) for n in self.names])
-        self.cut = [slice(0, len(s.time)) for s in smooth]
         self.parts = []
         for s in smooth:
             q, inverse = s.q + zero, s.inverse
@@ -316,7 +339,8 @@ class _Builder:
         self.slow = REST * self.parts[0].slow
         self.spans = self._spans()
         self.joints: list[list[JointSignals]] = [[] for _ in self.names]
-        residual = [self._residual(s, c) for s, c in zip(self.parts, self.cut, strict=True)]
+        self._known: dict[str, int] = {}
+        residual = [self._residual(s) for s in self.parts]
         rates = [s.rate_hz for s in self.parts]
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
         top *= MOTOR_SHARE if more.motors else 1.0
@@ -327,7 +351,7 @@ class _Builder:
         self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S, kept)
         self.channel = {j: c for c, j in enumerate(known)}
         self.out = JointProblem(
-            model, self.parts, self.cut, self._cells(residual), joints=self.joints, channel=self.channel
+            model, self.parts, self._cells(residual), joints=self.joints, channel=self.channel
         )
         self.out.dry = np.array(self.given.coulomb)
         for j in more.motors:  # a servo that sticks gives what its error asks for, which is no load
@@ -355,22 +379,17 @@ class _Builder:
 
     def _spans(self) -> list[Span]:
         def every(of: Callable[[Signals], Array]) -> Array:
-            return np.concatenate([of(s)[c] for s, c in zip(self.parts, self.cut, strict=True)])
+            return np.concatenate([of(s) for s in self.parts])
 
-        def size(x: Array) -> Array:
-            return np.sqrt(np.mean(x**2, axis=0)) + 1e-9
+        def size(of: Callable[[Signals], Array]) -> Array:
+            return np.sqrt(np.mean(every(of) ** 2, axis=0)) + 1e-9
 
         q, until = every(lambda s: s.q), max(float(s.time[-1]) for s in self.parts)
-        middle = 0.5 * (q.max(axis=0) + q.min(axis=0))
-        sizes = [size(every(of)) for of in (lambda s: s.torque, lambda s: s.dq, lambda s: s.ddq)]
-        travel = np.ptp(q, axis=0) + 1e-9
-        return [
-            Span(float(sizes[0][j]), float(sizes[1][j]), float(sizes[2][j]), float(travel[j]),
-                 float(middle[j]), until)
-            for j in range(self.J)
-        ]  # fmt: skip
+        middle, travel = 0.5 * (q.max(axis=0) + q.min(axis=0)), np.ptp(q, axis=0) + 1e-9
+        sizes = size(lambda s: s.torque), size(lambda s: s.dq), size(lambda s: s.ddq), travel, middle
+        return [Span(*own, until_s=until) for own in np.transpose(sizes).tolist()]
 
-    def _residual(self, s: Signals, c: slice) -> Array:
+    def _residual(self, s: Signals) -> Array:
         v = self.values
         step = 1.0 / s.rate_hz
         side = np.column_stack([friction.direction(s.dq[:, j], step, self.slow[j]) for j in range(self.J)])
@@ -387,13 +406,9 @@ class _Builder:
         load = s.inverse - self.given.armature * s.ddq
         load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # noise has no sign
         for j in range(self.J):
-            here = (c, j)
-            one = JointSignals(
-                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=load[here],
-                asked=asked[here], torque=torque[here], t=s.time[c], span=self.spans[j],
-            )  # fmt: skip
-            self.joints[j].append(one)
-        return (torque - asked * (1.0 + of("scale")))[c]
+            own = (x[:, j] for x in (s.q, s.dq, s.ddq, side, load, asked, torque))
+            self.joints[j].append(JointSignals(*own, t=s.time, span=self.spans[j]))
+        return torque - asked * (1.0 + of("scale"))
 
     def _cells(self, residual: Sequence[Array]) -> Cells:
         return Cells.of(self.bands, [r[:, list(self.channel)] for r in residual])
@@ -408,7 +423,7 @@ class _Builder:
 
     def wide(self, of: Callable[[Signals], Array]) -> Series:
         """A column of all joints."""
-        done = [of(s)[c] for s, c in zip(self.parts, self.cut, strict=True)]
+        done = [of(s) for s in self.parts]
         return {j: [d[:, j] for d in done] for j in range(self.J) if any(d[:, j].any() for d in done)}
 
     def group(
@@ -444,8 +459,8 @@ class _Builder:
         out.changed = self.more.changed
         body = int(self.tree.joint_body[self.tree.last_link])
         none = self.more.motors or "push" in self.more.excluded  # a gear that sticks looks like a push
-        for s, c in zip(self.parts, self.cut, strict=True) if not none else ():
-            out.pushed.append(force_torque(s.motion, body, self.tree.com[body])[c])
+        for s in () if none else self.parts:
+            out.pushed.append(force_torque(s.motion, body, self.tree.com[body]))
         for i, label in enumerate(out.labels):  # from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
@@ -547,10 +562,6 @@ class _Builder:
             for i, x in enumerate(forms):
                 self.add(f"{n} form {i}", 1.0, {j: x})
 
-    @property
-    def _known(self) -> dict[str, int]:
-        return self.__dict__.setdefault("_known_columns", {})
-
     def _kinds(self) -> None:
         """Causes of all joints alike: a common part and deviations."""
         for cause in (c for c in CAUSES if c.kind):
@@ -580,8 +591,8 @@ class _Builder:
         p, n, z = j - 1, self.names[j], self.spans[j]
         for ratio in (1.0, -1.0):
             by: tuple[Series, ...] = tuple({j: [], p: []} for _ in range(3))
-            for s, c in zip(self.parts, self.cut, strict=True):
-                v, a = s.dq[c, j] + ratio * s.dq[c, p], s.ddq[c, j] + ratio * s.ddq[c, p]
+            for s in self.parts:
+                v, a = s.dq[:, j] + ratio * s.dq[:, p], s.ddq[:, j] + ratio * s.ddq[:, p]
                 side = friction.direction(v, 1.0 / s.rate_hz, self.slow[j] + self.slow[p])
                 for k, x in enumerate((side, v, a)):
                     by[k][j].append(x)  # type: ignore[attr-defined]
@@ -598,7 +609,7 @@ class _Builder:
         self.group("elasticity", self.names[j], [k], [1e-3], least=(0.0,), family=f"angle of {self.names[j]}")
 
     def _braking(self, j: int) -> None:
-        by = [np.where(s.enabled, s.dq[:, j], 0.0)[c] for s, c in zip(self.parts, self.cut, strict=True)]
+        by = [np.where(s.enabled, s.dq[:, j], 0.0) for s in self.parts]
         k = self.add(f"{self.names[j]} braking", 0.0, {j: by})
         z = self.spans[j]
         self.group("back_emf", self.names[j], [k], [z.torque / z.speed], least=(0.0,))

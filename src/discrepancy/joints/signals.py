@@ -1,4 +1,4 @@
-"""Smooth signals of one log: positions and their derivatives, torques, and what the nominal model asks for."""
+"""Smooth signals of one log, the noise of its sensors in the rows, and torques of a displaced joint."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.signal import welch
 
-from discrepancy.joints.mechanics.motion import Motion
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.mechanics import Motion, Tree, rigid_torque, torque_of
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import Held, doubtful, filled
@@ -29,15 +30,14 @@ CUTOFF_SHARE = 0.15
 SLOW_SHARE = 0.01
 """Share of a joint's typical speed below which the direction of friction fades. Chosen."""
 SLOW_ROUNDINGS = 2.0
-"""The same, at least, over what rounding of the positions makes of a velocity. Chosen: two standard deviations; a joint
-that creeps through the steps of a coarse encoder has no direction."""
+"""Least such speed, in standard deviations of the velocity that rounding of positions makes."""
 LEAST_SPEED = 1e-6
 """Typical speed of a joint that does not move [rad/s or m/s]. Chosen: no more than a number to divide by."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Of W samples at the rate of the mechanics, J joints.
+    """W samples at the rate of the mechanics, J joints.
 
     Attributes:
         log: what they are of.
@@ -100,7 +100,7 @@ class Signals:
 
     @cached_property
     def motion(self) -> Motion:
-        """Of the nominal tree's bodies."""
+        """Motion of the nominal tree's bodies."""
         return Motion.of(self.tree, self.q, self.dq, self.ddq)
 
     @property
@@ -138,3 +138,95 @@ def _filled(log: JointLog) -> tuple[Array, NDArray[np.bool_]]:
         if good.any() and not good.all():
             torque[:, j] = np.interp(log.time, log.time[good], torque[good, j])
     return torque, known & log.usable[:, None]
+
+
+TORQUE_BAND_HZ = (30.0, 120.0)
+"""Where the torque's noise is read off: next to the rows, where little moves."""
+TOP_SHARES, FILTERED_SHARES = (0.25, 0.45), (0.1, 0.2)
+"""Where the noise of positions is read off, over the rate; the second of a log that was resampled."""
+SEGMENT_S = 0.5
+"""Length of the spectra whose median over time is the noise: bursts, such as reversals, are not [s]."""
+STILL_S, STILL_STEPS = 0.1, 0.3
+"""How long a position's reading must be the same, within which share of its step, to be without noise."""
+LEAST_SHARE = 1e-3
+"""Noise of a torque over its root mean square: no drive tells it better than to a thousandth."""
+SEED = 8113
+
+
+def sensor_noise(s: Signals) -> Array:
+    """A draw of what the sensors add to the residual of a whole log, at the rate of its signals, shape (W, J)."""
+    log, rate = s.log, s.log.rate_hz
+    torque = np.nan_to_num(log.torque) if log.torque is not None else np.zeros_like(log.q)
+    top = FILTERED_SHARES if log.resampled else TOP_SHARES
+    low, high = TORQUE_BAND_HZ
+    density = _density(torque, rate, min(low, top[0] * rate), min(high, top[1] * rate))
+    density = np.maximum(density, (LEAST_SHARE**2) * np.mean(torque**2, axis=0) / (rate / 2.0))
+    rounding = log.position_step**2 / 12.0 / (rate / 2.0)
+    angle = np.maximum(_density(log.q, rate, top[0] * rate, top[1] * rate), rounding)
+    rng = np.random.default_rng(SEED)
+    white = np.sqrt(rate / 2.0) * rng.standard_normal((2, *log.q.shape))
+    white[1] *= _changing(log)
+    read, q = (
+        low_pass(np.sqrt(d) * x, rate, smoothing_hz(rate))
+        for d, x in zip((density, angle), white, strict=True)
+    )
+    dq = differentiate(q, rate)
+    step = work_step(rate)
+    moved = [
+        x + noise[::step]
+        for x, noise in zip((s.q, s.dq, s.ddq), (q, dq, differentiate(dq, rate)), strict=True)
+    ]
+    before = rigid_torque(s.motion) + s.tree.armature * s.ddq
+    return read[::step] + before - torque_of(s.tree, *moved) - s.tree.armature * moved[2]
+
+
+def _changing(log: JointLog) -> NDArray[np.bool_]:
+    """Where the readings of positions change, shape (Q, J): one that stands still, by its step, has no noise at all."""
+    size = max(3, 2 * round(STILL_S * log.rate_hz / 2.0) + 1)
+    spread = maximum_filter1d(log.q, size, axis=0) - minimum_filter1d(log.q, size, axis=0)
+    return spread > STILL_STEPS * log.position_step
+
+
+def _density(x: Array, rate_hz: float, low: float, high: float) -> Array:
+    """Power density of every channel in a band, median over time and frequency, shape (J,) per hertz."""
+    size = min(len(x), max(16, round(SEGMENT_S * rate_hz)))
+    starts = range(0, len(x) - size + 1, max(1, size // 2))
+    frequency, each = np.zeros(0), []
+    for start in starts:
+        frequency, power = welch(x[start : start + size], rate_hz, nperseg=size, axis=0, detrend="linear")
+        each.append(power)
+    band = (frequency >= low) & (frequency <= high)
+    if not band.any():
+        band = frequency >= frequency[-1] / 2.0
+    # A periodogram's ordinate scatters as chi-square of two degrees of freedom, whose median is ln 2 of its mean.
+    return np.asarray(np.median(np.array(each)[:, band], axis=(0, 1)) / np.log(2.0))
+
+
+STEP_RAD, STEP_M = 1e-4, 1e-5
+"""Steps of differences by joint positions: their squares and rounding are both below 1e-6."""
+
+
+def along(signals: Signals, at: int, way: Array) -> Array:
+    """Change of the nominal torques per unit of a change of one joint's position over time, shape (W, J).
+
+    Args:
+        signals: of one log.
+        at: the joint.
+        way: in which direction and how far, shape (W,).
+    """
+    first = differentiate(way, signals.rate_hz)
+    ways = (way, first, differentiate(first, signals.rate_hz))
+    return np.asarray(sum(x * own[:, None] for x, own in zip(_partials(signals, at), ways, strict=True)))
+
+
+def _partials(signals: Signals, at: int) -> list[Array]:
+    """Change of the torques with a joint's position, velocity and acceleration, shape (W, J) each; remembered."""
+    known = signals.__dict__.setdefault("_partials", {})
+    if at not in known:
+        known[at], step = [], STEP_M if signals.tree.slides[at] else STEP_RAD
+        for k in range(3):
+            moved = [signals.q, signals.dq, signals.ddq]
+            moved[k] = moved[k].copy()
+            moved[k][:, at] += step
+            known[at].append((torque_of(signals.tree, *moved) - rigid_torque(signals.motion)) / step)
+    return known[at]

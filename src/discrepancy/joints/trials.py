@@ -1,4 +1,4 @@
-"""From logs to trials: torques of every drive, smooth signals, and parts that foretell each other."""
+"""From logs to trials: torques of every drive, smooth signals, and parts that predict each other."""
 
 from __future__ import annotations
 
@@ -13,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from discrepancy.evidence.findings import Event
-from discrepancy.evidence.held import HeldReadings
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.evidence.findings import Event, HeldReadings, held_readings
+from discrepancy.joints.mechanics import Tree, inverse_torque
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.noise import sensor_noise
-from discrepancy.joints.servo.motor import Motor, with_torques
-from discrepancy.joints.signals import Signals
+from discrepancy.joints.servo import Motor, with_torques
+from discrepancy.joints.signals import Signals, sensor_noise
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import JointLog
@@ -34,8 +31,7 @@ LEAST_S, LEAST_SAMPLES = 2.0, 40
 PARTS, PART_S = 3, 4.0
 """Parts of a single log, and their length at least: each holds most of the motion's poses."""
 LIMIT_RAD, LIMIT_M, LIMIT_S = 6e-3, 3e-3, 0.05
-"""How near to a limit its force may act, and how long what is left out fades. Derived: three tolerances of zeros and
-lengths; half a period of the fastest row."""
+"""Within this distance of a limit its force may act; fade time of what is left out [s]."""
 LEAST_SPEED = 1e-6
 RESTS = 2.0
 """Noise over which readings of a joint must scatter for it to move."""
@@ -69,7 +65,7 @@ class Trials:
 
     @property
     def signals(self) -> tuple[Signals, ...]:
-        """Of each part."""
+        """Signals of each part."""
         return tuple(part_of(self.runs[k], at) for k, at in self.parts)
 
 
@@ -134,23 +130,14 @@ def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array
 
 def held_in(model: SerialModel, trials: Trials) -> list[HeldReadings]:
     """Encoders that hold their last value for a while in any of the trials."""
-    events: dict[int, list[Event]] = {}
-    nats: dict[int, float] = {}
+    found = []
     for trial, s in enumerate(trials.signals):
         for held in s.held:
-            log = s.log
-            times = [Event(trial, float(log.time[a]), (b - a) / log.rate_hz) for a, b in held.spans]
+            times = [Event(trial, float(s.log.time[a]), (b - a) / s.log.rate_hz) for a, b in held.spans]
             times = [event for event in times if s.time[0] <= event.start_s <= s.time[-1]]
-            events.setdefault(held.column, []).extend(times)
-            nats[held.column] = nats.get(held.column, 0.0) + held.nats * len(times) / len(held.spans)
+            found.append((held.column, times, held.nats * len(times) / len(held.spans)))
     total_s = sum(len(s.time) / s.rate_hz for s in trials.signals)
-    return [
-        HeldReadings(
-            model.joints[j], j + 1, model.joints[j], own, sum(e.duration_s for e in own) / total_s, nats[j]
-        )
-        for j, own in sorted(events.items())
-        if own
-    ]
+    return held_readings(found, total_s, lambda j: (model.joints[j], j + 1, model.joints[j]))
 
 
 def part_of(s: Signals, at: slice) -> Signals:

@@ -5,39 +5,75 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from discrepancy.cause_names import excluded_from
-from discrepancy.evidence.findings import Event, Finding
-from discrepancy.evidence.held import with_held
+from discrepancy.evidence.findings import Event, Finding, Member, Verdict, with_held
 from discrepancy.evidence.judge import Judge
-from discrepancy.evidence.member import Member
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
-from discrepancy.evidence.search import Chosen
+from discrepancy.evidence.search import Chosen, Until
 from discrepancy.evidence.settings import SETTINGS
-from discrepancy.evidence.until import Until
 from discrepancy.formulas.law import Law
 from discrepancy.joints.causes import LINKS
-from discrepancy.joints.diagnose import Outcome, diagnose
-from discrepancy.joints.findings import Foretold, JointVerdict
-from discrepancy.joints.given import Given
+from discrepancy.joints.diagnose import Outcome, diagnose, parts_of
+from discrepancy.joints.effects import NAMES, absolute, physical
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.parts import parts_of
-from discrepancy.joints.problem import JointProblem
-from discrepancy.joints.servo.loop import loop_laws, sentences
-from discrepancy.joints.servo.motor import driven_by_voltage
+from discrepancy.joints.problem import Given, JointProblem
+from discrepancy.joints.servo import Motor, driven_by_voltage, loop_laws, sentences
+from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, at_limits, held_in, notes_of, resting, trials_of
 from discrepancy.joints.unlisted import SIGNALS, law_of
-from discrepancy.joints.values import NAMES, absolute, physical
 from discrepancy.result.traces import Trace
 from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """How well the torques of one trial are predicted by the others.
+
+    Attributes:
+        trial: its name.
+        before, after: root mean squares of measured minus predicted torque without and with the findings, as the other
+            trials have them, shape (J,) [N m or N].
+        noise: of the rows, shape (J,).
+        torque: root mean square of the measured torque, shape (J,).
+        chi2_before, chi2_after: squares over the noise's variance, per row.
+    """
+
+    trial: str
+    before: Array
+    after: Array
+    noise: Array
+    torque: Array
+    chi2_before: float
+    chi2_after: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointVerdict(Verdict):
+    """What logs say of a model of a robot of joints.
+
+    Attributes:
+        model: the robot as described.
+        parts: the trials: smoothed logs, or parts of one.
+        motors: drives that tell no torque, and what they give by what they were given.
+        foretold: one a trial, predicted by the others; by all of them where there is one trial only (``validated``).
+        by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
+    """
+
+    model: SerialModel
+    parts: Sequence[Signals]
+    motors: tuple[Motor, ...]
+    foretold: tuple[Prediction, ...]
+    by_the_others: Callable[[int], tuple[Finding, ...]]
+
 
 Say = Callable[[str], object]
 
@@ -81,7 +117,7 @@ def judged(
     )
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
-    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
+    outcome = replace(outcome, state=without_unfounded(outcome.search, outcome.state))
     return _JointJudge(model, trials, outcome).verdict([*notes_of([*logs, *reference])])
 
 
@@ -116,7 +152,7 @@ class _JointJudge(Judge):
             model=self.model,
             parts=self.trials.signals,
             motors=self.trials.motors,
-            foretold=tuple(self._foretold([o.chosen for o in self.named])),
+            foretold=tuple(self._predicted([o.chosen for o in self.named])),
             by_the_others=self.by_the_others,
         )
         return with_held(verdict, held_in(self.model, self.trials))
@@ -165,7 +201,8 @@ class _JointJudge(Judge):
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
         if group.cause == "unlisted":
-            return (self._law(group).member(group.place),)
+            law = self._law(group)
+            return (Member(group.place, law.joint, *law.numbers),)
         out, (mean, covariance) = [], values
         known = {int(j) for j in self.trials.joints}
         places = (
@@ -201,17 +238,17 @@ class _JointJudge(Judge):
         values = self.parts.values(prior, trial)
         return tuple(f for o in named for f in self.findings(o, values))
 
-    def _foretold(self, kept: Sequence[Chosen]) -> Iterator[Foretold]:
+    def _predicted(self, kept: Sequence[Chosen]) -> Iterator[Prediction]:
         both, parts = (self.prior((), tolerated=False), self.prior(kept)), self.parts
         for t, name in enumerate(self.trials.names[: self._changed]):
             sides, chi2 = [], []
             for prior in both:
-                x = parts.foretold(prior, t)
+                x = parts.predicted(prior, t)
                 sides.append(self._wide(np.sqrt(np.mean(self.series[t].left(x) ** 2, axis=0))))
                 chi2.append(float(parts.left(x, t) / parts.rows[t].sum()))
             own = self.trials.signals[t].torque
             torque = self._wide(np.sqrt(np.mean(own**2, axis=0))[self.trials.joints])
-            yield Foretold(name, sides[0], sides[1], self._wide(self._noise(t)), torque, chi2[0], chi2[1])
+            yield Prediction(name, sides[0], sides[1], self._wide(self._noise(t)), torque, chi2[0], chi2[1])
 
     def _wide(self, sizes: Array) -> Array:
         """Numbers of the joints with torques as ones of all joints."""

@@ -61,7 +61,7 @@ class WrittenDiagnosis:
     of_joints: bool = False
 
     def is_of(self, recording: str) -> bool:
-        """Whether it was made from a recording, by its file's name, or from parts of it (``team.long.parts``)."""
+        """Whether it was made from a recording, by its file's name, or from parts of it (``team.long``)."""
         names = {Path(name).name for name in self.recordings}
         return Path(recording).name in names | {re.sub(r", \d+ to \d+ s$", "", name) for name in names}
 

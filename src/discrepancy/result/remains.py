@@ -1,17 +1,19 @@
 """What a verdict leaves open: figures that would contradict it if nothing were said of them, and kinds that scatter."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
 
 from discrepancy.numbers import one_each, parameter, three_digits
 from discrepancy.result.read import is_of_joints, kind_of
 
 VISIBLE_CHI2_PER_N = 3.0
-"""Of the closed loop, from which something is said of it beside the verdict. Chosen."""
+"""chi2/n of the closed loop from which it is reported beside the verdict."""
 
 RESPONSE_SHARE = 0.8
-"""Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
-Chosen."""
+"""Share of the response's excess error that causes must remove; with less the rest is reported."""
 
 Values = Mapping[str, Any]
 FARTHEST = 3
@@ -100,3 +102,18 @@ def _sizes(entry: Values, sizes: Mapping[str, float]) -> str:
         number = f"{scale * size:.2g} {unit}".rstrip()
         said.append(number if len(sizes) == 1 else f"{words} {number}")
     return ", ".join(said)
+
+
+def excess_removed(chi2_per_n: Iterable[tuple[float, float]]) -> dict[str, Any] | None:
+    """Share of the error beyond noise that is removed: mean over trials, 95 % interval (-inf to 1 of one trial).
+
+    Args:
+        chi2_per_n: of each trial before and after; trials that noise accounts for before are left out.
+    """
+    excess = [[float(np.sqrt(max(x - 1.0, 0.0))) for x in pair] for pair in chi2_per_n if pair[0] > 1.0]
+    shares = [1.0 - after / before for before, after in excess]
+    if not shares:
+        return None
+    mean, count = float(np.mean(shares)), len(shares)
+    half = float(stdtrit(count - 1, 0.975) * np.std(shares, ddof=1) / np.sqrt(count)) if count > 1 else np.inf
+    return {"share": mean, "interval": [mean - half, min(1.0, mean + half)]}

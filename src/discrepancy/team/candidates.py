@@ -1,18 +1,59 @@
 """Every cause at every place, in every shape, and what it puts into a trial."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy.candidate import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Shape
-from discrepancy.team.linear.origin import beyond, places_of
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import AT, ArmUnit
 from estimator.arrays import Array
+
+_GROUPS: dict[str, tuple[str, ...]] = {
+    "phi_zero": ("phi_zero",),
+    "theta_zero": ("theta_zero",),
+    "link_length": ("proximal_length", "rod_length", "radius"),
+    "sea_scale": ("stiffness_ratio",),
+    "sea_bias": ("tau_zero",),
+    "base_tilt": ("tilt",),
+}
+"""Groups of ``ArmUnit.x`` that hold a cause's parameters, in their order."""
+
+
+def places_of(candidate: Candidate) -> tuple[int, NDArray[np.intp]] | None:
+    """Where a candidate's parameters are in ``ArmUnit.x`` of a team: the robot's row, columns; None where nowhere."""
+    groups = _GROUPS.get(candidate.cause)
+    if groups is None or candidate.transient is not None:
+        return None
+    robot = (candidate.robot or 1) - 1
+    if candidate.joint is None:
+        return robot, np.arange(AT[groups[0]].start, AT[groups[0]].stop)
+    return robot, np.array([AT[group].start + candidate.joint - 1 for group in groups])
+
+
+def origin_of(candidate: Candidate, origin: ArmUnit | None) -> Array | None:
+    """Values of a candidate's parameters where all is linear, shape (k,), in their own units; None where all is 0.
+
+    Args:
+        candidate: of a team's catalogue.
+        origin: how far the robots are there from where they were believed to be, ``x`` of shape (N, COUNT).
+    """
+    place = places_of(candidate)
+    return None if origin is None or place is None else np.asarray(origin.x[place], dtype=np.float64)
+
+
+def beyond(candidate: Candidate, values: Array, origin: ArmUnit | None) -> Array:
+    """Values of a candidate beyond what the robots, as they were found, have already."""
+    there = origin_of(candidate, origin)
+    return values if there is None else values - there
+
 
 Tolerances = Mapping[str, float]
 
@@ -38,34 +79,17 @@ def every_candidate(
     return out
 
 
-def other_shapes(candidate: Candidate, trials: int, *, finer: bool = False) -> list[Candidate]:
-    """The candidate in every other shape of the catalogue, or in finer ones around its own, in so many trials."""
-    cause = CAUSES[candidate.cause]
-    if candidate.transient:
-        return [candidate.in_shape(shape) for shape in cause.finer(candidate.shape)] if finer else []
-    return in_shapes(candidate, cause.finer(candidate.shape) if finer else cause.shapes, trials)
-
-
-def further_shapes(candidate: Candidate, trials: int) -> list[Candidate]:
-    """The same in shapes that are far apart, in which no scan has it."""
-    if candidate.transient or candidate.cause not in CAUSES:
-        return []
-    return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), trials)
-
-
 def in_shapes(candidate: Candidate, shapes: Sequence[Shape], trials: int) -> list[Candidate]:
     """The candidate in each of some shapes but its own that there can be in so many trials."""
     cause = CAUSES[candidate.cause]
+    if candidate.transient:
+        return [candidate.in_shape(shape) for shape in shapes]
     return [
         replace(candidate, shape=dict(shape), among=cause.alike(shape))
         for shape in shapes
-        if dict(shape) != candidate.shape and _within(shape, trials)
+        if dict(shape) != candidate.shape
+        and max(shape.get("trial", 1), shape.get("last_trial", 0) + 1) <= trials
     ]
-
-
-def _within(shape: Shape, trials: int) -> bool:
-    """Whether so many trials have those that a shape names."""
-    return max(shape.get("trial", 1), shape.get("last_trial", 0) + 1) <= trials
 
 
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
@@ -110,8 +134,3 @@ def explained_by(
 def indices(candidate: Candidate) -> tuple[int, int]:
     """Its robot and joint, from 0 (0 where it has none)."""
     return (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-
-
-def is_adjusted(candidate: Candidate) -> bool:
-    """Whether it is a function of readings, taken without their noise."""
-    return candidate.cause in CAUSES and CAUSES[candidate.cause].adjusted

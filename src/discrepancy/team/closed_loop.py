@@ -1,7 +1,9 @@
-"""Resimulate recorded commands with the estimated payload and bases, with or without causes."""
+"""Recorded commands simulated again with the estimated team, and how far that is from the recording."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -26,14 +28,82 @@ from mocobot_sim.scene.payload import nearest_inertia, payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 
+MARGIN_SHARE = 0.02
+"""Simulations whose chi-square differs by less are equally good; so are all within the noise, at 1 and less. Chosen."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """How far one trial's response to its commands is from the simulated one.
+
+    Attributes:
+        rms: by channel, in the channel's unit.
+        nrmse: by channel, over the standard deviation of the motion.
+        chi2_per_n: mean square over the variance of sensor noise and integration error.
+    """
+
+    rms: Mapping[str, float]
+    nrmse: Mapping[str, float]
+    chi2_per_n: float
+
+    @classmethod
+    def of(cls, errors: Mapping[str, Array], scales: Mapping[str, tuple[Array, Array]]) -> Response:
+        """From recorded minus simulated channels, and standard deviations of the noise and of the motion in each."""
+        rms, nrmse, squares = {}, {}, []
+        for name, error in errors.items():
+            noise, motion = scales[name]
+            rms[name] = float(np.sqrt(np.mean(error**2)))
+            nrmse[name] = rms[name] / float(np.sqrt(np.mean(motion**2)))
+            squares.append(np.mean((error / noise) ** 2))
+        return cls(rms, nrmse, float(np.mean(squares)))
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Responses of every trial that can be simulated, without and with the causes, by what the other trials say.
+
+    Attributes:
+        before, after: one per trial; None where the simulation failed.
+        held_out: False for a single trial, which predicts itself, and where a cause is there in some trials only, which
+            all have to tell it.
+        as_found: with the causes and every healthy part as far off as it is found, too; empty where that was not asked.
+    """
+
+    before: tuple[Response | None, ...]
+    after: tuple[Response | None, ...]
+    held_out: bool
+    as_found: tuple[Response | None, ...] = ()
+
+    @property
+    def pairs(self) -> list[tuple[Response, Response]]:
+        """Trials that were simulated both ways."""
+        both = zip(self.before, self.after, strict=True)
+        return [(a, b) for a, b in both if a is not None and b is not None]
+
+    @property
+    def is_better_as_found(self) -> bool:
+        """Whether every trial can be simulated with all as found, and is told better so than with the causes alone."""
+        return bool(self.as_found) and mean_chi2(self.as_found) < mean_chi2([b for _, b in self.pairs])
+
+
+def is_worse(chi2_per_n: float, than: float) -> bool:
+    """Whether simulated responses are worse than others; within the noise (1) none is."""
+    return chi2_per_n > max(than, 1.0) * (1.0 + MARGIN_SHARE)
+
+
+def mean_chi2(trials: Sequence[Response | None]) -> float:
+    """Mean chi-square per number; infinite where a trial could not be simulated."""
+    return float(np.mean([np.inf if r is None else r.chi2_per_n for r in trials]))
+
+
 LEAST_MOMENT_RATIO = 1e-3
 """Least principal moment of a simulated payload over the largest: a body needs some. Chosen."""
 
 TEAM_TIMESTEP_S = 1e-3
-"""Of the closed loop's simulation. Measured: with it the integrator's error stays below the sensors' noise."""
+"""Step of the closed loop's simulation: the integrator's error stays below the sensors' noise."""
 
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
-"""Of the closed loop. Measured: integrator at 1 and 0.25 ms."""
+"""Integration errors of the closed loop, measured at steps of 1 and 0.25 ms."""
 
 
 def team_of(

@@ -1,25 +1,213 @@
-"""From recordings of a team to the likeliest causes."""
+"""From recordings of a team to the likeliest causes: the search, and problems linear around what it found."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from discrepancy.evidence.search import Search, State
+import numpy as np
+
+from discrepancy.candidate import Candidate
+from discrepancy.evidence.search import Chosen, Search, State, Until
 from discrepancy.evidence.settings import SETTINGS, Settings
-from discrepancy.evidence.until import Until
-from discrepancy.team.around import (
-    STRAIGHT_CHI2_PER_N,
-    around,
-    bent,
-    exact,
-    opened_by,
-    placed,
-)
+from discrepancy.team.candidates import beyond, explained_by, places_of
+from discrepancy.team.linear.rest import HEALTHY, limits_of
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.start import exact_residual, linearised_trials, sensed_in
+from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
+from estimator.arm.arms import true_joints
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.rigid_team.residual import Shared
+
+STRAIGHT_CHI2_PER_N = 1e-3
+"""What curvature adds to chi-square, from which all is linearised again. Chosen: some ten nats of four trials' rows."""
+
+NORMAL_MEDIAN = 0.6745
+"""Median of the absolute value of a normal number. Derived."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Values of everything in a problem.
+
+    Attributes:
+        shared: displacement of the unknowns of all trials, shape (s,).
+        local: the same of each trial, shape (l,).
+        values: every candidate that has columns, and its values in their own units, shape (k,).
+        active: causes that were chosen, with their values.
+    """
+
+    shared: Array
+    local: tuple[Array, ...]
+    values: tuple[tuple[Candidate, Array], ...]
+    active: tuple[tuple[Candidate, Array], ...]
+
+
+def found_in(problem: TeamProblem, state: State) -> Found:
+    """Values that a state has."""
+    x, own = state.posterior.mean, problem.rig.local_unknowns
+    values: dict[int, tuple[Candidate, Array]] = {}
+    for k, label in enumerate(problem.labels):
+        if label is not None:
+            candidate, parameter = label
+            values.setdefault(id(candidate), (candidate, np.zeros(len(candidate.parameters))))[1][
+                parameter
+            ] = x[k]
+    listed = [c.group for c in state.chosen if not c.group.late]
+    active = tuple((problem.candidates[g.identity], problem.values_of(g, x)) for g in listed)
+    local = tuple(-x[columns][:own] for columns in problem.local)
+    return Found(-x[problem.shared], local, tuple(values.values()), active)
+
+
+def robots_at(rig: TeamRig, found: Found) -> tuple[ArmUnit, ArmUnit, Shared]:
+    """The robots as they are found, how far that is from where they were believed to be, and the payload.
+
+    Raises:
+        InputError: there are no such robots.
+    """
+    first = rig.linear[0]
+    at = first.arms.x if isinstance(first.arms, ArmUnit) else np.zeros((first.robots, COUNT))
+    step = np.zeros_like(at)
+    for candidate, values in found.values:
+        place = places_of(candidate)
+        if place is not None:
+            step[place] = beyond(candidate, values, rig.origin)
+    before = np.zeros_like(step) if rig.origin is None else rig.origin.x
+    units = ArmUnit(first.design, at + step)
+    return units, ArmUnit(units.design, before + step), first.shared.moved(found.shared)
+
+
+def _as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
+    """phi, theta, tau as the sensors read them, shape (Q, N, 3) each."""
+    s = trial.signals
+    if not isinstance(trial.arms, ArmUnit):
+        return s.phi, s.theta, s.tau
+    arms = trial.arms
+    tau = s.tau / (1.0 + arms.of("stiffness_ratio")) + arms.of("tau_zero")
+    return s.phi + arms.of("phi_zero"), s.theta + arms.of("theta_zero"), tau
+
+
+def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, shared: Shared) -> float:
+    """Mean square of what straight columns miss of robots and unknowns, in units of the noise's variance."""
+    x = np.zeros(len(state.posterior.mean))
+    moved = [k for k, label in enumerate(problem.labels) if label and places_of(label[0]) is not None]
+    moved += [*problem.shared, *(k for own in problem.local for k in own)]
+    x[moved] = state.posterior.mean[moved]
+    exact = []
+    for trial, white, local in zip(problem.rig.linear, problem.rig.whitening, found.local, strict=True):
+        signals = Signals(trial.signals.time, *true_joints(units, *_as_read(trial)), trial.signals.rate_hz,
+                          trial.signals.sampling)  # fmt: skip
+        exact.append(white(exact_residual(signals, shared, trial.bases.moved(local), units, trial.reduction)))
+    exact, total = problem.rows_of(exact), 0.0
+    for c, channel in enumerate(problem.cells.channels):
+        straight = channel.y - channel.X @ x[channel.columns]
+        there = problem.bands.spectrum([r[:, 3 * c : 3 * c + 3] for r in exact])[problem.cells.order]
+        total += float(np.sum((there - straight) ** 2))
+    return total / sum(len(channel.y) for channel in problem.cells.channels)
+
+
+def resting_of(found: Found) -> dict[str, float]:
+    """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
+    sizes: dict[str, list[float]] = {kind: [] for kind in HEALTHY}
+    for candidate, values in found.values:
+        if candidate.cause in sizes and candidate.parameters[0].tolerance:
+            sizes[candidate.cause].append(abs(float(values[0])) / candidate.parameters[0].tolerance)
+    # By the median, as one of them may be at fault.
+    return {kind: max(1.0, float(np.median(x)) / NORMAL_MEDIAN) if x else 1.0 for kind, x in sizes.items()}
+
+
+def bent(problem: TeamProblem, state: State) -> bool:
+    """Whether straight columns miss too much where a state finds robots and unknowns.
+
+    Raises:
+        InputError: there are no such robots.
+    """
+    found = found_in(problem, state)
+    units, _, shared = robots_at(problem.rig, found)
+    return curvature(problem, state, found, units, shared) >= STRAIGHT_CHI2_PER_N
+
+
+def around(problem: TeamProblem, state: State) -> TeamProblem | None:
+    """The problem around where a state finds the robots; None where columns are straight that far.
+
+    Raises:
+        InputError: there are no such robots.
+    """
+    rig, found = problem.rig, found_in(problem, state)
+    units, origin, shared = robots_at(rig, found)
+    resting = resting_of(found)
+    same = all(0.5 < resting[kind] / rig.resting.get(kind, 1.0) < 2.0 for kind in resting)
+    straight = not bent(problem, state)
+    if straight and same:
+        return None
+    sensed, limits = rig.sensed, limits_of(rig.tolerances, resting)
+    if not same:
+        sensed = sensed_in(rig.linear, rig.sensed.noise, limits, rig.jobs, sensed)
+    resting = rig.resting if same else resting
+    if straight:
+        moved = replace(rig, sensed=sensed, resting=resting, kept={})
+    else:
+        recordings = [replace(r, metadata=replace(r.metadata, units=units)) for r in rig.recordings]
+        explained = explained_by(found.active, origin)
+        linear, sensed = linearised_trials(recordings, shared, limits, rig.jobs, sensed, explained)
+        moved = replace(rig, recordings=tuple(recordings), sensed=sensed, linear=linear, origin=origin,
+                        resting=resting, kept={})  # fmt: skip
+    return team_problem(moved, problem.opened, problem.catalogue if same else None)
+
+
+def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
+    """The same problem with its residual exact where a state finds unknowns and causes, and how far off it was.
+
+    The second is the mean square of what straight columns miss, in units of the noise's variance.
+    """
+    found, cells = found_in(problem, state), problem.cells
+    left = problem.rows_of(problem.rig.residual_there(found.shared, found.local, found.active))
+    moved = [*problem.shared, *(k for own in problem.local for k in own)]
+    moved += [k for c in state.chosen if not c.group.late for k in c.group.columns]
+    x = np.append(problem.there, np.zeros(len(state.posterior.mean) - len(problem.there)))
+    x[moved] = state.posterior.mean[moved]
+    new = cells.around([r.reshape(len(r), -1, 3) for r in left], x)
+    miss = sum(float(np.sum((a.y - b.y) ** 2)) for a, b in zip(new.channels, cells.channels, strict=True))
+    return replace(problem, cells=new), miss / sum(len(c.y) for c in cells.channels)
+
+
+def latent_whitening(problem: TeamProblem, state: State) -> list[Array] | None:
+    """What makes rows white beside what chosen causes leave open, shape (n, C, C) a trial; None where nothing is."""
+    rig, covariance = problem.rig, None
+    for candidate, values in found_in(problem, state).active:
+        if candidate.transient is not None:
+            continue
+        for t, patches in enumerate(rig.unknowns(candidate)):
+            if patches.width:
+                if covariance is None:
+                    covariance = [np.zeros((*r.residual.shape, r.residual.shape[1])) for r in rig.linear]
+                for patch in patches.each:
+                    P = patch.values * abs(float(values[0]))
+                    covariance[t][patch.where, patch.first :, patch.first :] += P @ np.swapaxes(P, 1, 2)
+    if covariance is None:
+        return None
+    out = []
+    for S in covariance:
+        w, V = np.linalg.eigh(S)
+        out.append(V / np.sqrt(1.0 + np.maximum(w, 0.0))[:, None, :] @ np.swapaxes(V, 1, 2))
+    return out
+
+
+def placed(problem: TeamProblem, other: TeamProblem, chosen: Sequence[Chosen]) -> list[Chosen]:
+    """Causes of another problem in this one."""
+    out = []
+    for c in chosen:
+        if not c.group.late:
+            problem.candidates[c.group.identity] = other.candidates[c.group.identity]
+        own = next((g for g in problem.groups if g.identity == c.group.identity), None)
+        out.append(Chosen(own or problem.place(c.group), c.scale))
+    return out
+
 
 LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
 """Causes after which rows have another noise: a search goes on only beside what they leave open."""
@@ -100,7 +288,7 @@ def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
 
 def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem, Search, State, bool]:
     """The same set in a problem that is linear around it, and whether that is the same problem but for little."""
-    opened, moved = opened_by(old, state), _moved(old, state)
+    opened, moved = latent_whitening(old, state), _moved(old, state)
     problem, same = old, True
     if opened is not None or moved is not None or old.opened is not None:
         near = moved or old

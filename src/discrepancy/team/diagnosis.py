@@ -8,27 +8,118 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from discrepancy.evidence.held import with_held
+import numpy as np
+
+from discrepancy.evidence.findings import Event, HeldReadings, held_readings, with_held
 from discrepancy.evidence.judge import is_named
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
+from discrepancy.evidence.search import Until
 from discrepancy.evidence.settings import ODDS, SETTINGS
-from discrepancy.evidence.until import Until
-from discrepancy.team.checks import check_estimate, check_recordings
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnose import TeamOutcome, search_team
 from discrepancy.team.estimates import errors, seen_by
-from discrepancy.team.held import held_in
-from discrepancy.team.linear.chatter import chattering
-from discrepancy.team.long.choice import Choice
-from discrepancy.team.long.search import search_parts
-from discrepancy.team.response import as_found, confirm
+from discrepancy.team.linear.noise import chattering
+from discrepancy.team.linear.signals import TEAM_TRIM_S
+from discrepancy.team.long import Choice, search_parts
+from discrepancy.team.response import confirm, left_by
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.verdict import judged_team
-from estimator.arm.unit import ENCODERS, in_encoder_frames
+from estimator.arm.unit import ArmUnit
 from estimator.errors import InputError
+from estimator.estimate.frames import ENCODERS, in_encoder_frames
 from estimator.estimate.payload import estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.statics import CONTRADICTION
+from estimator.held import angle_of, without_held
+from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
+
+GOOD_S = 30.0
+"""With which a diagnosis starts to be of use; only said. Chosen."""
+
+LEAST_S = 5.0
+"""Least length of all recordings together that is diagnosed [s]."""
+
+
+def check_recordings(recordings: Sequence[Recording]) -> None:
+    """Enough of them, and all of one team.
+
+    Raises:
+        InputError: there is none, one is of robots that hold nothing, they have one robot or differ in robots or
+            design, or they are too short.
+    """
+    if not recordings:
+        raise InputError("no recording given; name at least one file")
+    for recording in recordings:
+        check_carries(recording, "diagnosed")
+    first = recordings[0]
+    if first.metadata.robots < 2:
+        raise InputError(
+            f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
+            "nothing to diagnose"
+        )
+    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TEAM_TRIM_S) for recording in recordings]
+    if sum(used) < LEAST_S:
+        names = ", ".join(recording.name for recording in recordings)
+        raise InputError(
+            f"{names}: {sum(used):.1f} s are left when {TEAM_TRIM_S:g} s are dropped at both ends; a "
+            f"diagnosis needs at least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
+        )
+    for other in recordings[1:]:
+        if other.metadata.robots != first.metadata.robots:
+            raise InputError(
+                f"{other.name} has {other.metadata.robots} robots and {first.name} has {first.metadata.robots}; "
+                "recordings of one payload must have the same robots"
+            )
+        if other.metadata.design != first.metadata.design:
+            raise InputError(
+                f"{other.name} and {first.name} are of robots of different design; diagnose one at a time"
+            )
+        if not same_units(other.metadata.units, first.metadata.units):
+            raise InputError(
+                f"{other.name} and {first.name} carry different calibrations; give one to both (--calibration)"
+            )
+
+
+def same_units(a: ArmUnit | None, b: ArmUnit | None) -> bool:
+    """Whether robots are known to be the same: as designed, or as they are."""
+    return a is b or (a is not None and b is not None and np.array_equal(a.x, b.x))
+
+
+def check_estimate(estimate: PayloadEstimate) -> None:
+    """Without a payload there is no model; say why, where wrenches that contradict each other are the reason.
+
+    Raises:
+        InputError: they do.
+    """
+    if estimate.p_1c is None and any(CONTRADICTION in flag for flag in estimate.flags):
+        names = ", ".join(recording.name for recording in estimate.recordings)
+        raise InputError(
+            f"{names}: the robots' wrenches do not add up to one payload, so there is nothing to hold the data "
+            "against; is a robot missing, or a torque's sign or column wrong?"
+        )
+
+
+KINDS = ("driven joint", "gimbal axis")
+
+
+def held_in(recordings: Sequence[Recording]) -> list[HeldReadings]:
+    """Encoders that hold their last value for a while in any of a team's trials."""
+    found = []
+    for trial, recording in enumerate(recordings):
+        rate_hz = recording.metadata.rate_hz
+        for held in without_held(recording)[1]:
+            times = [Event(trial, float(recording.time[a]), (b - a) / rate_hz) for a, b in held.spans]
+            found.append((held.column, times, held.nats))
+
+    def words(column: int) -> tuple[str, int, str]:
+        kind, robot, joint = angle_of(column, recordings[0].metadata.robots)
+        place = f"{KINDS[kind]} {joint + 1} of robot {robot + 1}"
+        return place, joint + 1, f"the angle of {place}"
+
+    return held_readings(found, sum(len(r.time) / r.metadata.rate_hz for r in recordings), words)
+
 
 When = Literal["auto", "always", "never"]
 
@@ -88,12 +179,11 @@ def diagnose_team(
 
     choice, notes = Choice.of(recordings, whole=whole), ()
     if choice.others:
-        parts = search_parts(choice, search, as_found, say)
-        choice, outcome, notes = parts.choice, parts.searched, parts.notes
+        choice, outcome, notes = search_parts(choice, search, left_by, say)
     else:
         outcome = search(choice.searched)
     say("weighing what else each cause may be")
-    outcome = replace(outcome, state=borne_out(outcome.search, outcome.state))
+    outcome = replace(outcome, state=without_unfounded(outcome.search, outcome.state))
     weighed = odds_of(outcome.search, outcome.state)
     rig = outcome.rig
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"

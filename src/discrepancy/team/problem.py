@@ -19,10 +19,10 @@ from discrepancy.candidate import Candidate, Transient
 from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
+from discrepancy.team.candidates import in_shapes, origin_of, shape_steps
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.linear.origin import origin_of
+from discrepancy.team.laws import OPEN_NATS, Laws
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.unlisted import OPEN_NATS, Laws
 from estimator.arrays import Array
 
 TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
@@ -261,7 +261,11 @@ class TeamProblem:
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
             # In learnt noise a law hides that is told beside that of the sensors.
             quiet = replace(posterior, variance=np.minimum(v, self.sensors))
-            out += self.laws_of.proposed(self.left(quiet), self._white) if noise > least else []
+            out += (
+                self.laws_of.proposed(self.left(quiet.mean, quiet.variance), self._white)
+                if noise > least
+                else []
+            )
         if self.listed is not None:
             gains, most = self.gains(posterior, self.listed), len(out) + LIKELIEST
             for i in np.argsort(-gains):
@@ -312,7 +316,9 @@ class TeamProblem:
             return []
         found: dict[tuple[int, int, int], float] = {}
         windows = 0
-        for t, (score, D) in enumerate(zip(self.left(posterior), self.wrenches, strict=True)):
+        for t, (score, D) in enumerate(
+            zip(self.left(posterior.mean, posterior.variance), self.wrenches, strict=True)
+        ):
             m, rate = self.rig.linear[t].reduction.moving, self.cells.bands.rates_hz[t]
             Q = np.einsum("nck,nc->nk", D[:m], score[:m, -6:])
             R = np.einsum("nck,ncl->nkl", D[:m], D[:m])
@@ -346,29 +352,27 @@ class TeamProblem:
         given = self.rig.tolerances.get("push", {})
         return [self.group_of(CAUSES["push"].event(given, when), -math.log(windows)) for when in events]
 
-    @property
+    @cached_property
     def wrenches(self) -> list[Array]:
         """Whitened balance rows of forces along {b1} and moments in {1}, shape (n, 6, 6) a trial."""
-        if "wrenches" not in self.__dict__:
-            out = []
-            for linear, white in zip(self.rig.linear, self.rig.whitening, strict=True):
-                R = linear.data.R_bi[:, 0]
-                eye = np.broadcast_to(np.eye(3), R.shape)
-                force = linear.of_wrench(np.swapaxes(R, 1, 2), np.zeros_like(R))
-                moment = linear.of_wrench(np.zeros_like(R), eye)
-                out.append(white(np.concatenate([force, moment], axis=2)))
-            self.__dict__["wrenches"] = [x[:, -6:] for x in self.rows_of(out)]
-        return self.__dict__["wrenches"]
+        out = []
+        for linear, white in zip(self.rig.linear, self.rig.whitening, strict=True):
+            R = linear.data.R_bi[:, 0]
+            eye = np.broadcast_to(np.eye(3), R.shape)
+            force = linear.of_wrench(np.swapaxes(R, 1, 2), np.zeros_like(R))
+            moment = linear.of_wrench(np.zeros_like(R), eye)
+            out.append(white(np.concatenate([force, moment], axis=2)))
+        return [x[:, -6:] for x in self.rows_of(out)]
 
-    def left(self, posterior: Posterior) -> list[Array]:
-        """Rows that a posterior leaves over their variance, shape (n, C) a trial."""
+    def left(self, x: Array, variance: Array | None = None) -> list[Array]:
+        """Rows that values of the columns leave, over variances where these are given, shape (n, C) a trial."""
         parts = []
-        for channel, own in zip(self.cells.channels, posterior.variance, strict=True):
-            left = (channel.y - channel.X @ posterior.mean[channel.columns]) / np.repeat(
-                own, np.diff(channel.starts)
+        for c, channel in enumerate(self.cells.channels):
+            known, rows = channel.columns < len(x), np.empty_like(channel.y)
+            left = channel.y - channel.X[:, known] @ x[channel.columns[known]]
+            rows[self.cells.order] = (
+                left if variance is None else left / np.repeat(variance[c], np.diff(channel.starts))
             )
-            rows = np.empty_like(left)
-            rows[self.cells.order] = left
             parts.append(self.bands.rows(rows))
         return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
 
@@ -389,8 +393,15 @@ class TeamProblem:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
         out = self._stepped(candidate, group, posterior)
-        near = self.rig.refinements(candidate, finer=True) + self.rig.further(candidate)
-        for more in self.rig.grown(candidate):  # the same columns, until its further number has moved
+        cause, trials = CAUSES[candidate.cause], len(self.rig.linear)
+        near = in_shapes(candidate, cause.finer(candidate.shape), trials)
+        further, grown = (
+            () if candidate.transient else of(candidate.shape) for of in (cause.further, cause.grown)
+        )
+        near += in_shapes(candidate, further, trials)
+        for more in in_shapes(
+            candidate, grown, trials
+        ):  # the same columns, until its further number has moved
             of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
             out += self._stepped(more, of_more, posterior)
         if near:
@@ -407,7 +418,7 @@ class TeamProblem:
 
     def slopes(self, candidate: Candidate, x: Array) -> tuple[list[int], Array, Array]:
         """Columns by the numbers of a shape that the data determine, appended; these numbers, and sizes of steps."""
-        steps = self.rig.steps(candidate)
+        steps = shape_steps(candidate)
         names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
         if not steps or len(steps) != len(names):
             return [], np.zeros(0), np.zeros(0)
@@ -516,7 +527,7 @@ class Catalogue:
         others = [Listed([], none)]
         apart: dict[Hashable, Array] = {}
         for candidate in rig.candidates():
-            shapes = rig.refinements(candidate)
+            shapes = in_shapes(candidate, CAUSES[candidate.cause].shapes, len(rig.linear))
             count, first = 1 + len(shapes), len(labels)
             if not any(candidate.tolerant):
                 others += [] if near else [plain.listing([candidate, *shapes], count)]
@@ -562,19 +573,20 @@ def team_problem(
         opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C).
         catalogue: columns of this rig, or of one with the same whitening nearby; None makes them.
     """
-    rows = rig.rows()
+    linears = list(zip(rig.linear, rig.whitening, strict=True))
+    rows = [white(linear.residual) for linear, white in linears]
     moving = [linear.reduction.moving for linear in rig.linear]
     rates = [linear.signals.rate_hz / linear.reduction.step for linear in rig.linear]
     edges = np.append(EDGES_HZ, [np.inf, np.inf])
-    bands = RowBands(rates, [len(r.residual) for r in rows], edges, moving=moving)
-    plain = TeamProblem(rig, Cells.of(bands, [x.residual.reshape(len(x.residual), -1, 3) for x in rows]))
+    bands = RowBands(rates, [len(r) for r in rows], edges, moving=moving)
+    plain = TeamProblem(rig, Cells.of(bands, [x.reshape(len(x), -1, 3) for x in rows]))
     if catalogue is None or catalogue.rig is not rig:
         catalogue = Catalogue.of(plain, catalogue)
     out = TeamProblem(rig, Cells(bands, []), opened=opened, catalogue=catalogue)
     out.candidates = dict(catalogue.candidates)
     out.cells = plain.cells
     columns = out.beside(catalogue.X)
-    residual = [x.reshape(len(x), -1, 3) for x in out.rows_of([r.residual for r in rows])]
+    residual = [x.reshape(len(x), -1, 3) for x in out.rows_of(rows)]
     out.cells = Cells.of(bands, residual)
     there = np.zeros(len(catalogue.labels))  # values count from the design, not from where all is linear
     for k, label in enumerate(catalogue.labels):
@@ -591,12 +603,11 @@ def team_problem(
         out.labels += [None] * len(size)
         return out.add(columns)
 
-    out.shared = unknown([r.shared for r in rows])
-    for t, r in enumerate(rows):
-        own = [
-            r.local if k == t else np.zeros((*o.residual.shape, r.local.shape[2])) for k, o in enumerate(rows)
-        ]
-        out.local.append(unknown(own))
+    out.shared = unknown([white(linear.by_shared) for linear, white in linears])
+    for t, (linear, white) in enumerate(linears):
+        local = white(np.concatenate([linear.by_bases, linear.by_clocks], axis=2))
+        none = (np.zeros((*r.shape, local.shape[2])) for r in rows)
+        out.local.append(unknown([local if k == t else x for k, x in enumerate(none)]))
     first = out.cells.count
     out.cells.add_rows(columns)
     out.there = np.append(np.zeros(first), there)

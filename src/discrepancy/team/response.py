@@ -3,30 +3,40 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.odds import Odds, Rival
+from discrepancy.evidence.parts import Parts
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Key, Search, State
 from discrepancy.formulas.law import Law
 from discrepancy.numbers import three_digits
-from discrepancy.team.around import found_in, robots_at
-from discrepancy.team.closed_loop import named_effects, posture, team_of
-from discrepancy.team.diagnose import TeamOutcome
-from discrepancy.team.gain import MARGIN_SHARE, Gain, Response, is_worse, mean_chi2
+from discrepancy.team.closed_loop import (
+    MARGIN_SHARE,
+    Gain,
+    Response,
+    is_worse,
+    mean_chi2,
+    named_effects,
+    posture,
+    team_of,
+)
+from discrepancy.team.diagnose import TeamOutcome, found_in, robots_at
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import AsFound, TeamRig
+from discrepancy.team.verdict import parts_of
 from estimator.arrays import Array
-from estimator.files import ends_with_this
+from estimator.processes import ends_with_this
+from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.law import Law as LawEffect
 from mocobot_sim.extended.extended import write_extended
@@ -36,7 +46,7 @@ TOLD_NATS = 5.0
 CONTRADICTED = 0.5
 """By which causes lose probability that make the response worse. Chosen: as likely wrong as not."""
 VISIBLE_CHI2_PER_N = 3.0
-"""Of the closed loop, from which healthy parts are simulated as they are found, too. Chosen."""
+"""chi2/n of the closed loop from which healthy parts are simulated as they are found, too."""
 Active = list[tuple[Candidate, Array]]
 """Candidates and the values of their parameters."""
 
@@ -112,79 +122,43 @@ class Hypothesis:
         return out
 
     @cached_property
-    def beside(self) -> list[int]:
-        """Columns of parts and laws that have the values that all in the model together gives them."""
-        parts = [k for part in self.carried.values() for k in part]
-        return [*parts, *(k for group, _ in self.laws for k in group.columns)]
+    def parts(self) -> Parts:
+        """Normal equations of every trial."""
+        return parts_of(self.problem, self.state)
 
-    @cached_property
-    def alone(self) -> NDArray[np.intp]:
-        """Columns of unknowns and causes."""
-        p = self.problem
-        own = [k for _, group in self.causes for k in group.columns]
-        return np.array([*p.shared, *(k for local in p.local for k in local), *own], dtype=np.intp)
-
-    @cached_property
-    def columns(self) -> NDArray[np.intp]:
-        """Columns that a fit needs: where healthy parts are carried, of all that is in the model."""
-        return np.flatnonzero(self.state.posterior.prior) if len(self.beside) else np.sort(self.alone)
-
-    @cached_property
-    def _all(self) -> tuple[Array, Array]:
-        """Information matrix and score vector of the columns."""
-        G, b, _ = self.problem.cells.only(self.columns).weighted(self.state.posterior.variance)
-        return G, b
-
-    def _of_trial(self, trial: int) -> tuple[Array, Array]:
-        """The same of one trial's rows."""
-        cells, n = self.problem.cells, len(self.columns)
-        lengths = [len(cells.bands.of_trial(t)) for t in range(len(self.problem.local))]
-        here = np.repeat(np.arange(len(lengths)), lengths)[cells.order] == trial
-        G, b = np.zeros((n, n)), np.zeros(n)
-        for channel, variance in zip(cells.channels, self.state.posterior.variance, strict=True):
-            seen = np.flatnonzero(np.isin(channel.columns, self.columns))
-            at = np.searchsorted(self.columns, channel.columns[seen])
-            weight = np.repeat(1.0 / variance, np.diff(channel.starts))[here]
-            X = channel.X[np.ix_(here, seen)]
-            WX = weight[:, None] * X
-            G[np.ix_(at, at)] += X.T @ WX
-            b[at] += WX.T @ channel.y[here]
-        return G, b
+    def _is(self, columns: Iterable[int]) -> NDArray[np.bool_]:
+        """Which of the active columns are among some, shape (K,)."""
+        return np.isin(self.parts.active, list(columns))
 
     def told(self, trial: int | None) -> Told:
         """What a simulation of a trial takes: all from the other trials, but the unknowns of its own; None: of all.
 
         With a single trial, or a cause that is there in some trials only, all trials tell.
         """
-        G, b = self._all
-        own = None if trial is None else self._of_trial(trial)
-        if own and len(self.problem.local) > 1 and not self.of_trials:
-            G, b = G - own[0], b - own[1]
-        prior = self.state.posterior.prior[self.columns]
-        x, beside = np.zeros(len(self.columns)), self._at(self.beside)
-        if len(beside):
-            x[beside] = _mean(G, b, prior)[beside]
+        p, parts = self.problem, self.parts
+        others = parts.others(None if self.of_trials else trial)
+        prior, x = self.state.posterior.prior[parts.active], np.zeros(len(parts.active))
+        # Healthy parts and laws have the values that all in the model together gives them.
+        beside = [*self.carried.values(), *(group.columns for group, _ in self.laws)]
+        if beside:
+            x = np.where(self._is(k for own in beside for k in own), parts.step(x, prior, others), 0.0)
         # Causes are what they are beside that: what else may be off has no share of what they do.
-        prior = np.where(np.isin(self.columns, self.alone), prior, 0.0)
-        x += _mean(G, b - G @ x, prior)
-        t = trial or 0
-        if own is not None:
-            local = self._at(self.problem.local[t])
-            x[local] = 0.0
-            mine = np.zeros(len(x))
-            mine[local] = prior[local]
-            x += _mean(own[0], own[1] - own[0] @ x, mine)
-        every = np.zeros(self.problem.cells.count)
-        every[self.columns] = x
-        p = self.problem
+        causes = (group.columns for _, group in self.causes)
+        alone = self._is(k for own in (p.shared, *p.local, *causes) for k in own)
+        x = parts.step(x, np.where(alone, prior, 0.0), others)
+        if trial is not None:
+            local = self._is(p.local[trial])
+            x = parts.step(np.where(local, 0.0, x), np.where(local, prior, 0.0), [trial])
+        every = np.zeros(p.cells.count)
+        every[parts.active] = x
         active = [(candidate, p.values_of(group, every)) for candidate, group in self.causes]
         laws = [
             LawEffect(**piece)
             for group, law in self.laws
             for piece in p.laws_of.pieces(group, law, every[list(group.columns)])
         ]
-        local = -every[p.local[t]][: self.rig.local_unknowns]
-        return Told(-every[p.shared], local, active, self._healthy(every), laws)
+        local_values = -every[p.local[trial or 0]][: self.rig.local_unknowns]
+        return Told(-every[p.shared], local_values, active, self._healthy(every), laws)
 
     def _healthy(self, x: Array) -> Active:
         out = []
@@ -194,19 +168,6 @@ class Hypothesis:
             values[[n for _, n in labels]] = x[columns]
             out.append((labels[0][0], values))
         return out
-
-    def _at(self, columns: Sequence[int]) -> NDArray[np.intp]:
-        return np.searchsorted(self.columns, columns)
-
-
-def _mean(G: Array, b: Array, prior: Array) -> Array:
-    """Posterior mean of columns with prior variances; those with none are not in the model."""
-    x, k = np.zeros(len(b)), np.flatnonzero(prior)
-    s = np.sqrt(prior[k])
-    A = s[:, None] * G[np.ix_(k, k)] * s
-    A[np.diag_indices(len(k))] += 1.0
-    x[k] = s * cho_solve(cho_factor(A), s * b[k])
-    return x
 
 
 def responses(
@@ -410,15 +371,15 @@ def _with_all_as_found(
     return replace(gain, as_found=responses([replace(found, whole=True)], jobs, simulated)[0])
 
 
-def as_found(outcome: TeamOutcome) -> tuple[TeamRig, AsFound]:
-    """The recordings; robots, payload and causes as a search found them.
+def left_by(outcome: TeamOutcome) -> Callable[[Recording], tuple[Reduction, Array]]:
+    """What robots, payload and causes as a search found them leave in the rows of a recording.
 
     Raises:
         InputError: there are no such robots.
     """
     rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
     units, _, shared = robots_at(rig, found)
-    return rig, AsFound.of(units, shared, found.active)
+    return partial(rig.left_in, found=AsFound.of(units, shared, found.active))
 
 
 def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *, whole: bool = False) -> None:

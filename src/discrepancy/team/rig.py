@@ -11,19 +11,10 @@ import numpy as np
 
 from discrepancy.candidate import Candidate
 from discrepancy.cause_names import excluded_from
-from discrepancy.channel import Channel
-from discrepancy.team.candidates import (
-    every_candidate,
-    further_shapes,
-    in_shapes,
-    indices,
-    is_adjusted,
-    other_shapes,
-    shape_steps,
-)
+from discrepancy.result.traces import Channel
+from discrepancy.team.candidates import beyond, every_candidate, indices, origin_of, places_of
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
-from discrepancy.team.channels import channels_of, directions_of, quantities_of
 from discrepancy.team.closed_loop import (
     effect_of,
     impossible,
@@ -31,24 +22,30 @@ from discrepancy.team.closed_loop import (
     scale_of_response,
     why_not,
 )
-from discrepancy.team.linear.adjust import as_loud, noise_of
-from discrepancy.team.linear.filed import OneByOne, is_filed, rested
-from discrepancy.team.linear.origin import beyond, origin_of, places_of
-from discrepancy.team.linear.patches import Patches
-from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import HEALTHY, limits_of
+from discrepancy.team.linear.rows import Patches, Reduction, Whitening, whitened
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.start import (
+    OneByOne,
+    Sensed,
+    as_loud,
+    exact_residual,
+    is_filed,
+    linearised_trials,
+    noise_of,
+    rested,
+    start_shared,
+    trial_at,
+    without_bases,
+)
 from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.linear.unsearched import trial_at, without_bases
-from discrepancy.team.linear.whitening import Whitening, whitened
-from discrepancy.team.long.parts import LaterPart
-from discrepancy.team.words import statements
+from discrepancy.team.long import LaterPart
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from estimator.rigid_team import Shared
+from estimator.rigid_team.residual import Shared
+from estimator.rigid_team.slots import PHI, TAU, THETA
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.pymjcf import why_not_composed
 
@@ -71,21 +68,6 @@ class AsFound:
     def of(cls, units: ArmUnit, shared: Shared, causes: Iterable[tuple[Candidate, Array]]) -> AsFound:
         """With those causes that are not the robots' own and not of some trials alone."""
         return cls(units, shared, [(c, v) for c, v in causes if places_of(c) is None and not c.of_trials])
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """One trial's whitened residual and the columns of its unknowns, n rows of C channels.
-
-    Attributes:
-        residual: shape (n, C); unit variance and independent if nothing is wrong.
-        local: columns of the trial's own unknowns, shape (n, C, l).
-        shared: columns of the unknowns of all trials, shape (n, C, s).
-    """
-
-    residual: Array
-    local: Array
-    shared: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,29 +113,13 @@ class TeamRig:
             InputError: the recordings do not determine the grasps, the mass and the centre of mass, or a cause to
                 be excluded does not exist.
         """
-        left_out = excluded_from(CAUSES, excluded)
-        return cls._at(recordings, start_shared(estimate), tolerances, left_out, None, HEALTHY, jobs)
-
-    @classmethod
-    def _at(
-        cls,
-        recordings: Sequence[Recording],
-        shared: Shared,
-        tolerances: Mapping[str, Mapping[str, float]],
-        excluded: frozenset[str],
-        origin: ArmUnit | None,
-        resting: Mapping[str, float],
-        jobs: int,
-        sensed: Sensed | None = None,
-        explained: Callable[[int, TrialLinear], Array] | None = None,
-    ) -> Self:
-        limits = limits_of(tolerances, resting)
-        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed, explained)
-        return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
+        left_out, limits = excluded_from(CAUSES, excluded), limits_of(tolerances, HEALTHY)
+        linear, sensed = linearised_trials(recordings, start_shared(estimate), limits, jobs)
+        return cls(tuple(recordings), sensed, linear, tolerances, left_out, None, HEALTHY, jobs)
 
     @property
     def whitening(self) -> tuple[Whitening, ...]:
-        """Of every trial."""
+        """One for each trial."""
         return self.sensed.whitening
 
     @property
@@ -171,7 +137,13 @@ class TeamRig:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        return channels_of(self.robots)
+        """Pose of each further robot as seen by the first, then the balance of wrenches, 6 N."""
+        out = []
+        for i in range(2, self.robots + 1):
+            out += [Channel(f"grasp {i} rotation {a}", "kinematic", i, "rad") for a in "xyz"]
+            out += [Channel(f"grasp {i} position {a}", "kinematic", i, "m") for a in "xyz"]
+        out += [Channel(f"force {a}", "balance", None, "N") for a in "xyz"]
+        return out + [Channel(f"moment {a}", "balance", None, "N m") for a in "xyz"]
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue at every place; transients come from ``transients``."""
@@ -202,20 +174,17 @@ class TeamRig:
         """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
         return CAUSES[candidate.cause].columns(self.linear[trial], *indices(candidate), candidate.shape)
 
-    def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
-        """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
-        place, own = indices(candidate), self.beyond(candidate, values)
-        return CAUSES[candidate.cause].undo(signals, self.linear[trial], *place, own, candidate.shape)
-
     def _without(
         self, trial: int, active: Sequence[tuple[Candidate, Array]], noise: Signals | None = None
     ) -> tuple[Signals, list[tuple[Candidate, Array]]]:
         """A trial's signals without causes that are errors of them, functions of them without noise; and others."""
         signals, others = self.linear[trial].signals, []
         for candidate, values in active:
-            x = noise if noise and is_adjusted(candidate) else None
+            x = noise if noise and CAUSES[candidate.cause].adjusted else None
             seen = signals.minus(x.phi, x.theta, x.tau) if x else signals
-            true = self._undo(trial, candidate, values, seen)
+            place, own = indices(candidate), self.beyond(candidate, values)
+            undo = CAUSES[candidate.cause].undo
+            true = undo(seen, self.linear[trial], *place, own, candidate.shape)
             if true is None:
                 others.append((candidate, values))
             else:
@@ -244,7 +213,7 @@ class TeamRig:
             acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
             unknowns = linear.shared.moved(shared), linear.bases.moved(x)
             signals, modelled = self._without(t, acting)
-            if any(is_adjusted(candidate) for candidate, _ in acting):
+            if any(CAUSES[candidate.cause].adjusted for candidate, _ in acting):
                 noise = noise_of(signals, *unknowns, linear, self.sensed.signals[t])
                 signals, _ = self._without(t, acting, noise)
             residual = exact_residual(signals, *unknowns, linear.arms, linear.reduction)
@@ -255,30 +224,7 @@ class TeamRig:
             rested(linear)
         return out
 
-    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
-        """The candidate with every other shape of its cause; any interval of a transient is found by its steps."""
-        return other_shapes(candidate, len(self.linear), finer=finer)
-
-    def further(self, candidate: Candidate) -> list[Candidate]:
-        return further_shapes(candidate, len(self.linear))
-
-    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        return shape_steps(candidate)
-
-    def rows(self) -> list[Rows]:
-        """Whitened rows of every trial where all is linear."""
-        out = []
-        for linear, white in zip(self.linear, self.whitening, strict=True):
-            local = np.concatenate([linear.by_bases, linear.by_clocks], axis=2)
-            out.append(Rows(white(linear.residual), white(local), white(linear.by_shared)))
-        return out
-
     # --- its simulator
-
-    def grown(self, candidate: Candidate) -> list[Candidate]:
-        if candidate.transient or candidate.cause not in CAUSES:
-            return []
-        return in_shapes(candidate, CAUSES[candidate.cause].grown(candidate.shape), len(self.linear))
 
     def _context(self, candidate: Candidate) -> Context:
         pi, at = self.linear[0].shared.pi, candidate.transient
@@ -328,7 +274,7 @@ class TeamRig:
         effects: list[Effect] = []
         for candidate, values in healthy:
             if (as_designed or places_of(candidate) is None) and candidate.key not in there:
-                # Of what is found to be less than nothing there is nothing.
+                # Skip unphysical values.
                 effects += self.effects(candidate, values) or []
         return effects
 
@@ -381,17 +327,26 @@ class TeamRig:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
         return scale_of_response(self.sensed.noise, self.linear[trial].signals)
 
-    def undecidable(self) -> list[dict[str, Any]]:
-        """What recordings of a parked team with a rigid payload cannot decide."""
-        return statements(self.robots, aligned=self.aligned)
-
     def quantities(self, trial: int) -> dict[str, Array]:
         """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
-        return quantities_of(self.linear[trial])
+        linear = self.linear[trial]
+        at = linear.reduction.sample
+        velocity, h = linear.data.twist[at, :, 3:], linear.data.p_bi[at]
+        each = {"speed": velocity, "position": h - h.mean(axis=0), "load": linear.s[at, :, TAU]}
+        return {name: np.sqrt(np.mean(x**2, axis=(1, 2))) for name, x in each.items()}
 
     def row_rate_hz(self, trial: int) -> float:
         return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
 
     def directions(self, trial: int) -> dict[str, Array]:
-        """Directions of every spring torque and every gimbal axis, from the linearisation."""
-        return directions_of(self.linear[trial], self.whitening[trial])
+        """Unit directions in the whitened rows of every spring torque and angle, shape (n, C, 1) each."""
+        out, linear, white = {}, self.linear[trial], self.whitening[trial].rows_only
+        for robot in range(self.robots):
+            J = linear.J.at(robot, slice(None), linear.reduction.sample)
+            for k in range(3):
+                for kind, name in ((TAU, f"torque channel {k + 1}"), (PHI, f"driven angle {k + 1}"),
+                                   (THETA, f"gimbal angle {'zyx'[k]}")):  # fmt: skip
+                    x = white(J[:, :, kind][..., k])
+                    size = np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
+                    out[f"robot {robot + 1}'s {name}"] = (x / size)[..., None]
+        return out

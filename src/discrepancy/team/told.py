@@ -1,34 +1,152 @@
-"""A verdict on a team as JSON values, text and folder; ``discrepancy.result.json`` documents the keys."""
+"""A verdict on a team as JSON values with words, text and folder."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from discrepancy.candidate import Candidate
-from discrepancy.evidence.findings import Finding
-from discrepancy.evidence.held import words_of
-from discrepancy.result.folder import REPORT, draw
-from discrepancy.result.read import AS_FOUND, EXTENDED, NAME
-from discrepancy.result.remains import of_response
-from discrepancy.result.report import format_verdict
-from discrepancy.result.told import Told, Values
+from discrepancy.evidence.findings import Finding, words_of
+from discrepancy.numbers import Numbers, three_digits
+from discrepancy.result.folder import Diagnosed
+from discrepancy.result.json import Told, Values
+from discrepancy.result.read import AS_FOUND, EXTENDED
+from discrepancy.result.remains import excess_removed, of_response
+from discrepancy.result.traces import Channel
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.closed_loop import Gain, Response
 from discrepancy.team.diagnose import TeamOutcome
-from discrepancy.team.gain import Gain, Response
 from discrepancy.team.response import write_model
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.signature import signature
 from discrepancy.team.verdict import TeamVerdict
-from discrepancy.team.words import TeamWords
-from estimator.errors import InputError
-from estimator.files import write_json, write_text
+from estimator.arrays import Array
+
+
+def signature(rig: TeamRig, z: Sequence[Array]) -> dict[str, Any]:
+    """Describe what is left of the whitened residual beyond noise, shape (n, C) a trial, as plain numbers.
+
+    Returns:
+        ``chi2_per_n`` in all and by ``kind`` of channel, ``robot``, ``trial``; ``moving_share``: part of the excess
+        while the rig moves; ``correlation`` of its size with the rig's explanatory quantities; ``frequency_hz``:
+        median frequency of the worst channel; ``along``: the source along which most of it points; ``sentence``.
+    """
+    squares = np.concatenate([(x**2) for x in z])
+    out: dict[str, Any] = {"chi2_per_n": float(squares.mean())}
+    kinds = sorted({channel.kind for channel in rig.channels})
+    out["kind"] = {
+        kind: float(squares[:, [k for k, c in enumerate(rig.channels) if c.kind == kind]].mean())
+        for kind in kinds
+    }
+    out["channel"] = {c.name: float(squares[:, k].mean()) for k, c in enumerate(rig.channels)}
+    out["trial"] = {name: float((x**2).mean()) for name, x in zip(rig.trials, z, strict=True)}
+    size = np.concatenate([(x**2).mean(axis=1) for x in z])
+    quantities = [rig.quantities(t) for t in range(len(rig.trials))]
+    out["correlation"] = {}
+    for name in quantities[0]:
+        values = np.concatenate([q[name] for q in quantities])
+        constant = np.std(values) < 1e-12 or np.std(size) < 1e-12
+        out["correlation"][name] = 0.0 if constant else float(np.corrcoef(values, np.log(size + 1e-12))[0, 1])
+    speed = np.concatenate([q["speed"] for q in quantities])
+    moving = speed > 0.2 * np.sqrt(np.mean(speed**2))
+    excess = np.maximum(size - 1.0, 0.0)
+    out["moving_share"] = float(excess[moving].sum() / max(excess.sum(), 1e-12))
+    worst = int(np.argmax(squares.mean(axis=0)))
+    out["worst_channel"] = rig.channels[worst].name
+    out["frequency_hz"] = _median_frequency(rig, z, worst)
+    out["along"] = _along(rig, z)
+    out["sentence"] = _sentence(out)
+    return out
+
+
+def _median_frequency(rig: TeamRig, z: Sequence[Array], channel: int) -> float:
+    power, at = 0.0, None
+    for t, x in enumerate(z):
+        rate = rig.row_rate_hz(t)
+        series = x[: len(x) // 2 * 2, channel]
+        spectrum = np.abs(np.fft.rfft(series, 512)) ** 2
+        power, at = power + spectrum, np.fft.rfftfreq(512, 1.0 / rate)
+    total = np.cumsum(power)
+    return float(at[np.searchsorted(total, 0.5 * total[-1])]) if at is not None else 0.0
+
+
+def _along(rig: TeamRig, z: Sequence[Array]) -> dict[str, float]:
+    """Share of the squared residual along each source's own direction (one of C dimensions, or a few)."""
+    shares: dict[str, list[float]] = {}
+    total = sum(float(np.sum(x**2)) for x in z)
+    for t, x in enumerate(z):
+        for name, directions in rig.directions(t).items():
+            inside = np.einsum("nc,nck->nk", x, directions)
+            shares.setdefault(name, []).append(float(np.sum(inside**2)))
+    ranked = sorted(((sum(v) / max(total, 1e-12), k) for k, v in shares.items()), reverse=True)
+    return {name: share for share, name in ranked[:5]}
+
+
+def _sentence(out: dict[str, Any]) -> str:
+    kind = max(out["kind"], key=lambda k: out["kind"][k])
+    source, share = next(iter(out["along"].items()), ("no single source", 0.0))
+    motion = "while it moves" if out["moving_share"] > 0.6 else "at rest and in motion alike"
+    return (
+        f"chi2/n is {three_digits(out['kind'][kind])} in the {kind} channels (worst: {out['worst_channel']}, around "
+        f"{out['frequency_hz']:.1f} Hz); {100 * share:.0f} % of the misfit lies along {source}, {motion}."
+    )
+
+
+UNDECIDABLE = (
+    (
+        "zero of the last gimbal axis",
+        "it turns the grasp frame by a constant, and the grasp frame is itself unknown",
+        "a grasp whose orientation is known",
+    ),
+    (
+        "mass of the gimbal and the platform",
+        "a point mass at the wrist is a part of the payload",
+        "a run of the arm alone",
+    ),
+    (
+        "a scale common to all torques",
+        "it scales the payload's mass and inertia and nothing else",
+        "a known weight on the payload",
+    ),
+    (
+        "which robot's gimbal rubs",
+        "a pure moment about parallel axes is the same wherever it acts; only the axis shows",
+        "one robot released at a time",
+    ),
+)
+"""What recordings of a parked team that holds one rigid payload cannot decide: what, why, and what would."""
+
+
+UNITS = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}
+"""Units of closed-loop channels, and of quantities that a misfit may depend on."""
+
+
+def describe(candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+    """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+    cause = CAUSES[candidate.cause]
+    return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
+
+
+def statements(robots: int, *, aligned: bool) -> list[dict[str, Any]]:
+    """What, why, and what would decide it, for a team of N robots whose clocks the motion may have set (aligned)."""
+    said = [{"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE]
+    if aligned:
+        why = "the conversion has taken out what the motion tells of the clocks"
+        said.append(
+            {"what": "the robots' clocks", "why": why, "remedy": "one clock for all, and no --clock correct"}
+        )
+    if robots == 1:
+        what = "every error of angles, lengths, bases and grasps of a single robot"
+        said.append(
+            {"what": what, "why": "no other robot tells where the payload is", "remedy": "a second robot"}
+        )
+    return said
+
 
 NOT_SIMULATED: Values = {
     "held_out": {"before": None, "after": None, "as_found": None}, "units": {}, "noise": {}, "removed": None,
@@ -37,7 +155,7 @@ NOT_SIMULATED: Values = {
 """What ``gain`` has where nothing was simulated."""
 
 
-class TeamTold(Told):
+class TeamValues(Told):
     """A verdict on a team as values with words."""
 
     machine = "team"
@@ -64,7 +182,7 @@ class TeamTold(Told):
             return f"Something that no table lists acts at {place}."
         numbers = {name: entry["value"] for name, entry in parameters.items()}
         errors = {name: entry["se"] for name, entry in parameters.items() if entry["se"] is not None}
-        return TeamWords().describe(candidate, numbers, errors)
+        return describe(candidate, numbers, errors)
 
     def separate(self, cause: str) -> str:
         return CAUSES[cause].separate if cause in CAUSES else ""
@@ -74,11 +192,11 @@ class TeamTold(Told):
         return signature(self.verdict.rig, self.verdict.left[which]) | {"chi2_per_n": chi2}
 
     def undecidable(self) -> list[Values]:
-        return self.verdict.rig.undecidable()
+        return statements(self.verdict.rig.robots, aligned=self.verdict.rig.aligned)
 
 
 @dataclass(frozen=True, eq=False)
-class TeamDiagnosed:
+class TeamDiagnosed(Diagnosed[TeamVerdict]):
     """A verdict with what simulations say.
 
     Attributes:
@@ -96,66 +214,43 @@ class TeamDiagnosed:
     errors: Mapping[str, Any] | None = None
 
     @cached_property
-    def _values(self) -> Values:
+    def values(self) -> Values:
         gain = gain_to_dict(self.gain, self.verdict.rig) if self.gain else NOT_SIMULATED
         gain = gain | {"estimates": dict(self.verdict.estimates)}
         if self.errors is not None:
             gain["errors"] = dict(self.errors)
-        values = TeamTold(self.verdict).values(gain, not_simulated=self.not_simulated)
+        values = TeamValues(self.verdict).values(gain, not_simulated=self.not_simulated)
         return values | {"remains": [*values["remains"], *of_response(values)]}
 
-    def to_dict(self) -> Values:
-        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
-        return self._values
-
-    def __str__(self) -> str:
-        """At most five sentences and a table."""
-        return format_verdict(self._values)
-
-    def verbose_text(self) -> str:
-        """All that there is to say."""
-        return format_verdict(self._values, verbose=True)
-
-    def write_into(self, folder: Path, **more: Any) -> None:
-        """Write models to take away, residuals, pictures, JSON and report into an existing folder.
-
-        Args:
-            folder: where.
-            more: further keys of the JSON.
-
-        Raises:
-            InputError: something cannot be written.
-        """
-        values, found = self._values, {(f.cause, f.place) for f in self.verdict.findings}
+    def models(self) -> Iterator[tuple[str, str, Callable[[Path], None]]]:
+        found = {(f.cause, f.place) for f in self.verdict.findings}
         chosen = [c for c in self.outcome.state.chosen if c.group.key in found]
-        models = [(EXTENDED, False)] if chosen else []
+        if chosen:
+            yield EXTENDED, "extended model", partial(write_model, self.outcome, chosen, whole=False)
         if self.gain is not None and self.gain.is_better_as_found:
-            models.append((AS_FOUND, True))
-        for name, whole in models:
-            try:
-                write_model(self.outcome, chosen, folder / name, whole=whole)
-            except InputError as error:  # values that no effect can have, such as a negative friction
-                note = f"There is no {'model as found' if whole else 'extended model'}: {error}."
-                values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        draw(values, self.verdict.traces(), self.verdict.rig.channels, TeamWords().unit, folder)
-        write_json(folder / NAME, values | more)
-        write_text(folder / REPORT, f"{self.verbose_text()}\n")
+            yield AS_FOUND, "model as found", partial(write_model, self.outcome, chosen, whole=True)
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return self.verdict.rig.channels
+
+    def unit(self, name: str) -> str:
+        return UNITS[name]
 
 
 def gain_to_dict(gain: Gain, rig: TeamRig) -> Values:
     """``gain`` of the JSON."""
-    channels, removed = list(next((a.rms for a, _ in gain.pairs), {})), gain.removed()
+    channels = list(next((a.rms for a, _ in gain.pairs), {}))
+    removed = excess_removed((a.chi2_per_n, b.chi2_per_n) for a, b in gain.pairs)
+    if removed is not None:
+        removed["interval"] = [x if np.isfinite(x) else None for x in removed["interval"]]
     both = zip((rig.trials[t] for t in rig.resimulated), gain.before, gain.after, strict=True)
     told = {"before": gain.before, "after": gain.after, "as_found": gain.as_found}
-    share = removed and {
-        "share": removed[0],
-        "interval": [x if np.isfinite(x) else None for x in removed[1:]],
-    }
     return {
         "held_out": {name: _mean(each) for name, each in told.items()},
-        "units": {name: TeamWords().unit(name) for name in channels},
+        "units": {name: UNITS[name] for name in channels},
         "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
-        "removed": share,
+        "removed": removed,
         "validated": gain.held_out,
         "trials": [{"name": name, "before": _response(a), "after": _response(b)} for name, a, b in both],
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -11,22 +11,56 @@ import numpy as np
 from scipy.signal import lfilter
 
 from discrepancy.candidate import Candidate
-from discrepancy.evidence.findings import Event, Scatter, Verdict
+from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
 from discrepancy.evidence.judge import Judge, Side
-from discrepancy.evidence.member import Member
 from discrepancy.evidence.odds import Odds
-from discrepancy.evidence.parts import Values
+from discrepancy.evidence.parts import Parts, Values
 from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.search import State
 from discrepancy.formulas.law import Law
 from discrepancy.result.traces import Trace
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.estimates import Estimate, to_dict
-from discrepancy.team.linear.whitening import Whitening
-from discrepancy.team.parts import left_of, parts_of
+from discrepancy.team.linear.rows import Whitening
 from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
+
+
+def parts_of(problem: TeamProblem, state: State) -> Parts:
+    """The rows of a search by trial; base poses, grips and what acts in some trials only are each trial's own."""
+    local = [k for own in problem.local for k in own]
+    events = [
+        k
+        for c in state.chosen
+        if c.group.identity in problem.candidates and problem.candidates[c.group.identity].of_trials
+        for k in (*c.group.columns, *c.forms)
+    ]
+    return Parts.of(state, _each(problem, state), [*problem.shared, *local], local, events)
+
+
+def _each(problem: TeamProblem, state: State) -> Iterator[tuple[Array, Array, float, Array]]:
+    """Weighted normal equations of the active columns, and rows by channel and band, of each trial."""
+    cells, active = problem.cells, np.flatnonzero(state.posterior.prior)
+    place = np.full(cells.count, -1)
+    place[active] = np.arange(len(active))
+    lengths = cells.bands.lengths
+    trial = np.repeat(np.arange(len(lengths)), 3 * np.array(lengths))[cells.order]
+    for t in range(len(lengths)):
+        own = trial == t
+        G, b, yy, rows = np.zeros((len(active),) * 2), np.zeros(len(active)), 0.0, []
+        for channel, variance in zip(cells.channels, state.posterior.variance, strict=True):
+            band = np.repeat(np.arange(len(variance)), np.diff(channel.starts))[own]
+            keep = np.flatnonzero(place[channel.columns] >= 0)
+            X, y, at = channel.X[np.ix_(own, keep)], channel.y[own], place[channel.columns[keep]]
+            weighted = X / variance[band][:, None]
+            G[np.ix_(at, at)] += weighted.T @ X
+            b[at] += weighted.T @ y
+            yy += float(np.sum(y**2 / variance[band]))
+            rows.append(np.bincount(band, minlength=len(variance)))
+        yield G, b, yy, np.array(rows, dtype=float)
+
 
 STEPS = 10.0
 """Steps of a number of a shape up to which it may be off, a prior as wide as none."""
@@ -84,7 +118,7 @@ class _TeamJudge(Judge):
         prior[fitted] = self.state.posterior.prior[fitted]
         plain = Posterior(problem.cells, prior, self.search.floor).mean
         values = {"before": plain, "after": self.state.posterior.mean}
-        left = {name: left_of(problem, x) for name, x in values.items()}
+        left = {name: problem.left(x) for name, x in values.items()}
         return TeamVerdict(
             **told,
             trials=tuple(rig.trials),
@@ -128,7 +162,8 @@ class _TeamJudge(Judge):
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
         if group.late:
-            return (self._law(group).member(group.place),)
+            law = self._law(group)
+            return (Member(group.place, law.joint, *law.numbers),)
         candidate = self.problem.candidates[group.identity]
         covariance, at = values[1], self.parts.columns_of(group.columns)
         x, C = np.zeros(len(candidate.parameters)), np.zeros((len(candidate.parameters),) * 2)

@@ -9,9 +9,9 @@ from discrepancy.evidence.findings import Word
 from discrepancy.evidence.settings import ODDS
 from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.result.read import name_of
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import When, against_truth, diagnose_team
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import read_tolerances
 from estimator.files import holds, whole_folder
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot.files.targets import check_folder

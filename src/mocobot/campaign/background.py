@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import default_tolerances
 from mocobot.campaign.draw import signed
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
 from mocobot_sim.effects import springs as listed

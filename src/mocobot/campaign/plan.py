@@ -6,8 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discrepancy.team.causes import CAUSES
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import CAUSES, default_tolerances
 from estimator.calibrate.calibration import Calibration
 from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
 from mocobot_sim.effects import EFFECTS

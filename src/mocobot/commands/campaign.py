@@ -6,8 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from discrepancy.team.causes import CAUSES
-from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.causes import CAUSES, read_tolerances
 from estimator.errors import InputError
 from estimator.extras import draws_plots
 from estimator.files import file_facts, write_json, write_text

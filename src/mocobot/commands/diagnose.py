@@ -6,9 +6,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from discrepancy.cause_names import read_tolerances
+from discrepancy.team.causes import default_tolerances
 from discrepancy.team.diagnosis import against_truth, diagnose_team
-from discrepancy.team.tolerances import default_tolerances
-from discrepancy.tolerances_file import read_tolerances
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording

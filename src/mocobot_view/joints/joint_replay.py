@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics import inverse_torque
 from discrepancy.joints.model import SerialModel
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass

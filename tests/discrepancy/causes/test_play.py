@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discrepancy.team.causes.free_while import played
+from discrepancy.team.causes.friction import played
 
 
 def stepped(x, half_width):

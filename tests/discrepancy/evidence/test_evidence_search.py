@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from estimator.arrays import Array
@@ -59,30 +59,6 @@ def test_the_floor_is_the_noise_however_much_the_dictionary_explains() -> None:
     cells.add([{0: [x]} for x in columns])
     floor = floor_of(Machine(cells), np.full(6, 100.0))
     assert np.sqrt(floor[0]) == pytest.approx(noise, rel=0.2)
-
-
-def test_noise_above_the_bands_stays_out_of_them() -> None:
-    """The second derivative of noise has hardly any power at low frequencies, unless a cut leaks it."""
-    power = []
-    for fade_s in (0.0, 0.5):
-        rng, own = np.random.default_rng(2), []
-        bands = Bands([RATE_HZ], [LENGTH], EDGES_HZ, fade_s)
-        for _ in range(20):
-            noise = np.diff(rng.standard_normal(LENGTH + 2), 2)
-            own.append(Cells.of(bands, [noise[:, None]]).channels[0].squares[0])
-        power.append(np.mean(own))
-    assert power[1] < 0.05 * power[0]
-
-
-def test_scores_of_columns_that_fade() -> None:
-    rng = np.random.default_rng(3)
-    y, x = rng.standard_normal((2, LENGTH))
-    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ, 0.5), [y[:, None]])
-    cells.add([{0: [x]}])
-    p = Posterior(cells, np.zeros(1), np.array([[0.5, 1.0, 2.0]]))
-    (score,) = cells.weighted_residual(p.mean, p.variance)
-    _, b, _ = cells.weighted(p.variance)
-    assert x @ score[:, 0] == pytest.approx(b[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("other", [0.0, 0.1])
@@ -142,23 +118,6 @@ def test_what_is_within_three_of_its_kinds_tolerances_is_no_fault(size: float, u
     assert odds.probability < 1e-3 if usual else odds.probability > 0.999
 
 
-def test_a_law_that_only_brings_its_errors_is_not_found() -> None:
-    """What a tolerance has in full leaves something else, which a law's errors have, and its law has not."""
-    rng = np.random.default_rng(5)
-    x, other = wave(rng), wave(rng)
-    y = 2.0 * x + 0.4 * other + 0.05 * rng.standard_normal(LENGTH)
-    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
-    cells.add([{0: [x]}, {0: [x]}])
-
-    class Tolerated(Machine):
-        def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
-            return np.array([0.0, 4.0])
-
-    machine = Tolerated(cells, [Group("cause", "joint", (0,), (3.0,))], others=[other])
-    search = Search(machine, np.full((1, 3), 0.05**2))
-    assert search.fixed([Chosen(machine.groups[0], 1.0)]).chosen == ()
-
-
 @pytest.mark.parametrize("large", [0.0, 5.0])
 def test_a_small_cause_is_sure_alone_and_not_beside_what_a_large_one_may_leave(large: float) -> None:
     rng = np.random.default_rng(6)
@@ -186,7 +145,7 @@ def test_of_two_causes_that_are_nearly_alike_one_stays() -> None:
     machine = Machine(cells, [Group(name, "joint", (k,), (1.0,)) for k, name in enumerate(("one", "twin"))])
     search = Search(machine, np.full((1, 3), 0.05**2))
     both = search.settled(search.value([Chosen(g, 1.0) for g in machine.groups], None))
-    state = borne_out(search, both)
+    state = without_unfounded(search, both)
     assert len(state.chosen) == 1
     (only,) = odds_of(search, state)
     assert only.over_nothing > 100.0
@@ -213,4 +172,4 @@ def test_laws_of_other_causes_leave_nothing_that_is_larger_than_they_are() -> No
     small = odds_of(search, state)[1]
     assert 0.0 < small.over_nothing < 9.5
     assert small.probability > 0.7
-    assert len(borne_out(search, state).chosen) == 2
+    assert len(without_unfounded(search, state).chosen) == 2

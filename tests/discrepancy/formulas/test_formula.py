@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from discrepancy.formulas.formula import Curve, Formula, Kind, formula_of
+from discrepancy.formulas.formula import KNOTS, Curve, Formula, Kind, formula_of
 from discrepancy.formulas.law import Law, Of
-from discrepancy.formulas.terms import KNOTS
 from estimator.arrays import Array
 from mocobot_sim.functions import FUNCTIONS, Inside
 

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.verdict import judged
+from discrepancy.joints.verdict import JointVerdict, judged
 from followed_arm import ARM, Change, Torque, arm_log, arm_model, both, rubs
 from mocobot_logs.joints.joint_log import JointLog
 

@@ -6,17 +6,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.joints.mechanics.motion import Motion
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.regressor import (
+from discrepancy.joints.mechanics import (
+    Motion,
+    Tree,
     body_regressor,
+    by_acceleration,
+    by_displacement,
     force_torque,
     inertial_parameters,
+    inverse_torque,
     rigid_torque,
     torque_of,
 )
-from discrepancy.joints.mechanics.shift import by_acceleration, by_displacement
-from discrepancy.joints.mechanics.tree import Tree
 
 BRANCHED = """
 <mujoco><compiler angle="radian"/><worldbody>

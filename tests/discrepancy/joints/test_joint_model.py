@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import load_model
 from estimator.errors import InputError
 

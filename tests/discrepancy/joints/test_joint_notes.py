@@ -28,11 +28,6 @@ def test_notes_that_differ_in_numbers_are_told_once():
     ]
 
 
-def test_no_logs_have_no_notes():
-    assert list(notes_of([])) == []
-    assert list(notes_of([log("monday")])) == []
-
-
 @pytest.mark.parametrize("rate_hz", [50.0, 500.0])
 def test_joints_that_rest_are_told(rate_hz: float) -> None:
     rng, time = np.random.default_rng(0), np.arange(round(10.0 * rate_hz)) / rate_hz

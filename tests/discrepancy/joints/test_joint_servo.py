@@ -8,11 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import SerialModel, load_model
-from discrepancy.joints.servo.loop import loop_laws
-from discrepancy.joints.servo.motor import with_torques
-from discrepancy.joints.verdict import judged
+from discrepancy.joints.servo import loop_laws, with_torques
+from discrepancy.joints.verdict import JointVerdict, judged
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
 

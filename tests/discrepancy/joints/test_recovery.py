@@ -12,12 +12,11 @@ import pytest
 
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from discrepancy.joints.diagnosed import JointDiagnosed
-from discrepancy.joints.findings import JointVerdict
 from discrepancy.joints.model import load_model
 from discrepancy.joints.problem import joint_problem
 from discrepancy.joints.trials import trials_of
 from discrepancy.joints.unlisted import SIGNALS
-from discrepancy.joints.verdict import judged
+from discrepancy.joints.verdict import JointVerdict, judged
 from mocobot_logs.joints.joint_log import Drive, JointLog
 
 Tolerances = Mapping[str, Mapping[str, float]]

@@ -6,8 +6,7 @@ import re
 
 import pytest
 
-from discrepancy.result.text_gain import gain_lines
-from discrepancy.result.text_rollouts import rollout_lines
+from discrepancy.result.tables import gain_lines, rollout_lines
 
 SIZES = (0.0128, 0.00152, 0.000339)
 

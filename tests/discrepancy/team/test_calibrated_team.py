@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.team.checks import check_recordings
 from discrepancy.team.closed_loop import posture, team_of
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.diagnosis import check_recordings
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise
 from estimator.arm.unit import AT, ArmUnit

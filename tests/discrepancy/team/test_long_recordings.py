@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 
 import mocobot
-from discrepancy.team.causes import CAUSES
+from discrepancy.team import long
+from discrepancy.team.candidates import in_shapes
+from discrepancy.team.causes import CAUSES, read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.linear import filed as filing
-from discrepancy.team.linear.filed import is_filed
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear import start as filing
+from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.long import choice, parts
-from discrepancy.team.long.choice import Choice
-from discrepancy.team.long.parts import LaterPart, parted
+from discrepancy.team.linear.start import is_filed
+from discrepancy.team.long import Choice, LaterPart, parted
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload
 from patchwork import dense
 
@@ -33,8 +32,7 @@ def recording():
 
 @pytest.fixture
 def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    for owner in (choice, parts):
-        monkeypatch.setattr(owner, "PART_S", 12.0)
+    monkeypatch.setattr(long, "PART_S", 12.0)
 
 
 def test_short_recordings_stay_whole(recording) -> None:
@@ -74,7 +72,7 @@ def test_what_is_in_files_is_the_same(recording, monkeypatch: pytest.MonkeyPatch
     whole, filed = made
     assert [is_filed(rig.linear[0]) for rig in made] == [False, True]
     for candidate in whole.candidates()[::5]:
-        for one in (candidate, *whole.refinements(candidate)[:1]):
+        for one in (candidate, *in_shapes(candidate, CAUSES[candidate.cause].shapes, 1)[:1]):
             for _ in range(2):  # made, and kept
                 np.testing.assert_array_equal(filed.columns(one)[0], whole.columns(one)[0])
             np.testing.assert_array_equal(dense(filed.unknowns(one)[0]), dense(whole.unknowns(one)[0]))

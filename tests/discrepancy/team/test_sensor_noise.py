@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from discrepancy.team.linear.chatter import MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD, Fast, chattering
-from discrepancy.team.linear.noise import MODEL_ABOVE, MODEL_BELOW_HZ, Noise
+from discrepancy.team.linear.noise import (
+    MODEL_ABOVE,
+    MODEL_BELOW_HZ,
+    MODEL_PHI_RAD,
+    MODEL_TAU_NM,
+    MODEL_THETA_RAD,
+    Fast,
+    Noise,
+    chattering,
+)
 from discrepancy.team.linear.signals import Signals
 
 RATE = 100.0

@@ -11,16 +11,13 @@ import pytest
 import mocobot
 from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.search import Chosen
-from discrepancy.team.causes import CAUSES
+from discrepancy.team import long
+from discrepancy.team.causes import CAUSES, read_tolerances
+from discrepancy.team.closed_loop import mean_chi2
 from discrepancy.team.diagnose import TeamOutcome, search_team
-from discrepancy.team.gain import mean_chi2
-from discrepancy.team.long import choice as choices
-from discrepancy.team.long import left as lefts
-from discrepancy.team.long.choice import Choice
-from discrepancy.team.long.search import search_parts
-from discrepancy.team.response import as_found, confirm, write_model
+from discrepancy.team.long import Choice, search_parts
+from discrepancy.team.response import confirm, left_by, write_model
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload
 from hidden_team import recorded
 from mocobot_sim.effects import make_effect
@@ -116,7 +113,7 @@ def test_models_to_take_away(tmp_path) -> None:
 def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque is wrong in the last part only, which was not searched at first."""
     for owner, name, value in (
-        (choices, "SEARCHED_S", 16.0), (choices, "SHORTEST_PART_S", 8.0), (lefts, "ODD_WINDOW_S", 2.0),
+        (long, "SEARCHED_S", 16.0), (long, "SHORTEST_PART_S", 8.0), (long, "ODD_WINDOW_S", 2.0),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, value)
     recording = mocobot.simulate("b", "random", vias=16, seed=6)
@@ -126,12 +123,7 @@ def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.Monkey
     tau[np.searchsorted(recording.time, choice.parts[odd].time[300]) :, 1, 0] += 0.5
     choice = Choice.of([replace(recording, tau=tau)])
     said: list[str] = []
-    parts = search_parts(
-        choice,
-        lambda some: searched(some, "phi_zero"),
-        as_found,
-        said.append,
-    )
+    taken, found, _ = search_parts(choice, lambda some: searched(some, "phi_zero"), left_by, said.append)
     assert odd not in choice.taken
-    assert odd in parts.choice.taken
-    assert choice.parts[odd].name in parts.searched.problem.rig.trials
+    assert odd in taken.taken
+    assert choice.parts[odd].name in found.problem.rig.trials

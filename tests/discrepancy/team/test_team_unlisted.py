@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from diagnosed import check_finite
-from discrepancy.team import told
+from discrepancy.result import folder
 from discrepancy.team.diagnosis import diagnose_team
 from hidden_team import recorded
 from mocobot_sim.effects.law import Law
@@ -19,7 +19,7 @@ TRUE = Law("tau_2_1", "sine", "phi_2_1", amplitude=0.05, number=12.0, phase_rad=
 @pytest.mark.slow
 def test_an_unlisted_law_is_told_and_carried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque sensor that feels where its joint stands."""
-    monkeypatch.setattr(told, "draw", lambda *given: None)
+    monkeypatch.setattr(folder, "draw", lambda *given: None)
     found = diagnose_team(recorded("b", [TRUE], seed=2), closed_loop=False)
     values = found.to_dict()
     check_finite(values)

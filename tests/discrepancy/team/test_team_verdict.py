@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from diagnosed import check_finite
-from discrepancy.joints.json import verdict_to_dict
+from discrepancy.joints.diagnosed import verdict_to_dict
 from discrepancy.result.read import read_diagnosis
 from discrepancy.result.report import format_verdict
 from discrepancy.team import told
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import read_tolerances
 from estimator.errors import InputError
 from hidden_team import recorded
 from joint_verdicts import joint_verdict, offset_or_spring

@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.joints.mechanics.motion import Motion
-from discrepancy.joints.mechanics.nominal import inverse_torque
-from discrepancy.joints.mechanics.regressor import body_regressor, inertial_parameters
-from discrepancy.joints.mechanics.tree import Tree
+from discrepancy.joints.mechanics import Motion, Tree, body_regressor, inertial_parameters, inverse_torque
 from discrepancy.joints.model import load_spec
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended

@@ -1,13 +1,18 @@
-"""The catalogue of a team's causes, by subject."""
+"""The catalogue of a team's causes, by subject, and how far a well-kept Omnid may be from its model."""
 
+from __future__ import annotations
+
+from pathlib import Path
+
+from discrepancy.cause_names import read_tolerances as with_file
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.causes.cable import PayloadTether, Tether
 from discrepancy.team.causes.friction import GimbalFriction, JointFriction, SeaHysteresis
-from discrepancy.team.causes.geometry import BaseTilt, LinkLength
-from discrepancy.team.causes.grasp_play import GraspPlay
 from discrepancy.team.causes.payload import Drag, PayloadMass, Push
 from discrepancy.team.causes.readings import (
+    BaseTilt,
     ClockDelay,
+    LinkLength,
     PhiZero,
     SeaBias,
     SeaHardening,
@@ -18,7 +23,7 @@ from discrepancy.team.causes.readings import (
     TorqueSkew,
 )
 from discrepancy.team.causes.slosh import Slosh
-from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex
+from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex, GraspPlay
 
 CATALOGUE = (
     PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,
@@ -27,3 +32,21 @@ CATALOGUE = (
 )  # fmt: skip
 CAUSES: dict[str, Cause] = {cause.name: cause() for cause in CATALOGUE}
 """Every cause by its name."""
+
+
+def default_tolerances() -> dict[str, dict[str, float]]:
+    """Those that the causes have, by cause and parameter."""
+    return {
+        name: dict(zip(cause.parameters, cause.tolerances, strict=True))
+        for name, cause in CAUSES.items()
+        if cause.tolerances
+    }
+
+
+def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
+    """The defaults, with what a TOML file changes; see ``discrepancy.cause_names``.
+
+    Raises:
+        InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.
+    """
+    return with_file(path, default_tolerances())

@@ -11,7 +11,7 @@ import numpy as np
 
 from discrepancy.candidate import Candidate, Parameter, Transient
 from discrepancy.numbers import Numbers, number
-from discrepancy.team.linear.patches import Patches
+from discrepancy.team.linear.rows import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.unit import Arms
@@ -151,7 +151,7 @@ class Cause(ABC):
         return []
 
     def grown(self, shape: Shape) -> Sequence[Shape]:
-        """The same shape with a number more that the data determine, nought so far; none where that is all."""
+        """The same shape with a number more that the data determine, zero so far; none where that is all."""
         return []
 
     def around(self, values: Array, shape: Shape) -> Shape:
@@ -159,7 +159,7 @@ class Cause(ABC):
         return shape
 
     def alike(self, shape: Shape) -> int:
-        """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
+        """Number of equally likely ones that differ by their shapes alone; 0 where places are listed."""
         return self.among
 
     def slope_step(self, name: str, number: float) -> float:

@@ -13,33 +13,25 @@ from discrepancy.team.causes.base import Cause, Shape
 from estimator.arrays import Array
 
 CABLES, CABLE_LINES = 10_000, 100
-"""Cables that are told apart. Derived: ways 0.1 rad apart (4 pi / 0.01) times eight stretches; at the payload also
-lines 0.1 m apart across a metre each way."""
+"""Distinguishable cables: ways 0.1 rad apart times eight stretches; lines 0.1 m apart at the payload."""
 
 TETHER_LEVER_M, TETHER_FINER_M, TETHER_STEP_M = 0.4, (0.2, 0.07, 0.025), 0.02
-"""Levers of a tether of the payload at which a search begins, by which it goes on, and over which slopes are taken.
-Chosen: half of a payload, and so fine that a Gauss-Newton step does the rest."""
+"""Levers of a payload tether [m]: first grid, finer grids, and step of slopes."""
 
 CABLE_STIFFENS_RANGE_PER_M, CABLE_STIFFENS_STEP_PER_M, STRAPS = (-3.0, 1000.0), 20.0, 20
-"""By which share of its stiffness a strap is stiffer per metre of stretch: at least and most, over which slopes are
-taken, and how many are told apart. Chosen: a webbing twice as stiff at 0.02 m has 50 per m; rubber gets softer, not by
-more than 0.3 in 0.1 m."""
+"""Relative growth of a strap's stiffness per metre: range, step of slopes, distinguishable values."""
 
 CABLE_NEAR_PER_M, CABLE_NEAR_RANGE_PER_M, CABLE_NEAR_STEP_PER_M = 1.0, (0.05, 5.0), 0.4
 """One over how far away it is tied: at first, at least and most, and over which slopes are taken. Chosen: a room."""
 
 CABLE_STRETCHES_M, CABLE_STRETCH_STEP_M = (0.03, 0.0, 0.1), 0.015
-"""By how much it is stretched at home. Chosen: a carry moves by 0.05 m, so it is slack at times, half of the time, and
-never; steps as above."""
+"""Stretch at home [m], tried first: slack at times, half of the time, never; and step of slopes."""
 
 CABLE_TURNS, CABLE_TURN_STEP = (-0.45, 0.45), 0.15
-"""Where a tether that pulls along itself alone comes from: slopes across each of six axes at which a search begins,
-24 ways in all, no direction further off than 33 deg; and over which slopes are taken. Chosen: as far as a Gauss-Newton
-step goes; with a third of that it stopped beside what it was after."""
+"""Slopes across each of six axes from which a cable may come, 24 ways in all; and step of slopes."""
 
 TURNS, OFFSETS = ("turn_1", "turn_2"), ("offset_1_m", "offset_2_m")
-"""Numbers of its shape: where it comes from, as slopes across an axis; where its line passes the centre of mass, along
-the other two axes."""
+"""Shape numbers: direction, as slopes across an axis; where its line passes the centre of mass."""
 STRETCH, NEAR, STIFFENS = "stretch_m", "near_per_m", "stiffens_per_m"
 """By how much it is stretched at home; one over how far away it is tied; by which share it is stiffer per stretch."""
 SLOPE_STEPS: Mapping[str, float] = (
@@ -147,7 +139,7 @@ def strap(shape: Shape) -> list[Shape]:
 
 
 def alike(shape: Shape) -> int:
-    """Of how many cables, told apart by their shapes alone, one is one."""
+    """Number of equally likely cables that differ by their shapes alone."""
     return CABLES * (STRAPS if STIFFENS in shape else 1)
 
 
@@ -231,8 +223,7 @@ SLOSH_REACH_M = 1.5
 """From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
 
 TETHER_POINTS = 1000
-"""Points of a payload that are told apart. Derived: every 0.1 m of a metre each way; near the limit they err by 0.05 m.
-Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
+"""Distinguishable points of a payload, 0.1 m apart: the prior odds of one at a grasp against a free one."""
 
 LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
 
@@ -260,10 +251,7 @@ class PayloadTether(Cause):
         *(_at(sign * TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
         *(through(np.zeros(3), way) for way in first_ways()),
     )
-    determined: ClassVar[Mapping[str, float]] = {
-        **dict.fromkeys(LEVERS, TETHER_STEP_M),
-        **SLOPE_STEPS,
-    }
+    determined: ClassVar[Mapping[str, float]] = {**dict.fromkeys(LEVERS, TETHER_STEP_M), **SLOPE_STEPS}
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 

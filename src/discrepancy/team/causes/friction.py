@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import ClassVar, Literal
 
@@ -10,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.team.causes.base import Cause, Shape, one_joint, one_robot
-from discrepancy.team.causes.free_while import in_parts, pieces_while, played
-from discrepancy.team.linear.patches import PATCH_COLUMNS, Patches
 from discrepancy.team.linear.rest import REST_RAD_PER_S
+from discrepancy.team.linear.rows import PATCH_COLUMNS, Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.dynamics import moment_about_axes
@@ -20,10 +20,56 @@ from estimator.arm.motion import TAU, THETA
 from estimator.arrays import Array
 from estimator.filtering import differentiate
 
+
+def pieces_while(
+    where: NDArray[np.bool_], rate_hz: float, knots_s: float, shortest_s: float = 0.0
+) -> Iterator[tuple[slice, Array]]:
+    """Per interval of ``where`` (Q,): its s samples, and k hats between knots at most ``knots_s`` apart, shape (s, k).
+
+    Intervals shorter than ``shortest_s`` have none.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int))).reshape(-1, 2)
+    for start, stop in edges:
+        if stop - start < shortest_s * rate_hz:
+            continue
+        pieces = math.ceil((stop - start) / rate_hz / knots_s)
+        knots, here = np.linspace(start, stop - 1, pieces + 1), np.arange(start, stop)
+        yield (
+            slice(start, stop),
+            np.stack([np.interp(here, knots, unit) for unit in np.eye(pieces + 1)], axis=1),
+        )
+
+
+def in_parts(pieces: Iterator[tuple[slice, Array]], most: int) -> Iterator[tuple[slice, Array]]:
+    """The same with at most so many columns at a time, and of the samples those between which they are not zero."""
+    for at, values in pieces:
+        for first in range(0, values.shape[1], most):
+            some = values[:, first : first + most]
+            there = np.flatnonzero(some.any(axis=1))
+            here = slice(there[0], there[-1] + 1)
+            yield slice(at.start + here.start, at.start + here.stop), some[here]
+
+
+def played(x: Array, half_width: float) -> Array:
+    """A signal (Q,) behind a play: it stays where it is until the signal is farther off than half the play's width.
+
+    While the signal rises or falls without turning, only where it began matters: from turn to turn, not from sample to
+    sample.
+    """
+    moves = np.flatnonzero(np.diff(x))  # where it does not stand still
+    way = np.sign(np.diff(x)[moves])
+    turns = moves[1:][way[1:] != way[:-1]]
+    ends, at, starts = [*x[turns].tolist(), float(x[-1])], float(x[0]), []
+    for end in ends:
+        starts.append(at)
+        at = min(max(at, end - half_width), end + half_width)
+    counts = np.diff([0, *(turns + 1), len(x)])  # a turn ends the run before it
+    start = np.repeat(starts, counts)
+    return np.clip(start, x - half_width, x + half_width)
+
+
 PRESLIDING_OPEN_SHARE = 0.5
-"""Of its limit, by which friction that gives way may differ from Prandtl's law until it slips. Measured on LuGre, Dahl
-and Bouc-Wen friction of 0.15, 0.14 and 0.40 N m: chi2/n 1.43, 1.39 and 9.5 with 0, 1.10, 1.12 and 1.6 with 0.2, 1.05,
-1.07 and 1.35 with this; by evidence 1000, 1000 and 2500 nats likelier, sizes 3, 2 and 6 % off instead of 6, 6, 20."""
+"""Share of its limit by which presliding friction may differ from Prandtl's law until it slips."""
 
 PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 """Shares of such a torque that are tried next. Chosen."""
@@ -32,16 +78,10 @@ PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
 """The same of a joint's friction, by its angle. Chosen: bristles of 0.2 to 2 mrad are met; a step of 16 bits is 0.1."""
 
 REST_KNOTS_S = 0.05
-"""Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a
-spring, 0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than
-0.15 s left out; 1.12, 1.05 and 1.09 with 0.05 s; 1.07, 1.03 and 1.08 with every rest. Nothing faster passes the filter
-of the rows."""
+"""Between knots of friction at rest, which follows the load: nothing faster passes the rows' filter."""
 
 TURN_RAD_PER_S = 1e-2
-"""Below which friction that is kept may not be reversed yet when a joint turns round. Derived: from a turn at 0.5
-rad/s^2 until then it moves by 0.1 mrad, a step of 16 bits. Measured on four recordings (0.096 N m in a joint that gives
-way by 10 urad): chi2/n 1.72, 1.29, 2.55, 1.23 without, 1.13, 0.99, 1.29, 1.05 with 4e-3, 1.12, 0.98, 1.15, 1.05 with
-this; viscous friction is off by 6.9, 5.4, 14, 0.4 standard errors, by 1.1, 0.9, 2.2, 0.9, and by 0.3, 1.1, 0.7, 1.3."""
+"""Below this speed, friction that keeps its direction may not have reversed yet after a turn."""
 
 KEPT = "kept_below_rad_per_s"
 """Rate of a shape below which friction keeps its direction: so stiff that no encoder shows how it gives way."""
@@ -182,8 +222,7 @@ PRESLIDING_RANGE_NM = (0.01, 1.0)
 """Derived: less is passed within a sample; more is hardly ever turned round."""
 
 PRESLIDINGS_NM = (0.05, 0.2)
-"""Torque that a spring takes up while the friction inside it gives way before it slips, tried first. Chosen: Bouc-Wen
-springs that yield over 0.3 to 3 mrad at 100 N m/rad."""
+"""Torque [N m] over which friction inside a spring gives way before it slips, tried first."""
 
 
 class SeaHysteresis(Friction):

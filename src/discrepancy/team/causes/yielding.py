@@ -1,20 +1,24 @@
-"""What gives way to a force: bases and grasps, a spring beside a damper as Kelvin and Voigt have it, and creep."""
+"""What gives way to a force: bases and grasps behind a lag, creep, and a loose grasp."""
 
+from __future__ import annotations
+
+import math
 from typing import ClassVar, cast
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy.team.causes.base import Cause, Shape, stack
+from discrepancy.team.causes.friction import in_parts, pieces_while
+from discrepancy.team.linear.rest import PLAY_FORCE_N
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.dynamics import rate_matrix
 from estimator.arm.motion import THETA
 from estimator.arrays import Array
 
 RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
-"""Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds
-the rest; the first is that of a base of 60 kg that gives way by 1 to 3 um/N, critically damped. Of a grasp it is the
-least: 5 kg, a share of a payload, on 1 um/N, ten tolerances, follow within 4.5 ms."""
+"""Time constants tried first, a factor of four apart: a Gauss-Newton step finds the rest."""
 
 RELAXATION_RANGE_S = (0.001, 0.5)
 """Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
@@ -57,8 +61,7 @@ def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
 
 
 BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
-"""Compliance times the mass that moves, over the square of the lag, tried where a base gives way: a quarter is damped
-critically; and shares of it tried next. Chosen."""
+"""Compliance times moving mass over the lag squared, tried first (1/4: critical damping); finer shares."""
 
 
 class BaseCompliance(Yielding):
@@ -171,8 +174,7 @@ GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
 """Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
 
 GRASP_TURNS_M = (0.05, -0.05)
-"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first. Chosen: a flange's
-thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
+"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first [m]."""
 
 
 class GraspFlex(Yielding):
@@ -243,3 +245,76 @@ class GraspFlex(Yielding):
 def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
     """Rows of a grasp that is displaced along the axes of {i}, shape (Q, 3)."""
     return trial.of_pose(robot, None, np.einsum("qij,qj->qi", R_b1i, by))
+
+
+PLAY_COLUMNS_AT_A_TIME = 16
+"""Columns of that travel at a time: a limit of memory."""
+
+PLAY_CONTACT_PER_N = 0.02
+"""Share of a play by which its ends give way to a newton, over which slopes are taken."""
+
+PLAY_OPEN_KNOTS_S = 0.05
+"""Between knots of that travel: nothing faster passes the rows' filter."""
+
+PLAY_OPEN_N, PLAY_OPEN_S = 1.0, 0.03
+"""Force below which a loose payload may travel, and how long before and after: filters spread the force."""
+
+
+class GraspPlay(Cause):
+    """The payload rests against one end of its play on every axis of {i}, after the force on it.
+
+    Below ``force_N`` it has not settled there, and is anywhere between the ends. The ends may give way to the force:
+    by ``contact_per_N`` of the play, if that is in its shape.
+    """
+
+    title = "play in {grasp}"
+    family = "compliance"
+    parameters = ("play_m",)
+    tolerances = (3e-6,)
+    at = "grasp"
+    shapes = ({"force_N": PLAY_FORCE_N}, {"force_N": PLAY_FORCE_N, "contact_per_N": 0.0})
+    determined: ClassVar = {"contact_per_N": PLAY_CONTACT_PER_N}
+    positive = ("play_m",)
+    separate = "Internal forces of both signs at rest separate play from flexibility."
+
+    def sentence(self, n):
+        behind = ""
+        if n.values.get("contact_m_per_N"):
+            behind = f", and gives way by {n('contact_m_per_N', 'nm/N', 1e9)} behind"
+        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis{behind}"
+
+    def slope_step(self, name, number):
+        return self.determined[name]  # from zero on, and straight
+
+    def physical(self, values, context):
+        play_m = float(values[0])
+        return {"play_m": play_m, "contact_m_per_N": play_m * context.shape.get("contact_per_N", 0.0)}
+
+    def columns(self, trial, robot, joint, shape):
+        force = trial.data.wrench[:, robot, 3:]
+        end = np.clip(force / shape["force_N"], -1.0, 1.0)
+        behind = shape.get("contact_per_N", 0.0) * force
+        return stack([displaced(trial, robot, -end - behind, force)])
+
+    def unknowns(self, trial, robot, joint, shape):
+        force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
+        around = np.ones(2 * math.ceil(PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
+        columns = []
+        for axis in range(3):
+            small = np.abs(force[:, axis]) < PLAY_OPEN_N
+            loose = np.asarray(binary_dilation(small, around), dtype=np.bool_)
+            places = in_parts(pieces_while(loose, rate_hz, PLAY_OPEN_KNOTS_S), PLAY_COLUMNS_AT_A_TIME)
+            along = trial.data.R_bi[:, robot, :, axis] @ trial.bases.R[robot].T
+            columns.append(trial.of_shifts(robot, along, places))
+        return columns[0].beside(columns[1:])
+
+
+def displaced(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:
+    """Rows of an offset of the grasp along the axes of {i} under a force in them [N], shape (Q, 3) each.
+
+    The force still goes through the gimbal's centre, of which the payload is off by so much.
+    """
+    in_b = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], offset)
+    moment = np.cross(force, offset) @ trial.shared.grasps.R_1i[robot].T
+    rows = trial.of_pose(robot, None, in_b @ trial.bases.R[robot].T)
+    return np.asarray(rows + trial.of_wrench(np.zeros_like(moment), moment))

@@ -68,18 +68,13 @@ class BySignals:
         return whole
 
     def at(self, robot: int, slots: slice, samples: NDArray[np.intp]) -> Array:
-        """Of one robot at some samples, shape (k,) -> (k, C, s)."""
+        """Derivative by one robot's signals at some samples, shape (k,) -> (k, C, s)."""
         J = self.knots[robot][..., slots].astype(np.float64)
         low, rest = np.divmod(samples, self.every)
         after = J[np.minimum(low + 1, len(J) - 1)]
         whole = np.zeros((len(samples), self.channels, J.shape[2]))
         whole[:, self.moved[robot]] = J[low] + (after - J[low]) * (rest / self.every)[:, None, None]
         return whole
-
-    def dense(self, slots: slice = slice(None)) -> Array:
-        """At every sample, shape (N, Q, C, s)."""
-        every = np.arange(self.samples)
-        return np.array([self.at(robot, slots, every) for robot in range(len(self.knots))])
 
 
 def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> BySignals:

@@ -1,23 +1,15 @@
-"""How finely each sensor reads: rounding step and white noise of a reading, found in the recording itself."""
+"""How finely each sensor reads, by the recording itself: rounding steps, white noise, and a chattering loop."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, periodogram, sosfiltfilt
 
-from discrepancy.team.linear.chatter import (
-    MODEL_HZ,
-    MODEL_PHI_RAD,
-    MODEL_TAU_NM,
-    MODEL_THETA_RAD,
-    Fast,
-    columns_of,
-    native_hz,
-)
 from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -25,29 +17,141 @@ from estimator.quantisation import rounding_step
 from estimator.recording.metadata import SENSORS
 from mocobot_logs.resample.resampling import Resampling
 
+NOISE_SEED = 20250
+"""Seed of the noise draws, fixed so that verdicts can be reproduced."""
+
+MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM, MODEL_HZ = 2e-6, 7e-7, 3e-4, 100.0
+"""Error of the model itself (soft rods, welds, integrator), as noise of readings at ``MODEL_HZ``."""
+
+NOISE_ABOVE_HZ = 25.0
+"""Where nothing moves, so that what is there is noise. Chosen."""
+
+NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
+"""Share of the amplitude between spectral lines below which lines are no noise; lines over the torque's step that count
+as chatter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fast:
+    """What every channel has above 25 Hz, shape (3, N, 3) each: phi, theta, tau.
+
+    Attributes:
+        white: standard deviation of white noise of a reading. Robust against moments, and against lines where these are
+            most of it: a joint that chatters.
+        lines: root mean square where it is lines and no noise, otherwise 0.
+        at_hz: of the strongest line.
+    """
+
+    white: Array
+    lines: Array
+    at_hz: Array
+
+    @classmethod
+    def of(cls, signals: Signals) -> Fast:
+        """What one trial has."""
+        high, x = _high(signals), columns_of(signals)
+        frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
+        fast = density[frequency > high]
+        lines = np.sqrt(fast.sum(axis=0) * frequency[1])
+        at_hz = frequency[frequency > high][fast.argmax(axis=0)]
+        over_time, between_lines = _levels(signals)
+        noise = between_lines >= NOISE_LINES * over_time
+        white = np.where(noise, over_time, between_lines)
+        each = (white, np.where(noise, 0.0, lines), at_hz)
+        return cls(*(np.moveaxis(one.reshape(len(one), 3, 3), 1, 0) for one in each))
+
+    def is_loud(self, step: Array) -> bool:
+        """Whether a torque oscillates by much more than its noise, its step and what the model leaves.
+
+        Args:
+            step: rounding steps, shape (3, N, 3).
+        """
+        quiet = np.maximum(np.maximum(step[2], self.white[2]), MODEL_TAU_NM)
+        return bool(np.any(self.lines[2] > CHATTER_STEPS * quiet))
+
+
+def native_hz(signals: Signals) -> Array:
+    """Rate of every robot's readings [Hz], shape (N,)."""
+    if signals.sampling is None:
+        return np.full(signals.phi.shape[1], signals.rate_hz)
+    return np.array([sampling.native_hz for sampling in signals.sampling])
+
+
+def columns_of(signals: Signals) -> Array:
+    """The sensors' channels of all robots, shape (Q, N, 9)."""
+    return np.concatenate([signals.phi, signals.theta, signals.tau], axis=2)
+
+
+def _high(signals: Signals) -> float:
+    """From where on there is noise alone [Hz]."""
+    return float(min(NOISE_ABOVE_HZ, 0.4 * min(signals.rate_hz, *native_hz(signals))))
+
+
+def _levels(signals: Signals) -> tuple[Array, Array]:
+    """White noise of a reading with the lines, and without, shape (N, 9) each.
+
+    A conversion leaves less of it there; how much, it shows on noise of one.
+    """
+    rate_hz, x, high = signals.rate_hz, columns_of(signals), _high(signals)
+    over_time, between_lines = _fast(high, x, rate_hz)
+    if signals.sampling is None:
+        share = np.sqrt(1.0 - high / (rate_hz / 2.0))
+        return over_time / share, between_lines / share
+    rng = np.random.default_rng(NOISE_SEED)
+    for i, sampling in enumerate(signals.sampling):
+        way = Resampling.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
+        left = _fast(high, way(rng.standard_normal((len(way.instants), SENSORS))), rate_hz)
+        over_time[i] /= np.median(left[0])
+        between_lines[i] /= np.median(left[1])
+    return over_time, between_lines
+
+
+def _fast(high: float, x: Array, rate_hz: float) -> tuple[Array, Array]:
+    """Root mean squares above a frequency: with the lines there, robust against moments; and between the lines."""
+    band = butter(4, high, btype="high", fs=rate_hz, output="sos")
+    fast = np.asarray(sosfiltfilt(band, x, axis=0), dtype=np.float64)
+    over_time = 1.4826 * np.median(np.abs(fast), axis=0)
+    frequency, density = periodogram(fast, rate_hz, window="hann", axis=0)
+    # Powers of white noise are exponentially distributed: ln 2 of their mean is the median.
+    level = np.median(density[frequency > high], axis=0) / np.log(2.0)
+    return over_time, np.sqrt(level * (rate_hz / 2.0 - high))
+
+
+def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
+    """A sentence where a torque oscillates faster than a team moves, by so much that it is let through; for the notes.
+
+    Args:
+        trials: signals of every trial, with their cut-offs (``Noise.known_to``).
+    """
+    loud = [Fast.of(trial).lines[2] for trial in trials if trial.chatters]
+    if not loud:
+        return ()
+    lines = np.max(loud, axis=0)
+    robot, joint = np.unravel_index(int(np.argmax(lines)), lines.shape)
+    return (
+        f"The torque of driven joint {joint + 1} of robot {robot + 1} oscillates faster than "
+        f"{NOISE_ABOVE_HZ:g} Hz, with {lines[robot, joint]:.2g} N m rms, as if its loop were unstable "
+        "(mocobot inspect says at what frequency). The mean of what that does to torques and friction is in the model, "
+        "as far as the samples tell it; what it does to readings that are not linear is in no cause.",
+    )
+
+
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
-"""Noise of the rates that tell rest from sliding, up to which they are smoothed as usual; signals with more are
-smoothed more, down to that cut-off. Derived: a joint that turns round at 0.3 rad/s^2 is told to do so within 1 ms, of a
-row's 80; a torque's is that of the sensors with which thresholds were chosen; rows have nothing above 5 Hz. Noise
-counts from that share of a rounding step on: with less a joint at rest repeats one reading; its error is a tenth."""
+"""Noise of rates up to which signals are smoothed as usual; least cut-off of noisier ones; share of a rounding step
+from which noise counts."""
 
 PHASE_TRAVEL = 4.0
-"""Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
-changes an encoder's speed by half at most."""
+"""Steps of travel after which a rounding error is drawn anew."""
 
 SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
-"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and how far that of the signal
-falls with it. Chosen: the trajectory need only be one that the stairs may have come from."""
+"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and octaves by which the signal's
+falls."""
 
 CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
-"""Cut-off of signals in which something chatters, over its frequency, and at most over the sampling rate. Derived: the
-mean of a torque times the angle at which it acts is that of both oscillating together, of which the square of the
-filter's gain is left: at 27 Hz and 100 Hz 0.4 % with the usual cut-off and all with 45 Hz, at 1 kHz 97 % with 54 Hz.
-Measured: of torques of +- 7 N m it is up to 49 mN."""
+"""Cut-off over the frequency of chatter, and at most over the sampling rate: the mean torque times angle must pass."""
 
 MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
-"""Up to where, and the share of it that is left above. Measured: of the same, a twentieth of the power from 3 Hz on,
-and hardly anything from 4 Hz."""
+"""Frequency up to which the model's own error lies, and its share above."""
 
 
 @dataclass(frozen=True, eq=False)

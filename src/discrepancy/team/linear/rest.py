@@ -26,7 +26,7 @@ PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
 
 DRAWS_AT_A_TIME, DRAWN_TOGETHER = 8, 4.5e5
-"""Of noise, and samples of all robots in them, at most. Chosen: memory; eight of three minutes of three robots."""
+"""Most noise draws at a time, and most samples of all robots in them: a limit of memory."""
 
 Moves = Literal["phi", "theta", "tau"]
 KINDS: tuple[tuple[Moves, str, str], ...] = (
@@ -61,11 +61,7 @@ class Resting:
         self._limit_Nm: dict[Moves, float] = {
             moves: tolerances.get(cause, {}).get(name, 0.0) for moves, cause, name in KINDS
         }
-        slow = {
-            "phi": REST_RAD_PER_S,
-            "theta": REST_RAD_PER_S,
-            "tau": REST_NM_PER_S,
-        }
+        slow = {"phi": REST_RAD_PER_S, "theta": REST_RAD_PER_S, "tau": REST_NM_PER_S}
         self._play_m = tolerances.get("grasp_play", {}).get("play_m", 0.0)
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
 

@@ -1,38 +1,283 @@
-"""The unknowns before any cause: from the estimate, then Gauss-Newton on the whitened residual."""
+"""The unknowns before any cause, at adjusted signals: from the estimate, then Gauss-Newton on the whitened residual."""
 
-from collections.abc import Callable, Iterator, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import cast
+from typing import cast, overload
 
 import numpy as np
 from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
-from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
-from discrepancy.team.linear.chatter import NOISE_SEED
-from discrepancy.team.linear.filed import held, is_filed, rested
-from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
-from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.jacobian import by_signals
+from discrepancy.team.linear.noise import NOISE_SEED, Noise
 from discrepancy.team.linear.rest import Resting, Tolerances, draws_at_a_time
+from discrepancy.team.linear.rows import Reduction, Whitening
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
-from discrepancy.team.linear.whitening import Whitening
-from estimator.arm.unit import Arms
-from estimator.arrays import Array, inertia_parameters
+from discrepancy.team.linear.trial_linear import (
+    TrialLinear,
+    by_bases,
+    by_shared,
+    filtered,
+    given_back,
+    is_stored,
+    linearise,
+    stored,
+)
+from estimator.arm.arms import Arms
+from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.estimate.principal import inertia_matrix, inertia_parameters
 from estimator.estimate.result import PayloadEstimate
-from estimator.files import ends_with_this
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
-from estimator.rigid_team import (
+from estimator.rigid_team.residual import (
     Bases,
     Shared,
     balance,
     grasp_data,
+    pose_error,
     pose_residual,
     poses,
     start_bases,
 )
+from estimator.rigid_team.slots import PHI, TAU, THETA
+from estimator.signals.grasp_data import GraspData
+
+INERTIA_OFF = 0.3
+"""Relative error of the inertia up to which noise in moments is not drawn again."""
+
+
+def held_inertia(p_1i: Array, mass: float, p_1c: Array) -> Array:
+    """Inertia of a payload whose mass lies where it is held, about its centre of mass [kg m^2], shape (3, 3).
+
+    Args:
+        p_1i: origins of the grasp frames in {1} [m], shape (N, 3).
+        mass: [kg].
+        p_1c: centre of mass in {1} [m], shape (3,).
+    """
+    lever = p_1i - p_1c
+    spread = mass * lever.T @ lever / len(lever)
+    return np.asarray(np.trace(spread) * np.eye(3) - spread)
+
+
+def inertia_about_centre(shared: Shared) -> Array:
+    """About the centre of mass, in the axes of {1} [kg m^2], shape (3, 3)."""
+    mass, c = shared.pi[0], shared.pi[1:4] / shared.pi[0]
+    return np.asarray(inertia_matrix(shared.pi[4:]) - mass * (c @ c * np.eye(3) - np.outer(c, c)))
+
+
+def inertia_is_like_held(shared: Shared) -> Array:
+    """Information that an inertia is as it is to within that of a mass where it is held, (6 (N - 1) + 10,).
+
+    It counts beside what trials tell: axes about which a payload hardly turns keep what was taken for them.
+    """
+    mass, c = shared.pi[0], shared.pi[1:4] / shared.pi[0]
+    size = float(np.trace(held_inertia(shared.grasps.p_1i, mass, c))) / 3.0
+    known = np.zeros(6 * shared.grasps.robots + 4)
+    known[-6:] = 1.0 / max(size, 1e-6) ** 2
+    return known
+
+
+def is_another(a: Shared, b: Shared) -> bool:
+    """Whether noise that is turned into moments by a's inertia must be so again, by b's."""
+    first, second = inertia_about_centre(a), inertia_about_centre(b)
+    return bool(np.linalg.norm(first - second) > INERTIA_OFF * np.linalg.norm(second))
+
+
+@dataclass(frozen=True, eq=False)
+class SignalNoise:
+    """What a residual tells of the noise of every signal in a trial.
+
+    Attributes:
+        told: regression of the signals' noise on the residual's channels, in motion and in holds, (N, 21, C) each.
+    """
+
+    told: tuple[Array, Array]
+
+    @classmethod
+    def of(cls, rows: Array, signals: Array, moving: int) -> SignalNoise:
+        """From draws of the noise alone: residuals (D, n, C), reduced signals (D, n, N, 21)."""
+        kinds = slice(None, moving), slice(moving, None)
+        moves, holds = (_regression(rows[:, at], signals[:, at]) for at in kinds)
+        return cls((moves, holds))
+
+
+def _regression(rows: Array, signals: Array) -> Array:
+    """E[s r^T] E[r r^T]^-1, shape (N, 21, C); few draws tell of every channel by itself, none of nothing."""
+    r, s = rows.reshape(-1, rows.shape[2]), signals.reshape(-1, *signals.shape[2:])
+    squares, weight = r.T @ r, min(1.0, r.shape[1] / max(len(r), 1))
+    size = np.sqrt(np.maximum(np.diag(squares), 1e-300))
+    alike = (1.0 - weight) * squares / np.outer(size, size) + weight * np.diag(np.diag(squares) / size**2)
+    inverse = np.linalg.pinv(alike, hermitian=True) / np.outer(size, size)
+    return np.asarray(np.einsum("kns,kc->nsc", s, r, optimize=True) @ inverse)
+
+
+def with_adjusted_signals(
+    linear: TrialLinear, noise: SignalNoise, explained: Array | float = 0.0
+) -> TrialLinear:
+    """The trial linear at its signals moved the likeliest way that leaves no residual but what causes explain.
+
+    Columns of scales, lengths and masses are functions of the signals. At measured signals their noise is in column
+    and residual alike and biases them; at adjusted ones it is not (Deming, Statistical Adjustment of Data, 1943).
+
+    Args:
+        linear: the trial.
+        noise: what its residual tells of its signals.
+        explained: what causes put into every sample's residual, shape (Q, C).
+    """
+    shared, bases, arms = linear.shared, linear.bases, linear.arms
+    s = linear.s - _noise_in(linear.data, shared, bases, linear.reduction, noise, explained)
+    data = grasp_data(s, arms, linear.signals.rate_hz)
+    return replace(
+        linear,
+        s=s,
+        data=data,
+        J=by_signals(s, data, shared, bases, arms),
+        by_shared=linear.reduction(by_shared(data, shared, bases)),
+        by_bases=linear.reduction(by_bases(data, shared, bases)),
+    )
+
+
+def noise_of(
+    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise
+) -> Signals:
+    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3)."""
+    data = grasp_data(filtered(signals), linear.arms, signals.rate_hz)
+    each = _noise_in(data, shared, bases, linear.reduction, noise)
+    phi, theta, tau = (each[..., kind] for kind in (PHI, THETA, TAU))
+    return Signals(signals.time, phi, theta, tau, signals.rate_hz)
+
+
+def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise) -> Array:
+    """What has to be added to a residual so that its noise is as loud as where the trial is linear, rows (n, C).
+
+    Noise of accelerations is in the residual as often as there is mass, and that of a spring's reading at the lever of
+    its robot. Elsewhere it would be louder or quieter than its whitening says, and the quieter the likelier.
+    """
+    s = filtered(signals)
+    data = grasp_data(s, linear.arms, signals.rate_hz)
+    each = _noise_in(data, shared, bases, linear.reduction, noise)
+    quiet = grasp_data(s - each, linear.arms, signals.rate_hz)
+    here = _residual(data, shared, bases) - _residual(quiet, shared, bases)
+    there = sum(linear.J(robot, slice(None), each[:, robot]) for robot in range(linear.robots))
+    return linear.reduction(there - here)
+
+
+def _residual(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """Residual of every sample, shape (Q, 6 N)."""
+    return np.concatenate([pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1)
+
+
+def _noise_in(
+    data: GraspData,
+    shared: Shared,
+    bases: Bases,
+    reduction: Reduction,
+    noise: SignalNoise,
+    explained: Array | float = 0.0,
+) -> Array:
+    """Noise of every sample's signals, shape (Q, N, 21)."""
+    residual = _residual(data, shared, bases) - explained
+    held = np.zeros(len(residual), dtype=bool)
+    held[reduction.operator[reduction.moving :].indices] = True
+    moves, holds = (np.einsum("nsc,qc->qns", told, residual, optimize=True) for told in noise.told)
+    return np.where(held[:, None, None], holds, moves)
+
+
+LINEAR_BYTES = 1.5e8
+"""Size of all linear trials from which they are kept in files: seven minutes of three robots."""
+
+
+def held(trials: Iterable[TrialLinear]) -> tuple[TrialLinear, ...]:
+    """Trials one after the other, in files if together they take more memory than they should."""
+    out: list[TrialLinear] = []
+    total = 0
+    for trial in trials:
+        out.append(trial)
+        total += sum(x.nbytes for x in _arrays(trial))
+        if total > LINEAR_BYTES:
+            out = [filed(each) for each in out]
+    return tuple(out)
+
+
+def filed(trial: TrialLinear) -> TrialLinear:
+    """The same trial with its arrays in files."""
+    data, J = trial.data, trial.J
+    names = ("R_bi", "p_bi", "twist", "twist_dot", "wrench")
+    return replace(
+        trial, s=stored(trial.s), by_shared=stored(trial.by_shared), by_bases=stored(trial.by_bases),
+        data=replace(data, **{name: stored(getattr(data, name)) for name in names}),
+        J=replace(J, knots=tuple(map(stored, J.knots))),
+        reduction=_reduction(trial.reduction),
+    )  # fmt: skip
+
+
+def is_filed(trial: TrialLinear) -> bool:
+    """Whether a trial is in files."""
+    return is_stored(trial.s)
+
+
+def rested(trial: TrialLinear) -> None:
+    """Let the system take what a trial takes until it is asked for again."""
+    if is_filed(trial):
+        given_back(*_arrays(trial), *(x for x in (trial.__dict__.get("by_wrist"),) if x is not None))
+
+
+class OneByOne(Sequence[Array]):
+    """So many arrays, each made by its number whenever it is asked for."""
+
+    def __init__(self, of: Callable[[int], Array], count: int) -> None:
+        self._of, self._count = of, count
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, at: int) -> Array: ...
+    @overload
+    def __getitem__(self, at: slice) -> list[Array]: ...
+    def __getitem__(self, at: int | slice) -> Array | list[Array]:
+        where = range(self._count)[at]
+        return self._of(where) if isinstance(where, int) else [self._of(k) for k in where]
+
+
+def _reduction(reduction: Reduction) -> Reduction:
+    of = reduction.operator
+    if is_stored(of.data):
+        return reduction
+    operator = csr_array((stored(of.data), stored(of.indices), of.indptr), shape=of.shape)
+    return replace(reduction, operator=operator)
+
+
+def _arrays(trial: TrialLinear) -> Iterator[NDArray[np.generic]]:
+    """What is large of a trial."""
+    data, of = trial.data, trial.reduction.operator
+    yield from (trial.s, trial.by_shared, trial.by_bases, *trial.J.knots, of.data, of.indices)
+    yield from (data.R_bi, data.p_bi, data.twist, data.twist_dot, data.wrench)
+
+
+def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) -> TrialLinear:
+    """The trial where its bases fit it on average; without ``full`` the robots' signals are left out."""
+    signals, arms = noise.known_to(Signals.of(recording)), recording.metadata.arms
+    angles = signals.phi[signals.keep], signals.theta[signals.keep]
+    bases = start_bases(*poses(*angles, arms), shared)
+    return linearise(signals, shared, bases, arms, Reduction.of(signals), full=full, known=True)
+
+
+def without_bases(trial: TrialLinear, rows: Array) -> Array:
+    """Rows, shape (n, C), without what the bases' places can explain of them, every channel in its own scale."""
+    if not rows.size:
+        return rows
+    scale = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
+    columns = (trial.by_bases / scale[:, None]).reshape(rows.size, -1)
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    values = np.linalg.lstsq(columns / size, (rows / scale).ravel(), rcond=None)[0] / size
+    return rows - trial.by_bases @ values
+
 
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""

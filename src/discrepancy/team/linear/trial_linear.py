@@ -1,44 +1,130 @@
-"""One trial, linearised: its residual, how robots' signals and unknowns move it, and its whitening."""
+"""One trial, linearised: its residual's derivatives by signals, unknowns and what acts on the payload."""
+
+from __future__ import annotations
 
 import math
+import mmap
+import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.jacobian import BySignals, by_signals
-from discrepancy.team.linear.patches import Patches
-from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rows import Patches, Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.stored import is_stored, stored
+from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
-from estimator.arm.motion import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
-from estimator.arm.unit import Arms, arm_of, design_of
 from estimator.arrays import Array
-from estimator.rigid_team import (
-    Bases,
-    BodyMotion,
-    Shared,
-    balance,
-    fuse,
-    fusion_matrix,
-    grasp_data,
-    needed_wrench,
-    pose_residual,
-)
-from estimator.signals import GraspData
-from estimator.so3 import skew
+from estimator.estimate.fusion import BodyMotion, fuse, fusion_matrix
+from estimator.rigid_team.changes import needed_wrench
+from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual
+from estimator.rigid_team.slots import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
+from estimator.signals.grasp_data import GraspData
+from estimator.so3 import inverse_left_jacobian, skew
+
+Kind = TypeVar("Kind", bound=np.generic)
+
+
+def stored(x: NDArray[Kind]) -> NDArray[Kind]:
+    """The same numbers, to be read only, in a file that is gone with the array; where no file can be, the array.
+
+    They lie as they did: where components are apart in memory, sums over them have the same bits.
+    """
+    if not x.size or is_stored(x):
+        return x
+    order = np.argsort([-stride for stride in x.strides], kind="stable")
+    apart = x.transpose(order)
+    try:
+        with tempfile.TemporaryFile() as file:
+            np.ascontiguousarray(apart).tofile(file)
+            file.flush()
+            pages = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except OSError:  # a full disk
+        return x
+    return np.frombuffer(pages, dtype=x.dtype).reshape(apart.shape).transpose(np.argsort(order))
+
+
+def is_stored(x: NDArray[np.generic]) -> bool:
+    """Whether an array, or what it is a view of, is in a file."""
+    return _pages(x) is not None
+
+
+def given_back(*arrays: NDArray[np.generic]) -> None:
+    """Let the system take the memory of arrays that are stored, until they are read again; others stay."""
+    for x in arrays:
+        pages = _pages(x)
+        if pages is not None and hasattr(mmap, "MADV_DONTNEED"):
+            pages.madvise(mmap.MADV_DONTNEED)
+
+
+def _pages(x: object) -> mmap.mmap | None:
+    """What an array is a view of, where it is stored."""
+    while isinstance(x, np.ndarray):
+        x = x.base
+    x = x.obj if isinstance(x, memoryview) else x
+    return x if isinstance(x, mmap.mmap) else None
+
+
+STEP = 1e-5
+"""Step of grasps [rad, m], both ways, by which the balance of wrenches is differenced."""
+
+
+def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """Derivative of the residual's samples by ``Shared.moved``, shape (Q, 6 N, 6 (N - 1) + 10).
+
+    A loop knows its own robot's grasp alone. Its rotation is log(E), and a grasp that turns by d in {1} makes E
+    exp(-R_b1 d) of E.
+    """
+    N, split = data.robots, 6 * (data.robots - 1)
+    out = np.zeros((data.samples, 6 * N, split + 10))
+    out[:, split:, split:] = -balance(data, shared)[1]
+    for k in range(split):
+        step = STEP * np.eye(split + 10)[k]
+        ends = (balance(data, shared.moved(sign * step))[0] for sign in (1.0, -1.0))
+        out[:, split:, k] = (next(ends) - next(ends)) / (2.0 * STEP)
+    R_b1 = data.R_bi[:, 0]
+    for i in range(1, N):
+        about, along = _channels(i)
+        out[:, about, about] = -inverse_left_jacobian(-_turned(data, shared, bases, i)) @ R_b1
+        out[:, along, along] = -R_b1
+    return out
+
+
+def by_bases(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """The same by ``Bases.moved``, shape (Q, 6 N, 4 (N - 1)); E of a base that turns is exp(yaw z) E."""
+    N = data.robots
+    out = np.zeros((data.samples, 6 * N, 4 * (N - 1)))
+    for i in range(1, N):
+        (about, along), column = _channels(i), 4 * (i - 1)
+        out[:, along, column : column + 3] = np.eye(3)
+        out[:, about, column + 3] = inverse_left_jacobian(_turned(data, shared, bases, i))[..., 2]
+        out[:, along, column + 3] = np.cross([0.0, 0.0, 1.0], data.p_bi[:, i] @ bases.R[i].T)
+    return out
+
+
+def _channels(robot: int) -> tuple[slice, slice]:
+    """Rotation and position of one robot's loop (from 0)."""
+    return slice(6 * (robot - 1), 6 * robot - 3), slice(6 * robot - 3, 6 * robot)
+
+
+def _turned(data: GraspData, shared: Shared, bases: Bases, robot: int) -> Array:
+    """e_rot of one robot's loop, shape (Q, 3)."""
+    back = data.R_bi[:, 0] @ shared.grasps.R_1i[robot]
+    turned = bases.R[robot] @ data.R_bi[:, robot] @ np.swapaxes(back, -1, -2)
+    return np.asarray(Rotation.from_matrix(turned).as_rotvec(), dtype=np.float64)
+
 
 SHIFT_REACH_S = 0.5
 """Before and after a displacement in which its accelerations show. Derived: a filter of 20 Hz has died to 1e-6."""
 
 CHATTER_JACOBIAN_HZ = 10.0
-"""Cut-off of signals at which slopes are taken where something chatters. Derived: below half of
-``TEAM_JACOBIAN_HZ``."""
+"""Cut-off of signals at which slopes are taken where something chatters: below half of their rate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +167,7 @@ class TrialLinear:
 
     @cached_property
     def motion(self) -> BodyMotion:
-        """Of the payload, as all robots tell it."""
+        """Motion of the payload, fused from all robots."""
         return fuse(self.data, self.shared.grasps)
 
     @cached_property
@@ -92,7 +178,7 @@ class TrialLinear:
 
     @cached_property
     def wrist_accelerations(self) -> Array:
-        """Of every wrist in {b_i} [m/s^2], shape (Q, N, 3)."""
+        """Acceleration of every wrist in {b_i} [m/s^2], shape (Q, N, 3)."""
         each = [
             wrist_motion(leg_geometry(s[:, PHI], self.arm(i)), s[:, PHI_DOT], s[:, PHI_DDOT])[1]
             for i, s in enumerate(np.moveaxis(self.s, 1, 0))
@@ -149,11 +235,7 @@ class TrialLinear:
         angles = self.signals.with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0))
         # (3, Q, N, 2, 3, D) to slots, which are value, rate and acceleration of phi, then of theta, then tau
         parts = np.concatenate(
-            [
-                np.moveaxis(angles, 0, 3).reshape(samples, N, 18, D),
-                np.moveaxis(tau, 0, -1),
-            ],
-            axis=2,
+            [np.moveaxis(angles, 0, 3).reshape(samples, N, 18, D), np.moveaxis(tau, 0, -1)], axis=2
         )
         total = self.J(0, slice(None), parts[:, 0])
         for i in range(1, N):

@@ -1,0 +1,421 @@
+"""Mechanics of a tree of hinges and slides, all samples of a log at once."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+# mujoco's compiled modules come without types.
+# pyright: reportAttributeAccessIssue=false
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Bodies in an order in which parents come first; body 0 is the world. B bodies, J joints.
+
+    Attributes:
+        parent: of every body, shape (B,).
+        position, rotation: of every body's frame in its parent's, all joints at ``zero``, shapes (B, 3), (B, 3, 3).
+        joint_body: which body a joint moves, shape (J,).
+        slides: whether it slides, shape (J,).
+        anchor, axis: a point on the joint's axis and its direction, in the frame of its body, shapes (J, 3).
+        zero: joint position at which the frames are as said, shape (J,).
+        mass: shape (B,) [kg].
+        com: centres of mass in the frames of their bodies, shape (B, 3) [m].
+        inertia: about the centres of mass, along the bodies' frames, shape (B, 3, 3) [kg m^2].
+        gravity: in the frame of the world, shape (3,) [m/s^2].
+        armature: inertia of the rotors as the joints feel it, shape (J,).
+        coulomb, viscous: dry friction [N m or N] and damping per rad/s or m/s of every joint, shape (J,).
+    """
+
+    parent: NDArray[np.intp]
+    position: Array
+    rotation: Array
+    joint_body: NDArray[np.intp]
+    slides: NDArray[np.bool_]
+    anchor: Array
+    axis: Array
+    zero: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    gravity: Array
+    armature: Array
+    coulomb: Array
+    viscous: Array
+
+    @classmethod
+    def of(cls, model: Any) -> Tree:
+        """From a compiled ``mujoco.MjModel`` of hinges and slides."""
+        own = _rotations(model.body_iquat)
+        return cls(
+            parent=np.asarray(model.body_parentid, dtype=np.intp),
+            position=np.array(model.body_pos),
+            rotation=_rotations(model.body_quat),
+            joint_body=np.asarray(model.jnt_bodyid, dtype=np.intp),
+            slides=np.asarray(model.jnt_type) == 2,  # mjJNT_SLIDE
+            anchor=np.array(model.jnt_pos),
+            axis=np.array(model.jnt_axis),
+            zero=np.array(model.qpos0),
+            mass=np.array(model.body_mass),
+            com=np.array(model.body_ipos),
+            inertia=own @ (model.body_inertia[:, :, None] * own.swapaxes(1, 2)),
+            gravity=np.array(model.opt.gravity),
+            armature=np.array(model.dof_armature),
+            coulomb=np.array(model.dof_frictionloss),
+            viscous=np.array(model.dof_damping),
+        )
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """Which joints move which bodies, shape (J, B)."""
+        out = np.zeros((len(self.joint_body), len(self.parent)), dtype=bool)
+        for b in range(1, len(self.parent)):
+            out[:, b] = out[:, self.parent[b]] | (self.joint_body == b)
+        return out
+
+    @property
+    def last_link(self) -> int:
+        """The joint that moves the last link: the one with the longest way to the base."""
+        ways = self.moved[:, self.joint_body].sum(axis=0)
+        return int(np.flatnonzero(ways == ways.max())[-1])
+
+    @property
+    def links(self) -> NDArray[np.intp]:
+        """Bodies that move and have mass: those whose inertias can show."""
+        return np.flatnonzero(self.moved.any(axis=0) & (self.mass > 0))
+
+
+def _rotations(quaternions: Array) -> Array:
+    """Rotation matrices of quaternions (w, x, y, z), shape (B, 4) -> (B, 3, 3)."""
+    return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion at Q samples; vectors in the world's axes, origins those of the bodies' frames.
+
+    Attributes:
+        tree: what moves.
+        rotation: of every body in the world, shape (B, Q, 3, 3).
+        origin: shape (B, Q, 3) [m].
+        omega, alpha: angular velocity and acceleration, shape (B, Q, 3).
+        acceleration: of the origins, less gravity's, shape (B, Q, 3) [m/s^2].
+        axis, anchor: of every joint, shape (J, Q, 3).
+        known: what ``regressor`` made of it: torques per unit of a body's numbers, and those of all bodies under None.
+    """
+
+    tree: Tree
+    rotation: Array
+    origin: Array
+    omega: Array
+    alpha: Array
+    acceleration: Array
+    axis: Array
+    anchor: Array
+    known: dict[int | None, Array] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, tree: Tree, q: Array, dq: Array, ddq: Array) -> Motion:
+        """Motion of all bodies from joint positions, velocities and accelerations, shape (Q, J) each."""
+        Q, B, J = len(q), len(tree.parent), len(tree.joint_body)
+        R = np.moveaxis(np.zeros((B, 3, 3, Q)), -1, 1)
+        p, w, al, a = (vectors(B, Q) for _ in range(4))
+        axis, anchor = vectors(J, Q), vectors(J, Q)
+        R[0], a[0] = np.eye(3), -tree.gravity
+        for b in range(1, B):
+            up = tree.parent[b]
+            lever = turned(R[up], tree.position[b])
+            Rb, pb = turned_frame(R[up], tree.rotation[b]), p[up] + lever
+            wb, alb, ab = w[up], al[up], a[up] + rigid(w[up], al[up], lever)
+            for j in np.flatnonzero(tree.joint_body == b):
+                s, to = turned(Rb, tree.axis[j]), turned(Rb, tree.anchor[j])
+                axis[j], anchor[j] = s, pb + to
+                rate, turn = s * dq[:, j, None], q[:, j] - tree.zero[j]
+                if tree.slides[j]:
+                    shift = s * turn[:, None]
+                    ab = ab + rigid(wb, alb, shift) + 2.0 * cross(wb, rate) + s * ddq[:, j, None]
+                    pb = pb + shift
+                    continue
+                off = tree.anchor[j].any()  # most bodies' frames are on the axis
+                ab = ab + rigid(wb, alb, to) if off else ab
+                alb = alb + s * ddq[:, j, None] + cross(wb, rate)
+                wb = wb + rate
+                Rb = _about(Rb, tree.axis[j], turn)
+                if off:
+                    back = -turned(Rb, tree.anchor[j])
+                    pb, ab = anchor[j] + back, ab + rigid(wb, alb, back)
+            R[b], p[b], w[b], al[b], a[b] = Rb, pb, wb, alb, ab
+        return cls(tree, R, p, w, al, a, axis, anchor)
+
+
+def rigid(omega: Array, alpha: Array, lever: Array) -> Array:
+    """Acceleration of a point over that of another of the same body, alpha x r + omega x (omega x r), shape (Q, 3)."""
+    return cross(alpha, lever) + cross(omega, cross(omega, lever))
+
+
+def vectors(*shape: int) -> Array:
+    """Vectors of zero, shape (..., Q, 3); a component's samples follow each other: faster for all made of them."""
+    return np.swapaxes(np.zeros((*shape[:-1], 3, shape[-1])), -1, -2)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product along the last axis; many times as fast as numpy's."""
+    out = np.empty((3, *np.broadcast_shapes(a.shape, b.shape)[:-1]))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.multiply(a[..., i], b[..., j], out=out[k])
+        out[k] -= a[..., j] * b[..., i]
+    return np.moveaxis(out, 0, -1)
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Scalar product along the last axis."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+
+
+def turned(R: Array, v: Array) -> Array:
+    """R v, shapes (Q, 3, 3), (Q, 3) or (3,) -> (Q, 3)."""
+    out = np.empty((3, len(R)))
+    for i in range(3):
+        np.multiply(R[:, i, 0], v[..., 0], out=out[i])
+        out[i] += R[:, i, 1] * v[..., 1]
+        out[i] += R[:, i, 2] * v[..., 2]
+    return out.T
+
+
+def times(C: Array, v: Array) -> Array:
+    """C v with one constant C, shapes (3, 3), (Q, 3) -> (Q, 3)."""
+    return (C @ v.T).T
+
+
+def turned_frame(R: Array, C: Array) -> Array:
+    """R C with one constant C, shapes (Q, 3, 3), (3, 3) -> (Q, 3, 3)."""
+    out = np.zeros((3, 3, len(R)))
+    for k, j in zip(*np.nonzero(C), strict=True):  # most are turns about an axis
+        out[:, j] += R[:, :, k].T * C[k, j]
+    return np.moveaxis(out, -1, 0)
+
+
+def _about(R: Array, axis: Array, angle: Array) -> Array:
+    """R turned on about an axis of its own by Rodrigues' formula, shapes (Q, 3, 3), (3,), (Q,) -> (Q, 3, 3)."""
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, rest = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]
+    return R + sine * turned_frame(R, K) + rest * turned_frame(R, K @ K)
+
+
+def inverse_torque(model: mujoco.MjModel, q: Array, dq: Array, ddq: Array) -> Array:
+    """Torques of a motion, shape (Q, J): inertia with armature, gravity and springs, but nothing that rubs.
+
+    Contacts, limits and dry friction are constraints of MuJoCo, and off; so is the joints' damping.
+
+    Args:
+        model: compiled, joints of one degree of freedom only.
+        q, dq, ddq: joint positions and their derivatives, shape (Q, J).
+    """
+    bare = copy.copy(model)
+    bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    bare.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)  # ddq is the motion's, not a step's
+    bare.dof_damping[:] = 0.0
+    data = mujoco.MjData(bare)
+    out = np.empty_like(q)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]
+        mujoco.mj_inverse(bare, data)
+        out[k] = data.qfrc_inverse
+    return out
+
+
+PARAMETERS = ("m", "hx", "hy", "hz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+"""Mass [kg], first moments [kg m] and inertia about the origin of the body's frame [kg m^2], along that frame."""
+
+
+def inertial_parameters(mass: float, com: Array, inertia: Array) -> Array:
+    """The ten numbers of a body of a mass, a centre and an inertia about that centre, shape (10,)."""
+    about = inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return np.array([mass, *(mass * com), *np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
+
+
+def body_regressor(motion: Motion, body: int) -> Array:
+    """Joint torques per unit of each of a body's ten numbers, shape (Q, J, 10); kept with the motion."""
+    if body not in motion.known:
+        motion.known[body] = _body_regressor(motion, body)
+    return motion.known[body]
+
+
+def _body_regressor(motion: Motion, body: int) -> Array:
+    tree = motion.tree
+    R, a = motion.rotation[body], motion.acceleration[body]
+    w, al = motion.omega[body], motion.alpha[body]
+    own = R.swapaxes(1, 2)  # to the body's axes
+    wb, alb = turned(own, w), turned(own, al)
+    inner = [turned(R, times(E, alb) + cross(wb, times(E, wb))) for E in _unit_inertias()]
+    axes = [R[..., k] for k in range(3)]
+    by_axis = [cross(al, e) + cross(w, cross(w, e)) for e in axes]
+    by_acceleration = [cross(e, a) for e in axes]
+    out = np.moveaxis(np.zeros((len(tree.joint_body), 10, len(a))), -1, 0)
+    for j in np.flatnonzero(tree.moved[:, body]):
+        s = motion.axis[j]
+        # s . (r x f) = (s x r) . f
+        force = s if tree.slides[j] else cross(s, motion.origin[body] - motion.anchor[j])
+        out[:, j, 0] = dot(force, a)
+        for k in range(3):
+            out[:, j, 1 + k] = dot(force, by_axis[k])
+            if not tree.slides[j]:
+                out[:, j, 1 + k] += dot(s, by_acceleration[k])
+        for k in range(0 if tree.slides[j] else 6):
+            out[:, j, 4 + k] = dot(s, inner[k])
+    return out
+
+
+def rigid_torque(motion: Motion) -> Array:
+    """Torques of all joints that the tree's rigid bodies need, shape (Q, J); kept with the motion."""
+    if None not in motion.known:
+        motion.known[None] = _rigid_torque(motion)
+    return motion.known[None]
+
+
+def _rigid_torque(motion: Motion) -> Array:
+    tree, samples = motion.tree, motion.origin.shape[1]
+    force, moment = vectors(len(tree.parent), samples), vectors(len(tree.parent), samples)
+    out = np.zeros((len(tree.joint_body), samples)).T
+    for b in range(len(tree.parent) - 1, 0, -1):
+        if tree.mass[b]:  # a fit may pass through masses below zero
+            R, w, al = motion.rotation[b], motion.omega[b], motion.alpha[b]
+            own = R.swapaxes(1, 2)
+            lever = turned(R, tree.com[b])
+            f = tree.mass[b] * (motion.acceleration[b] + rigid(w, al, lever))
+            spin, change = (turned(R, times(tree.inertia[b], turned(own, x))) for x in (w, al))
+            force[b] += f
+            moment[b] += change + cross(w, spin) + cross(lever, f)
+        for j in np.flatnonzero(tree.joint_body == b):
+            s = motion.axis[j]
+            if tree.slides[j]:
+                out[:, j] = dot(s, force[b])
+            else:
+                out[:, j] = dot(s, moment[b] + cross(motion.origin[b] - motion.anchor[j], force[b]))
+        up = tree.parent[b]
+        force[up] += force[b]
+        moment[up] += moment[b] + cross(motion.origin[b] - motion.origin[up], force[b])
+    return out
+
+
+def torque_of(tree: Tree, q: Array, dq: Array, ddq: Array) -> Array:
+    """The same from joint positions, velocities and accelerations, shape (Q, J) each."""
+    return rigid_torque(Motion.of(tree, q, dq, ddq))
+
+
+def force_torque(motion: Motion, body: int, point: Array) -> Array:
+    """Joint torques per newton of a force on a body along each of the world's axes, shape (Q, J, 3).
+
+    Args:
+        motion: of the tree.
+        body: which is pushed.
+        point: where, in the body's frame [m], shape (3,).
+    """
+    tree = motion.tree
+    at = motion.origin[body] + turned(motion.rotation[body], point)
+    out = np.zeros((at.shape[0], len(tree.joint_body), 3))
+    for j in np.flatnonzero(tree.moved[:, body]):
+        s = motion.axis[j]
+        out[:, j] = s if tree.slides[j] else cross(s, at - motion.anchor[j])
+    return out
+
+
+@cache
+def _unit_inertias() -> list[Array]:
+    """The last six of the parameters, one unit each, as matrices."""
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    return [np.array([[float({i, j} == {a, b}) for j in range(3)] for i in range(3)]) for a, b in pairs]
+
+
+def carried(tree: Tree) -> Array:
+    """Which bodies hang on which, each on itself, as 0 and 1, shape (B, B): [upper, lower]."""
+    out = np.eye(len(tree.parent))
+    for b in range(1, len(tree.parent)):
+        out[:, b] += out[:, tree.parent[b]]
+    return out
+
+
+def by_acceleration(motion: Motion) -> Array:
+    """Joint torques per unit of an acceleration of everything along each of the world's axes, shape (Q, J, 3).
+
+    Gravity of -1 m/s^2 does the same.
+    """
+    tree = motion.tree
+    mass, moment = _masses(motion)
+    out = np.zeros((motion.origin.shape[1], len(tree.joint_body), 3))
+    for j, b in enumerate(tree.joint_body):
+        s = motion.axis[j]
+        arm = moment[b] - mass[b] * motion.anchor[j]
+        out[:, j] = s * mass[b] if tree.slides[j] else cross(s, arm)
+    return out
+
+
+def by_displacement(motion: Motion, body: int) -> Array:
+    """Joint torques per metre by which a body's frame is displaced in its parent's, along its axes, shape (Q, J, 3).
+
+    All that hangs on it moves along: its accelerations change as the parent turns, and its levers.
+    """
+    tree, up = motion.tree, motion.tree.parent[body]
+    mass, moment = _masses(motion)
+    below = np.flatnonzero(carried(tree)[body])
+    force = sum((_force(motion, int(b)) for b in below if tree.mass[b]), np.zeros_like(motion.origin[0]))
+    out = np.zeros((motion.origin.shape[1], len(tree.joint_body), 3))
+    for k in range(3):
+        d = motion.rotation[up][:, :, k]
+        a = rigid(motion.omega[up], motion.alpha[up], d)
+        for j, own in enumerate(tree.joint_body):
+            s, anchor = motion.axis[j], motion.anchor[j]
+            if own in below:
+                push, turn = mass[own] * a, cross(moment[own] - mass[own] * anchor, a)
+            elif tree.moved[j, body]:
+                push = mass[body] * a
+                turn = cross(d, force) + cross(moment[body] - mass[body] * anchor, a)
+            else:
+                continue
+            out[:, j, k] = np.sum(s * (push if tree.slides[j] else turn), axis=1)
+    return out
+
+
+def _masses(motion: Motion) -> tuple[Array, Array]:
+    """Mass of what hangs on every body, shape (B,), and its first moment about the world's origin, (B, Q, 3)."""
+    tree = motion.tree
+    below = carried(tree)
+    centres = motion.origin + np.einsum("bqij,bj->bqi", motion.rotation, tree.com)
+    return below @ tree.mass, np.einsum("ab,bqi->aqi", below, tree.mass[:, None, None] * centres)
+
+
+def _force(motion: Motion, body: int) -> Array:
+    """Force that a body's motion needs, shape (Q, 3)."""
+    lever = motion.rotation[body] @ motion.tree.com[body]
+    a = motion.acceleration[body] + rigid(motion.omega[body], motion.alpha[body], lever)
+    return motion.tree.mass[body] * a
+
+
+def horizontal(gravity: Array) -> Array:
+    """Two horizontal axes, shape (2, 3)."""
+    return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
+
+
+def with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
+    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
+    total = max(mass + float(load[0]), 0.05 * mass)
+    centre = (mass * com + load[1:4]) / total
+    xx, yy, zz, xy, xz, yz = load[4:]
+    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def about(c: Array) -> Array:
+        return c @ c * np.eye(3) - np.outer(c, c)
+
+    return total, centre, inertia + mass * about(com) + more - total * about(centre)

@@ -1,1 +1,0 @@
-"""The model and the extended model simulated, and held against the logs."""

@@ -1,0 +1,409 @@
+"""Drives that tell no torque: what a motor makes of its voltage or current, and what the loop makes of an error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from discrepancy.joints.mechanics import Tree, inverse_torque
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.signals import Signals
+from estimator.arrays import Array
+from estimator.errors import InputError
+from estimator.filtering import low_pass
+from estimator.statistics import measured
+from mocobot_logs.joints.joint_log import JointLog
+
+MOTOR_SHARE, MOVES_THROUGHOUT = 0.5, 0.98
+"""Cut-off of the fit over the rows', and the share of its filter's window in which the joint moves."""
+LEAST_DRIVEN_SHARE = 0.1
+"""Least share of the drive's input squared that the model's torque explains: otherwise the joint only rubs."""
+
+
+@dataclass(frozen=True)
+class Motor:
+    """What a drive gives per unit of what the logs have.
+
+    Attributes:
+        joint: which, from 0.
+        torque_per_unit: at standstill, at the joint [N m or N per ``unit``].
+        unit: ``V``, ``full duty`` or ``A``.
+    """
+
+    joint: int
+    torque_per_unit: float
+    unit: str
+
+    def sentence(self, name: str) -> str:
+        """What is to be said of it."""
+        speed = "" if self.unit == "A" else "; what that loses to speed counts as viscous, or as back-EMF"
+        return (
+            f"Torques of joint {name} are taken as {self.torque_per_unit:.4g} (N m, or N of a slide) per {self.unit} "
+            f"that its drive was given, as the model's masses have it{speed}."
+        )
+
+
+def with_torques(
+    model: SerialModel, logs: Sequence[JointLog]
+) -> tuple[tuple[JointLog, ...], tuple[Motor, ...]]:
+    """The logs with torques of every joint that has a duty or a current in all of them, and what these are worth.
+
+    A voltage gives a torque at standstill that is in proportion to it; what it loses to the speed (back-EMF) is left to
+    the causes. How much per volt follows from the model: with masses as drawn, or as wrong as these are.
+
+    Args:
+        model: the robot as described.
+        logs: of it, those of the reference included.
+
+    Raises:
+        InputError: a drive does not go with what the model asks for.
+    """
+    raw, unit = _raw(logs, len(model.joints))
+    unknown = [j for j, name in enumerate(unit) if name]
+    if not unknown:
+        return tuple(logs), ()
+    tree, inverse = Tree.of(model.model), partial(inverse_torque, model.model)
+    signals = [
+        Signals.of(replace(log, torque=own), tree, inverse) for log, own in zip(logs, raw, strict=True)
+    ]
+    motors = [_motor(signals, j, unit[j], model.joints[j]) for j in unknown]
+    out = []
+    for log, own in zip(logs, raw, strict=True):
+        torque = np.full(log.q.shape, np.nan) if log.torque is None else log.torque.copy()
+        for motor in motors:
+            torque[:, motor.joint] = own[:, motor.joint] * motor.torque_per_unit
+        out.append(replace(log, torque=torque))
+    return tuple(out), tuple(motors)
+
+
+def driven_by_voltage(motors: Sequence[Motor], joints: int) -> np.ndarray:
+    """Which joints' torques come from a voltage or a duty, so that speed costs torque, shape (J,)."""
+    out = np.zeros(joints, dtype=bool)
+    out[[motor.joint for motor in motors if motor.unit != "A"]] = True
+    return out
+
+
+def _raw(logs: Sequence[JointLog], joints: int) -> tuple[list[Array], list[str]]:
+    """What drives of unknown constants were given in every log (Q, J), and its unit; empty where torques are known."""
+    volts = all(log.drive.supply_V is not None for log in logs)
+    unit = []
+    for j in range(joints):
+        told = [log.torque is not None and bool(np.isfinite(log.torque[:, j]).any()) for log in logs]
+        free = [bool(np.isnan(log.drive.torque_constant[j])) for log in logs]
+        duty = [log.drive.duty is not None and bool(np.isfinite(log.drive.duty[:, j]).any()) for log in logs]
+        if all(told) and not any(free):
+            unit.append("")
+        elif all(told):
+            unit.append("A")
+        elif all(duty):
+            unit.append("V" if volts else "full duty")
+        else:
+            unit.append("")
+    raw = []
+    for log in logs:
+        own = np.full(log.q.shape, np.nan) if log.torque is None else log.torque.copy()
+        for j, name in enumerate(unit):
+            if name in ("V", "full duty") and log.drive.duty is not None:
+                supply = log.drive.supply_V if name == "V" else None
+                own[:, j] = log.drive.duty[:, j] * (1.0 if supply is None else supply)
+        raw.append(own)
+    return raw, unit
+
+
+def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
+    """By least squares: what the drive was given is torque over its constant, plus friction, back-EMF, rotor, offset.
+
+    Friction by load is among them, or a servo that mostly lifts would seem to give less. At rest friction is anything.
+    """
+    left, right = [], []
+    for s in signals:
+        side, load, speed = np.clip(s.dq[:, j] / s.slow[j], -1.0, 1.0), s.inverse[:, j], s.dq[:, j]
+        on = np.ones(len(speed)) if s.enabled is None else s.enabled
+        cutoff = MOTOR_SHARE * s.cutoff_hz
+        # Noise has no sign, and would be a load where there is none.
+        passed = np.abs(low_pass(load, s.rate_hz, cutoff))
+        each = [
+            load,
+            side,
+            passed * side,
+            speed,
+            on * speed,
+            s.ddq[:, j],
+            np.ones(len(speed)),
+            s.torque[:, j],
+        ]
+        smooth = low_pass(np.column_stack(each), s.rate_hz, cutoff)
+        moves = (s.usable[:, j] & (np.abs(speed) > s.slow[j])).astype(float)
+        at = low_pass(moves[:, None], s.rate_hz, cutoff)[:, 0] > MOVES_THROUGHOUT
+        left.append(smooth[at, :-1])
+        right.append(smooth[at, -1])
+    A, b = np.concatenate(left), np.concatenate(right)
+    size = np.linalg.norm(A, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    found = np.linalg.lstsq(A / size, b, rcond=None)[0] / size
+    part = found[0] * A[:, 0]
+    if found[0] <= 0 or np.sum(part**2) < LEAST_DRIVEN_SHARE * np.sum(b**2):
+        raise InputError(
+            f"{signals[0].log.name}: the drive of joint {name} does not go with the torque that the model asks for; "
+            "`mocobot inspect` looks for wrong signs and joints"
+        )
+    return Motor(j, float(1.0 / found[0]), unit)
+
+
+MOST_LOOP_SHARE = 0.1
+"""Share of a duty's variance that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
+LATE_S = 1e-3
+"""Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
+CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
+"""Saturation: share of the largest duty, share of the time above it, samples left out around it."""
+LOOP_STRETCH_S = 1.0
+"""Stretches whose scatter gives a loop's standard errors. Chosen: longer than any loop remembers."""
+LEAST_ROWS = 40
+"""That a block must have to be one. Chosen."""
+
+
+@dataclass(frozen=True)
+class LoopLaw:
+    """A proportional loop at one joint: output = gain * (error ``late_s`` ago) + offset, cut off at ``limit``.
+
+    Attributes:
+        joint: which, from 0.
+        gain: of the position loop as the map has it, NaN where that is not known.
+        per_rad: output per rad or m of error.
+        se: its standard error, from the scatter between stretches of a second.
+        late_s: how long the loop takes, the readings' own lag included [s].
+        offset: in the output's unit.
+        limit: most that was given where the loop was cut off; inf where it was not.
+        left: root mean square of what the law leaves, in the output's unit.
+        share: of the output's variance that it leaves.
+        logs: how many it was fitted to.
+    """
+
+    joint: int
+    gain: float
+    per_rad: float
+    se: float
+    late_s: float
+    offset: float
+    limit: float
+    left: float
+    share: float
+    logs: int
+
+
+def loop_laws(logs: Sequence[JointLog]) -> list[LoopLaw]:
+    """The laws of all joints with a position command and a duty, one per gain.
+
+    Args:
+        logs: of one robot; those whose drives are commanded something else are left out.
+    """
+    told = [log for log in logs if _commanded(log)]
+    if not told:
+        return []
+    laws = []
+    for j in range(len(told[0].joints)):
+        by_gain: dict[float, list[JointLog]] = {}
+        for log in told:
+            if log.command is not None and log.drive.duty is not None:
+                here = np.isfinite(log.command[:, j]) & np.isfinite(log.drive.duty[:, j])
+                if here.any():
+                    gain = float(log.drive.position_gain[j])
+                    by_gain.setdefault(-1.0 if np.isnan(gain) else gain, []).append(log)
+        for gain, own in sorted(by_gain.items()):
+            law = _law(own, j, gain if gain > 0 else np.nan)
+            if law is not None:
+                laws.append(law)
+    return laws
+
+
+def sentences(laws: Sequence[LoopLaw], joints: Sequence[str]) -> Iterator[str]:
+    """What is to be said of them, one sentence per joint.
+
+    Args:
+        laws: of ``loop_laws``.
+        joints: names.
+    """
+    for j in dict.fromkeys(law.joint for law in laws):
+        own = [law for law in laws if law.joint == j]
+        good = [law for law in own if law.share < MOST_LOOP_SHARE]
+        if not good:
+            yield f"Loop of joint {joints[j]}: its duty does not go with the error of its position."
+            continue
+        said = ", ".join(_said(law) for law in good)
+        per_gain = np.array([law.per_rad / law.gain for law in good])
+        more = ""
+        if len(good) > 1 and np.isfinite(per_gain).all():
+            off = np.ptp(per_gain) / per_gain.mean()
+            more = f"; {per_gain.mean():.4g} per rad and unit of gain, the same within {100.0 * off:.1f} %"
+        late, left = float(np.median([law.late_s for law in good])), max(law.left for law in good)
+        delay = f"is {1e3 * late:.1f} ms late and " if abs(late) > LATE_S else ""
+        yield f"Loop of joint {joints[j]}: {said}{more}. It {delay}leaves {left:.2g} of full duty at most (rms)."
+
+
+def _said(law: LoopLaw) -> str:
+    value, se = measured(law.per_rad, law.se)
+    at = "" if np.isnan(law.gain) else f" at gain {law.gain:g}"
+    cut = "" if np.isinf(law.limit) else f" (cut off at {law.limit:.3g})"
+    return f"{value} +- {se} of full duty per rad of error{at}{cut}"
+
+
+def _commanded(log: JointLog) -> bool:
+    return log.drive.command == "position" and log.command is not None and log.drive.duty is not None
+
+
+def _law(logs: Sequence[JointLog], j: int, gain: float) -> LoopLaw | None:
+    peak = min(max(float(np.nanmax(np.abs(_duty(log, j)))) for log in logs), 1.0)  # resampling overshoots
+    rows, outputs, stretches, every = [], [], [], []
+    for log in logs:
+        assert log.command is not None
+        error, duty = log.command[:, j] - log.q[:, j], _duty(log, j)
+        rate = np.gradient(error, log.period_s)
+        here = log.usable & np.isfinite(error) & np.isfinite(duty)
+        if log.enabled is not None:
+            here &= log.enabled
+        here[[0, -1]] = False
+        columns = np.column_stack([error, -rate, np.ones(len(error))])
+        every.append(columns[here])
+        # What may be cut off does not follow the law.
+        here &= maximum_filter1d(np.abs(duty), CUT_OFF_SAMPLES) < CUT_OFF_SHARE * peak
+        rows.append(columns[here])
+        outputs.append(duty[here])
+        start = stretches[-1].max(initial=0) + 1 if stretches else 0
+        stretches.append((start + log.time / LOOP_STRETCH_S).astype(int)[here])
+    A, b, stretch = np.concatenate(rows), np.concatenate(outputs), np.concatenate(stretches)
+    if len(b) < LEAST_ROWS or np.linalg.matrix_rank(A) < A.shape[1]:
+        return None
+    normal = np.linalg.inv(A.T @ A)
+    found = normal @ (A.T @ b)
+    left = b - A @ found
+    scores = np.array([A[stretch == k].T @ left[stretch == k] for k in np.unique(stretch)])
+    covariance = normal @ (scores.T @ scores) @ normal
+    beyond = np.abs(np.concatenate(every) @ found) > peak / CUT_OFF_SHARE
+    cut = np.mean(beyond) > LEAST_CUT_OFF
+    share = float(np.sum(left**2) / max(np.sum((b - b.mean()) ** 2), 1e-300))
+    return LoopLaw(
+        j, gain, float(found[0]), float(np.sqrt(covariance[0, 0])), float(found[1] / found[0]), float(found[2]),
+        peak if cut else np.inf, float(np.sqrt(np.mean(left**2))), share, len(logs),
+    )  # fmt: skip
+
+
+def _duty(log: JointLog, j: int) -> Array:
+    assert log.drive.duty is not None
+    return log.drive.duty[:, j]
+
+
+@dataclass(frozen=True)
+class Servo:
+    """The loop of one joint: output = ``per_rad`` (command - position) - ``damping`` velocity, cut off at ``limit``.
+
+    Attributes:
+        joint: which, from 0.
+        per_rad: output per rad or m of error.
+        damping: output per rad/s or m/s.
+        limit: most that it gives.
+        torque: of one unit of output at standstill [N m or N].
+        by_supply: whether that is per volt of supply: the output is a duty.
+    """
+
+    joint: int
+    per_rad: float
+    damping: float
+    limit: float
+    torque: float
+    by_supply: bool
+
+
+def servo_of(
+    log: JointLog, j: int, motors: Sequence[Motor], laws: Sequence[LoopLaw], name: str
+) -> Servo | str:
+    """The loop of a joint by the map's gains or, where these are a firmware's, by what logs have; or why there is none.
+
+    Args:
+        log: with the commands.
+        j: the joint, from 0.
+        motors: what drives that are told by duties give.
+        laws: of loops, fitted to logs that are not to be simulated.
+        name: of the joint.
+    """
+    drive = log.drive
+    if drive.command != "position":
+        said = "no command is logged" if drive.command == "none" else f"it is commanded a {drive.command}"
+        return f"joint {name}: {said}, and the loop that is simulated is a position's"
+    if log.command is None or not np.isfinite(log.command[:, j]).any():
+        return f"joint {name}: no command is logged"
+    gain, damping, limit = (float(x[j]) for x in (drive.position_gain, drive.velocity_gain, drive.limit))
+    damping = 0.0 if np.isnan(damping) else damping
+    limit = np.inf if np.isnan(limit) else limit
+    if drive.gain_of == "torque":
+        if np.isnan(gain):
+            return f"joint {name}: the map has no position_gain"
+        return Servo(j, gain, damping, limit, 1.0, by_supply=False)
+    if drive.gain_of == "velocity":
+        return f"joint {name}: what torque its velocity loop gives is not known"
+    motor = next((motor for motor in motors if motor.joint == j and motor.unit != "A"), None)
+    if motor is None:
+        return f"joint {name}: what torque a duty gives is not known"
+    if drive.gain_of == "firmware" or np.isnan(gain):
+        per_rad = _fitted(laws, j, gain)
+        if per_rad is None:
+            return f"joint {name}: the duties of other logs tell no law of its loop"
+        gain, damping = per_rad, 0.0
+    return Servo(j, gain, damping, min(limit, 1.0), motor.torque_per_unit, by_supply=motor.unit == "V")
+
+
+def _fitted(laws: Sequence[LoopLaw], j: int, gain: float) -> float | None:
+    """Output per rad at a gain: as it was fitted there, or as laws at other gains have it per unit of gain."""
+    good = [law for law in laws if law.joint == j and law.share < MOST_LOOP_SHARE]
+    same = [law.per_rad for law in good if law.gain == gain or (np.isnan(law.gain) and np.isnan(gain))]
+    if same:
+        return same[0]
+    each = [law.per_rad / law.gain for law in good if np.isfinite(law.gain)]
+    return float(np.mean(each)) * gain if each and np.isfinite(gain) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Commanded:
+    """Torques as the log would have them, of servos that follow its commands.
+
+    Attributes:
+        servos: of joints that have one.
+        time: of the samples, even [s], shape (Q,).
+        command: held from sample to sample, shape (Q, J).
+        supply_V: shape (Q,); 1 where no servo needs it.
+        on: whether the drives are on, shape (Q,).
+    """
+
+    servos: tuple[Servo, ...]
+    time: Array
+    command: Array
+    supply_V: Array
+    on: Array
+
+    @classmethod
+    def of(cls, log: JointLog, servos: Sequence[Servo]) -> Commanded:
+        """With the commands of a log."""
+        assert log.command is not None
+        count = len(log.time)
+        on = np.ones(count) if log.enabled is None else log.enabled.astype(float)
+        supply = np.ones(count) if log.drive.supply_V is None else log.drive.supply_V
+        return cls(tuple(servos), log.time, log.command, supply, on)
+
+    def sample(self, time: float) -> int:
+        """Which sample holds at a time."""
+        # Half a step of rounding must not hold the sample before.
+        k = int((time - self.time[0]) / (self.time[1] - self.time[0]) + 1e-6)
+        return min(max(k, 0), len(self.time) - 1)
+
+    def told(self, time: float, q: Array, dq: Array) -> Array:
+        """Torques of the servos [N m or N], shape (J,); 0 at joints that have none."""
+        k, out = self.sample(time), np.zeros(len(q))
+        for servo in self.servos:
+            j = servo.joint
+            output = servo.per_rad * (self.command[k, j] - q[j]) - servo.damping * dq[j]
+            output = min(max(output, -servo.limit), servo.limit)
+            out[j] = self.on[k] * servo.torque * output * (self.supply_V[k] if servo.by_supply else 1.0)
+        return out

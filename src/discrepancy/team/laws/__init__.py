@@ -1,1 +1,0 @@
-"""Laws at the places of a team of Omnids."""
