@@ -6,14 +6,30 @@ The names in ``__all__`` are the public ones (docs/api.md); each is imported whe
 
 from __future__ import annotations
 
+import os
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from mocobot.blas import one_thread
 
-# Results must not depend on how many there are. The matrices are small, too: threads that fight over them make a
-# diagnosis several times slower on a busy machine.
-one_thread()
+def _one_thread() -> None:
+    """One thread for matrices: how many there are decides how sums round.
+
+    The matrices are small, too: threads that fight over them make a diagnosis several times slower on a busy machine.
+    OpenBLAS reads the variable when it is loaded; where numpy or scipy is there already, its own must be told.
+    """
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    for name in ("numpy.linalg._umath_linalg", "scipy.linalg._fblas"):
+        if name.partition(".")[0] in sys.modules:
+            import ctypes  # takes longer than the rest of ``import mocobot``
+
+            library = ctypes.CDLL(import_module(name).__file__)  # names are looked up in what it links, too
+            for kind in ("scipy_openblas_%s64_", "scipy_openblas_%s", "openblas_%s64_", "openblas_%s"):
+                if hasattr(library, kind % "set_num_threads"):
+                    getattr(library, kind % "set_num_threads")(1)
+
+
+_one_thread()
 
 if TYPE_CHECKING:
     from estimator.errors import InputError as InputError
@@ -33,8 +49,10 @@ if TYPE_CHECKING:
     from mocobot.api.comparison import Comparison as Comparison
     from mocobot.api.comparison import compare as compare
     from mocobot.api.conversion import Conversion as Conversion
+    from mocobot.api.conversion import MapDraft as MapDraft
     from mocobot.api.conversion import convert as convert
     from mocobot.api.conversion import convert_parts as convert_parts
+    from mocobot.api.conversion import map as map
     from mocobot.api.diagnosis import Cause as Cause
     from mocobot.api.diagnosis import Diagnosis as Diagnosis
     from mocobot.api.diagnosis import diagnose as diagnose
@@ -47,6 +65,18 @@ if TYPE_CHECKING:
     from mocobot.api.simulation import SimulatedRecording as SimulatedRecording
     from mocobot.api.simulation import simulate as simulate
     from mocobot.api.simulation import simulate_trials as simulate_trials
+    from mocobot.api.watch import Watched as Watched
+    from mocobot.api.watch import report as report
+    from mocobot.api.watch import watch as watch
+    from mocobot.options import CalibrateOptions as CalibrateOptions
+    from mocobot.options import ConvertOptions as ConvertOptions
+    from mocobot.options import DiagnoseOptions as DiagnoseOptions
+    from mocobot.options import EstimateOptions as EstimateOptions
+    from mocobot.options import InspectOptions as InspectOptions
+    from mocobot.options import MapOptions as MapOptions
+    from mocobot.options import ReplayOptions as ReplayOptions
+    from mocobot.options import SimulateOptions as SimulateOptions
+    from mocobot.options import WatchOptions as WatchOptions
     from mocobot_sim.effects.base import Effect as Effect
     from mocobot_sim.effects.catalogue import EFFECTS as EFFECTS
     from mocobot_sim.effects.catalogue import apply_effects as apply_effects
@@ -69,12 +99,15 @@ _NAMES = {
     "mocobot": "bases guiding pictures robots serial trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
     "mocobot.api.comparison": "Comparison compare",
-    "mocobot.api.conversion": "Conversion convert convert_parts",
+    "mocobot.api.conversion": "Conversion MapDraft convert convert_parts map",
     "mocobot.api.diagnosis": "Cause Diagnosis diagnose",
     "mocobot.api.estimation": "Estimate estimate read_estimate",
     "mocobot.api.inspection": "Inspection inspect",
     "mocobot.api.replay": "replay",
     "mocobot.api.simulation": "SimulatedRecording simulate simulate_trials",
+    "mocobot.api.watch": "Watched report watch",
+    "mocobot.options": "CalibrateOptions ConvertOptions DiagnoseOptions EstimateOptions InspectOptions MapOptions "
+    "ReplayOptions SimulateOptions WatchOptions",
     "mocobot_sim.effects.base": "Effect",
     "mocobot_sim.effects.catalogue": "EFFECTS apply_effects make_effect",
     "mocobot_sim.errors": "TrialError",

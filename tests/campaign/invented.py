@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from discrepancy.team.causes import CAUSES
-from mocobot.campaign.plan import CampaignPlan, CampaignSet
+from mocobot.campaign.run import CampaignPlan, CampaignSet
 
 Json = dict[str, Any]
 LIMITS = {

@@ -14,16 +14,12 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
 from invented import LIMITS, quiet
-from mocobot.campaign.draw import draw_at
-from mocobot.campaign.ground import Ground
-from mocobot.campaign.limits import MeasuredLimits
-from mocobot.campaign.plan import CampaignPlan
-from mocobot.campaign.run import run_campaign
-from mocobot.campaign.store import CampaignStore
+from mocobot.campaign import run as command
+from mocobot.campaign.effects import Ground, MeasuredLimits, draw_at
+from mocobot.campaign.run import CampaignPlan, CampaignStore, run_campaign
 from mocobot.campaign.summary import summarise
-from mocobot.commands import campaign as command
 
-PLAN = CampaignPlan(backgrounds=("calibrated",), causes=("sea_bias", "drag"), teams=2, sets=5)
+PLAN = CampaignPlan(background=("calibrated",), causes=("sea_bias", "drag"), teams=2, sets=5)
 CONFIG = {"payload": "a"}
 
 
@@ -148,7 +144,7 @@ def test_the_command_writes_everything_and_goes_on(tmp_path, monkeypatch, capsys
     monkeypatch.setattr(command, "run_campaign", counted)
     out, options = tmp_path / "out", ("--jobs", 1, "--teams", 1, "--causes", "sea_bias", "drag")
     for sets in (2, 3):
-        code, text, _ = run(capsys, "campaign", "--out", out, *options, "--sets", sets)
+        code, text, _ = run(capsys, "campaign", "--out", out, *options, "--sets", sets, "--pictures")
         assert code == 0
         assert "Detection limits" in text
     assert asked == [2, 3]
@@ -197,7 +193,7 @@ def test_what_is_hidden_is_found_and_a_clean_team_is_clean(tmp_path):
     plan = CampaignPlan(
         tolerances={cause: default_tolerances()[cause] for cause in few},
         exclude=tuple(cause for cause in CAUSES if cause not in few),
-        payload="b", trials=("random", "periodic"), vias=8, duration_s=10.0, backgrounds=("calibrated",),
+        payload="b", trials="random,periodic", vias=8, duration_s=10.0, background=("calibrated",),
         causes=("sea_bias",), sizes=(8.0,), teams=1, sets=1,
     )  # fmt: skip
     clean, hidden = run_campaign(plan, CampaignStore(tmp_path / "out", CONFIG))

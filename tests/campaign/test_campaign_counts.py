@@ -12,10 +12,17 @@ from scipy.stats import binomtest
 
 from estimator.errors import InputError
 from invented import named, result
-from mocobot.campaign.plan import CampaignPlan, CampaignSet
-from mocobot.campaign.plots import save_plots
-from mocobot.campaign.summary import interval, match, reliability, summarise
-from mocobot.campaign.text import COLUMNS, csv_table, format_campaign
+from mocobot.campaign.run import CampaignPlan, CampaignSet
+from mocobot.campaign.summary import (
+    COLUMNS,
+    csv_table,
+    format_campaign,
+    interval,
+    match,
+    reliability,
+    summarise,
+)
+from mocobot.plots import save_campaign
 from mocobot_report.page import write_report
 
 
@@ -163,7 +170,7 @@ def test_summary_is_plain_and_text_fits(summary):
 
 
 def test_pictures(summary, tmp_path):
-    names = [path.name for path in save_plots(summary, tmp_path)]
+    names = [path.name for path in save_campaign(summary, tmp_path)]
     assert names == ["limits.png", "found.png", "confusion.png", "reliability.png"]
     assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in names)
 

@@ -7,7 +7,7 @@ from discrepancy.team.tolerances import default_tolerances
 from hidden.generator import HiddenSet, generate
 from hidden.limits import LIMITS
 from hidden.schedule import Schedule
-from mocobot.campaign.limits import FORCE, push_limits
+from mocobot.campaign.effects import FORCE, push_limits
 
 
 @pytest.mark.slow

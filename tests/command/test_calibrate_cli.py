@@ -35,7 +35,7 @@ def trials(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 @pytest.fixture(scope="module")
 def calibrated(trials: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("calibrated") / "calibration"
-    main(["calibrate", *map(str, trials), "--parallel-flanges", "--out", str(folder)])
+    main(["calibrate", *map(str, trials), "--parallel-flanges", "--pictures", "--out", str(folder)])
     return folder
 
 

@@ -14,7 +14,7 @@ from command import refused, run
 from estimator.calibrate.calibrate import calibrate
 from estimator.recording.parquet import read_recording, write_recording
 from invented_calibration import invented_calibration
-from mocobot.files.calibrations import read_calibration, write_calibration
+from mocobot.api.calibration import read_calibration, write_calibration
 from mocobot_report.blocks.html import words
 from mocobot_report.estimate.part import answer
 from mocobot_report.folder import Estimated
@@ -107,7 +107,7 @@ def test_what_cannot_be_is_refused(folder: Path, tmp_path: Path, capsys: pytest.
     assert "--self-calibrate and --calibration are both given; choose one" in refused(
         capsys, "estimate", one, "--calibration", calibration, "--self-calibrate"
     )
-    assert "--self-calibrate and --method joint are both given" in refused(
+    assert "--self-calibrate and --method are both given" in refused(
         capsys, "estimate", one, "--self-calibrate", "--method", "joint"
     )
     assert "none.json: there is no such file; it would be a calibration" in refused(

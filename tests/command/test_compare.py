@@ -22,9 +22,7 @@ from estimator.arm.unit import AT
 from estimator.calibrate.json import calibration_to_dict
 from estimator.files import write_json
 from invented_calibration import invented_calibration
-from mocobot.comparison import rules
-from mocobot.comparison.difference import Group
-from mocobot.comparison.estimates import grasp_groups
+from mocobot.api.comparison_groups import Group, grasp_groups
 
 RNG = np.random.default_rng(7)
 
@@ -224,10 +222,3 @@ def test_nothing_is_compared_with_something_else(
     ):
         sentence = refused(capsys, "compare", est, tmp_path / other)
         assert said.replace("verdict", str(tmp_path / "verdict")) in sentence
-
-
-def test_rules_say_where_they_come_from() -> None:
-    text = Path(rules.__file__).read_text()
-    names = [name for name in vars(rules) if name.isupper()]
-    assert len(names) == 4
-    assert sum(text.count(f" {origin}") for origin in ("Chosen:", "Derived:", "Measured:")) == len(names)

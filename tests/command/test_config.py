@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from command import refused
-from mocobot.cli import COMMANDS
-from mocobot.parsing import parse, with_config
+from mocobot.cli import parse, with_config
 
 TOML = """
 [diagnose]
@@ -33,7 +32,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def parsed(*words: object):
-    return parse(COMMANDS, with_config(COMMANDS, [str(word) for word in words]).words)
+    return parse(with_config([str(word) for word in words]).words)
 
 
 def test_a_file_says_what_the_command_line_would(file):
@@ -42,8 +41,8 @@ def test_a_file_says_what_the_command_line_would(file):
         "--no-closed-loop", "--strict",
     )  # fmt: skip
     simulate = parsed("simulate", f"--config={file}", "--trials", "random")
-    assert simulate.effect == ("drag:coefficient=1", "sea_bias:robot=1,joint=1,bias=0.1")
-    assert (simulate.out_dir, simulate.vias) == (Path("trials"), 4)
+    assert simulate.effects == ("drag:coefficient=1", "sea_bias:robot=1,joint=1,bias=0.1")
+    assert (simulate.out, simulate.vias) == (Path("trials"), 4)
 
 
 def test_the_command_line_goes_before_the_file(file):
@@ -66,7 +65,7 @@ def test_the_command_line_goes_before_the_file(file):
             "[diagnose] jobs is true; it is not an option that is switched on or off",
         ),
         ("[diagnose]\njobs = 'many'\n", "mine.toml: [diagnose] --jobs is 'many'; it must be a whole number"),
-        ("[diagnose]\nodds = -3\n", "mine.toml: [diagnose] odds is -3; it must be greater than 0"),
+        ("[diagnose]\nodds = -3\n", "mine.toml: [diagnose] --odds is -3; it must be greater than 0"),
         ("[diagnose]\nexclude = [['drag']]\n", "it must be a value, or a list of values"),
         ("[diagnose\n", "mine.toml"),
     ],
@@ -79,7 +78,7 @@ def test_refusals(file, capsys, text, said):
 def test_what_the_command_line_says_is_not_said_of_the_file(file, capsys):
     file.write_text("[diagnose]\njobs = 2\nodds = 0.1\n")
     said = refused(capsys, "diagnose", "a.parquet", "--config", file, "--odds", "-3")
-    assert said == "mocobot: odds is -3; it must be greater than 0 and at most 1000"
+    assert said == "mocobot: --odds is -3; it must be greater than 0 and at most 1000"
     assert "mine.toml" not in said
 
 

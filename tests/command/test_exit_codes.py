@@ -47,7 +47,7 @@ def test_a_verdict(
             return "what was found"
 
     found = Found(to_dict=lambda: {"verdict": verdict})
-    monkeypatch.setattr("mocobot.commands.diagnose.diagnose_team", lambda *_, **__: found)
+    monkeypatch.setattr("mocobot.api.diagnosis.diagnose_team", lambda *_, **__: found)
     assert run(capsys, "diagnose", brief) == (0, "what was found\n", "")
     said = f"mocobot: the verdict is {verdict.replace('_', ' ')}" if strict else ""
     assert run(capsys, "diagnose", brief, "--strict") == (strict, "what was found\n", said)
@@ -58,7 +58,7 @@ def test_an_estimate_that_says_nothing(
 ) -> None:
     """Flagged ones: test_cli."""
     nothing = SimpleNamespace(flags=(), mass=None, grasps=None)
-    monkeypatch.setattr("mocobot.commands.estimate.estimate", lambda *_, **__: nothing)
+    monkeypatch.setattr("mocobot.estimate", lambda *_, **__: nothing)
     assert run(capsys, "estimate", brief)[0] == 0
     code, _, err = run(capsys, "estimate", brief, "--strict")
     assert (code, err) == (1, "mocobot: the recordings determine neither mass nor grasps")

@@ -12,7 +12,8 @@ import pytest
 
 from estimator import extras
 from invented_calibration import invented_calibration
-from mocobot.files.calibrations import write_into
+from mocobot.api.calibration import Calibration
+from mocobot.results import public
 from mocobot_view.pictures.camera import Camera
 from mocobot_view.pictures.render import Shot, render_shots
 
@@ -119,7 +120,7 @@ def no_plots(monkeypatch: pytest.MonkeyPatch):
 def test_a_folder_without_pictures_is_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for number in (1, 2):
         (tmp_path / f"{number}").mkdir()
-        write_into(tmp_path / f"{number}", invented_calibration(seed=number))
+        public(Calibration, invented_calibration(seed=number)).write_into(tmp_path / f"{number}")
     assert capsys.readouterr().err == f"mocobot: {extras.NO_PLOTS}\n"  # once
     names = {path.name for path in (tmp_path / "1").iterdir()}
     assert {"calibration.json", "report.txt", "omnid3.toml"} <= names
@@ -127,7 +128,7 @@ def test_a_folder_without_pictures_is_whole(tmp_path: Path, capsys: pytest.Captu
 
 
 def test_a_folder_with_pictures_has_three(tmp_path: Path) -> None:
-    write_into(tmp_path, invented_calibration())
+    public(Calibration, invented_calibration()).write_into(tmp_path)
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "deviations.png",
         "recordings.png",

@@ -14,7 +14,7 @@ import pytest
 
 from estimator.errors import InputError
 from estimator.files import LIST, check_target, holds, make_folder, whole_file, whole_folder, write_text
-from mocobot.files.targets import check_folder
+from mocobot.checks import check_folder
 
 
 def test_a_folder_appears_when_all_is_written(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from estimator.calibrate.json import calibration_to_dict
 from estimator.recording.parquet import write_recording
 from invented_calibration import invented_calibration
 from mocobot.api.calibration import Calibration
-from mocobot.commands.watch import _payload
+from mocobot.api.watch import payload_line as _payload
 from mocobot_report.estimate.part import answer
 from mocobot_report.folder import Estimated
 from mocobot_view.facts.fact_files import read_truth

@@ -202,7 +202,7 @@ def test_control_characters_are_shown_escaped(
 ) -> None:
     shown = "\\x1b[31m"
     assert shown in refused(capsys, "inspect", tmp_path / f"{ESCAPE}.csv")
-    monkeypatch.setattr("mocobot.commands.effects.run", lambda _: print(f"é {ESCAPE}\n\tx"))
+    monkeypatch.setattr("mocobot.commands.effects", lambda _: print(f"é {ESCAPE}\n\tx"))
     assert run(capsys, "effects") == (0, f"é {shown}\n\tx\n", "")
     file = tmp_path / "log.csv"
     file.write_text("time\u00a0[s],x\n" + "".join(f"{k / 100},{k}\n" for k in range(300)), encoding="utf-8")

@@ -14,8 +14,7 @@ import pytest
 
 from estimator.errors import InputError
 from mocobot.cli import main
-from mocobot.files import provenance as module
-from mocobot.files.provenance import file_facts, folder_provenance, provenance
+from mocobot.results import commit_of, file_facts, folder_provenance, provenance
 from mocobot_view.facts.fact_files import read_estimate
 
 KEYS = ["mocobot", "commit", "python", "platform", "packages", "command", "options", "files"]
@@ -32,9 +31,9 @@ def git(folder: Path, *arguments: str) -> str:
 def checkout(tmp_path: Path) -> Path:
     """A repository laid out like ours, with one commit."""
     root = tmp_path / "checkout"
-    (root / "src" / "mocobot" / "files").mkdir(parents=True)
+    (root / "src" / "mocobot").mkdir(parents=True)
     (root / "docs").mkdir()
-    (root / "src" / "mocobot" / "files" / "provenance.py").write_text("")
+    (root / "src" / "mocobot" / "results.py").write_text("")
     (root / "docs" / "page.md").write_text("")
     git(tmp_path, "init", "--quiet", "checkout")
     git(root, "add", ".")
@@ -57,7 +56,7 @@ def test_a_large_file_is_not_held_in_memory(tmp_path: Path) -> None:
     with path.open("wb") as file:
         file.truncate(200_000_000)
     code = (
-        "import resource, sys; from pathlib import Path; from mocobot.files.provenance import file_facts\n"
+        "import resource, sys; from pathlib import Path; from mocobot.results import file_facts\n"
         "used = int(Path('/proc/self/statm').read_text().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (used + 100_000_000,) * 2)\n"
         "print(file_facts(Path(sys.argv[1]))['sha256'])"
@@ -108,29 +107,27 @@ def test_a_folder_is_all_its_files(tmp_path: Path) -> None:
 
 def test_commit_is_gits_and_changes_of_sources_show(checkout: Path) -> None:
     head = git(checkout, "rev-parse", "HEAD")
-    assert module._commit(checkout) == head
+    assert commit_of(checkout) == head
     (checkout / "docs" / "page.md").write_text("changed")
-    assert module._commit(checkout) == head, "documents change no result"
+    assert commit_of(checkout) == head, "documents change no result"
     (checkout / "src" / "mocobot" / "new.py").write_text("")
-    assert module._commit(checkout) == f"{head}+changed"
+    assert commit_of(checkout) == f"{head}+changed"
 
 
 def test_commit_of_others_is_not_ours(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     head = git(checkout, "rev-parse", "HEAD")
     inside = checkout / "lib" / "site"  # a package that was installed below somebody's repository
-    (inside / "src" / "mocobot" / "files").mkdir(parents=True)
-    shutil.copy(
-        checkout / "src" / "mocobot" / "files" / "provenance.py", inside / "src" / "mocobot" / "files"
-    )
-    assert module._commit(inside) is None
+    (inside / "src" / "mocobot").mkdir(parents=True)
+    shutil.copy(checkout / "src" / "mocobot" / "results.py", inside / "src" / "mocobot")
+    assert commit_of(inside) is None
     shutil.rmtree(checkout / "lib")
     monkeypatch.setenv("GIT_DIR", str(checkout / "nowhere"))  # as a hook of another repository sets it
-    assert module._commit(checkout) == head
+    assert commit_of(checkout) == head
     monkeypatch.setenv("PATH", str(checkout / "nowhere"))
-    assert module._commit(checkout) is None
+    assert commit_of(checkout) is None
     monkeypatch.undo()
     shutil.rmtree(checkout / ".git")
-    assert module._commit(checkout) is None
+    assert commit_of(checkout) is None
 
 
 def test_folder_lists_what_was_written(tmp_path: Path) -> None:
@@ -157,7 +154,7 @@ def test_estimate_carries_it_and_is_the_same_bytes_again(
     assert values["provenance"]["command"] == "estimate"
     assert values["provenance"]["options"] == {
         "map": None, "method": "auto", "cutoff_hz": 4.0, "calibration": None, "self_calibrate": False,
-        "max_unpacked": None,
+        "max_unpacked_gib": None,
     }  # fmt: skip
     assert [entry["path"] for entry in values["provenance"]["files"]] == [str(biased_trials[0])]
     read_estimate(out[0])  # as replay reads it

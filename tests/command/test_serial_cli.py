@@ -103,7 +103,7 @@ REFUSED = {
     "log as its reference": (
         ["diagnose", "{log}", "--reference", "{log}", "--model", "{model}"], "is given twice", []
     ),
-    "reference without model": (["diagnose", "{log}", "--reference", "{log}"], "--reference goes with --model", []),
+    "reference without model": (["diagnose", "{log}", "--reference", "{log}"], "--reference goes with a model", []),
     "unknown cause": (
         ["diagnose", "{log}", "--model", "{model}", "--exclude", "sorcery"], "cause 'sorcery' does not exist", []
     ),
@@ -125,7 +125,7 @@ REFUSED = {
         ["replay", "{log}", "--model", "{model}", "--truth", "--save", "{folder}/x.rrd"], "--truth is of a team's", []
     ),
     "map of a replay": (
-        ["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with --model", []
+        ["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with a model", []
     ),
     "folder of the log": (
         ["diagnose", "{log}", "--model", "{model}", "--out", "{folder}"], "which would be lost; name another folder", []
@@ -190,11 +190,8 @@ def test_damaged_logs_maps_and_models_leave_nothing_behind(tmp_path, capsys, val
     assert count > 10
 
 
-def test_tolerances_of_the_causes_that_a_file_names(tmp_path) -> None:
+def test_tolerances_of_the_causes_that_a_file_names(tmp_path, log) -> None:
     path = tmp_path / "tolerances.toml"
     path.write_text("[torque_scale]\nscale_percent = 2.0\n", encoding="utf-8")
-    with pytest.raises(serial.InputError, match="torque_scale has no 'scale_percent'; its parameters are"):
-        serial.serial_tolerances(path)
-    path.write_text("[torque_scale]\nscale = 0.02\n", encoding="utf-8")
-    assert serial.serial_tolerances(path) == {"torque_scale": {"scale": 0.02}}
-    assert serial.serial_tolerances(None) is None
+    with pytest.raises(InputError, match="torque_scale has no 'scale_percent'; its parameters are"):
+        serial.diagnose(tmp_path / "arm.xml", log, tolerances=path)

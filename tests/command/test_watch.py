@@ -13,7 +13,8 @@ from command import refused, run
 from estimator.errors import InputError
 from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_text
-from mocobot.commands import watch
+from mocobot import commands
+from mocobot.api import watch
 from recordings import small_recording
 
 
@@ -121,7 +122,7 @@ def test_the_page_is_opened(
     trial: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, no_diagnosis: list[Any]
 ) -> None:
     opened: list[str] = []
-    monkeypatch.setattr(watch.webbrowser, "open", opened.append)
+    monkeypatch.setattr(commands.webbrowser, "open", opened.append)
     run(capsys, "watch", trial, "--open")
     (address,) = opened
     assert address.startswith("file:///")

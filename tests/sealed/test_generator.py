@@ -15,7 +15,7 @@ from hidden.generator import HiddenSet, generate
 from hidden.limits import LIMITS, pendulum_limit_kg
 from hidden.schedule import Schedule
 from hidden.sealed import Sealed
-from mocobot.campaign.draw import draw_effect
+from mocobot.campaign.effects import draw_effect
 from mocobot_sim.effects import EFFECTS
 
 generated = cache(generate)

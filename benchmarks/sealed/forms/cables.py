@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocobot.campaign.draw import REACH_M
+from mocobot.campaign.effects import REACH_M
 from mocobot_sim.effects.spring import add_site, tie
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene

@@ -47,11 +47,12 @@ class JointDiagnosed:
         """All that there is to say."""
         return format_verdict(self._values, verbose=True)
 
-    def write_into(self, folder: Path, **more: Any) -> None:
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
         """Write extended model, residuals, pictures, JSON and report into an existing folder.
 
         Args:
             folder: where.
+            pictures: whether pictures are drawn, too.
             more: further keys of the JSON.
 
         Raises:
@@ -68,7 +69,7 @@ class JointDiagnosed:
             Channel(f"{name} torque", "torque", None, unit_of(model, j))
             for j, name in enumerate(model.joints)
         ]
-        draw(values, self.verdict.traces(), channels, self._quantity_unit, folder)
+        draw(values, self.verdict.traces(), channels, self._quantity_unit, folder, pictures=pictures)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self.verbose_text()}\n")
 

@@ -15,7 +15,7 @@ REPORT = "report.txt"
 
 def draw(
     values: Mapping[str, Any], traces: Sequence[Trace], channels: Sequence[Channel], unit: Callable[[str], str],
-    folder: Path,
+    folder: Path, *, pictures: bool = True,
 ) -> None:  # fmt: skip
     """Write residuals and, where plots can be drawn, pictures of a diagnosis.
 
@@ -25,12 +25,13 @@ def draw(
         channels: what they are of.
         unit: of a quantity that a misfit may depend on.
         folder: an existing one.
+        pictures: whether pictures are drawn, too.
 
     Raises:
         InputError: something cannot be written.
     """
     save_traces(traces, channels, folder / RESIDUALS)
-    if draws_plots():
+    if pictures and draws_plots():
         from discrepancy.result.pictures.plots import save_plots
 
         save_plots(values, traces, channels, unit, folder)

@@ -116,11 +116,12 @@ class TeamDiagnosed:
         """All that there is to say."""
         return format_verdict(self._values, verbose=True)
 
-    def write_into(self, folder: Path, **more: Any) -> None:
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
         """Write models to take away, residuals, pictures, JSON and report into an existing folder.
 
         Args:
             folder: where.
+            pictures: whether pictures are drawn, too.
             more: further keys of the JSON.
 
         Raises:
@@ -137,7 +138,14 @@ class TeamDiagnosed:
             except InputError as error:  # values that no effect can have, such as a negative friction
                 note = f"There is no {'model as found' if whole else 'extended model'}: {error}."
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        draw(values, self.verdict.traces(), self.verdict.rig.channels, TeamWords().unit, folder)
+        draw(
+            values,
+            self.verdict.traces(),
+            self.verdict.rig.channels,
+            TeamWords().unit,
+            folder,
+            pictures=pictures,
+        )
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self.verbose_text()}\n")
 

@@ -35,8 +35,9 @@ from joint_verdicts import (
     off_everywhere,
     offset_or_spring,
 )  # fmt: skip
+from mocobot.api.comparison_groups import diagnosis_changes as changes_of
+from mocobot.api.comparison_groups import diagnosis_groups as groups_of
 from mocobot.api.diagnosis import Diagnosis
-from mocobot.comparison.diagnoses import changes_of, groups_of
 from mocobot_view.replay.replay_trial import replay_trial
 from recordings import small_recording
 

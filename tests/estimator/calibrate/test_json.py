@@ -16,7 +16,7 @@ from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
 from estimator.calibrate.outcome.carried import carried
 from estimator.errors import InputError
 from invented_calibration import invented_calibration
-from mocobot.files.calibrations import read_calibration, write_calibration
+from mocobot.api.calibration import read_calibration, write_calibration
 
 
 def through_text(values: dict[str, Any]) -> dict[str, Any]:

@@ -1,10 +1,9 @@
-"""``mocobot watch``: logs to a first verdict: inspect, convert, estimate, calibrate if need be, diagnose, report."""
+"""Logs to a first verdict: inspect, convert, estimate, calibrate if need be, diagnose, and a page."""
 
-import tempfile
-import textwrap
-import webbrowser
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from estimator.arm.unit import AT
 from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from estimator.errors import InputError
 from estimator.estimate.frames import frames_said
-from estimator.files import whole_folder, write_json, write_text
+from estimator.files import write_json, write_text
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
@@ -22,30 +21,24 @@ from mocobot.api.conversion import convert, convert_parts
 from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
-from mocobot.checks import PAGE, VERDICT
-from mocobot.files.calibrations import NAME as CALIBRATION
-from mocobot.files.calibrations import write_calibration
-from mocobot.files.calibrations import write_into as write_calibration_into
-from mocobot.files.provenance import provenance
-from mocobot.files.recordings import read
-from mocobot.files.targets import map_file
-from mocobot.options import Watch
-from mocobot.progress import stages
-from mocobot.strict import NotGood
+from mocobot.api.recordings import Say, quiet, read
+from mocobot.checks import CALIBRATION
+from mocobot.options import WatchOptions, made
+from mocobot.results import Folder
 from mocobot_logs.formats import log_kind
 from mocobot_logs.table.parquet import is_recording
 from mocobot_report.page import write_report
+from mocobot_report.sought import NAME
 
-WIDTH = 110
 BEYOND, MOST = 3.0, 3
 """Standard deviations of the prior from which on a robot is said to be off, and how many places are named. Chosen: of
 the some sixty deviations of a healthy team of three, one is that far off in every sixth team."""
-Say = Callable[[str], object]
+VERDICT = "verdict.txt"
 
 
-@dataclass
-class _Seen:
-    """What was found so far.
+@dataclass(repr=False)
+class Watched(Folder):
+    """What a first look found.
 
     Attributes:
         lines: the overall verdict.
@@ -60,6 +53,7 @@ class _Seen:
     estimate: Estimate | None = None
     calibration: Calibration | None = None
     diagnosis: Diagnosis | None = None
+    result = "watch"
 
     def of(self, *, free: bool) -> list[Recording]:
         """Recordings of robots that hold nothing, or of all others."""
@@ -71,66 +65,110 @@ class _Seen:
         verdict = self.diagnosis and self.diagnosis.verdict
         return self.estimate is not None and verdict in ("consistent", "explained")
 
+    def __str__(self) -> str:
+        """The overall verdict."""
+        return "\n".join(self.lines)
 
-def run(options: Watch) -> None:
-    """Run the command.
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Watched of {len(self.recordings)} recordings: {'' if self.good else 'not '}good>"
+
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
+        """Write everything into an existing folder: the diagnosis and the JSON of the others at its top, for the page.
+
+        Args:
+            folder: it.
+            pictures: whether pictures are drawn, too.
+            more: further keys of every JSON.
+
+        Raises:
+            InputError: something cannot be written.
+        """
+        if self.diagnosis is not None:
+            self.diagnosis.write_into(folder, pictures=pictures, **more)
+        if self.estimate is not None:
+            write_json(folder / "estimate.json", self.estimate.to_dict() | more)
+        if self.calibration is not None:
+            write_json(folder / CALIBRATION, self.calibration.to_dict() | more)
+            (folder / "calibration").mkdir()
+            self.calibration.write_into(folder / "calibration", pictures=pictures, **more)
+        for name in self.converted:
+            write_recording(self.recordings[name], folder / "recordings" / f"{name}.parquet")
+        write_text(folder / VERDICT, f"{self}\n")
+
+
+def report(folder: Path | str, out: Path | str | None = None, *, say: Say = quiet) -> Path:
+    """Make one HTML page of a result folder (of ``paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign``).
+
+    Args:
+        folder: of the result.
+        out: page to write; ``report.html`` in the folder if not given.
+        say: takes the name of the stage that begins.
+
+    Returns:
+        The page.
 
     Raises:
-        InputError: a log that cannot be read, or an output that cannot be written.
-        NotGood: with ``strict``, there is no estimate, or the verdict is neither consistent nor explained.
+        InputError: the folder holds no result, or one that cannot be read, or the page cannot be written.
     """
-    seen, out = _Seen(), options.out
-    inputs = [*options.rec, *map_file(options.map)]
-    made_with = provenance("watch", asdict(options), inputs)
-    if out is None and options.open:
-        out = Path(tempfile.mkdtemp(prefix="mocobot-watch-")) / "watch"
-    with stages() as (say, simulated):
-        _read(seen, options, say)
-        _conclude(seen, options.jobs, say, simulated)
-        if out is not None:
-            say("write")
-            with whole_folder(out, "watch") as folder:
-                _write(seen, folder, made_with)
-            if seen.estimate or seen.diagnosis:
-                write_report(out, out / PAGE, say)
-                seen.lines.append(f"The page with all of it: {out / PAGE}.")
-    print(
-        "\n".join(part for line in seen.lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  "))
-    )
-    if options.open and out is not None and (out / PAGE).is_file():
-        webbrowser.open((out / PAGE).resolve().as_uri())
-    if options.strict and not seen.good:
-        raise NotGood(seen.lines[-1].rstrip("."))
+    page = Path(folder) / NAME if out is None else Path(out)
+    write_report(Path(folder), page, say)
+    return page
 
 
-def _read(seen: _Seen, options: Watch, say: Say) -> None:
-    """Inspect every file, and read what is of use."""
-    for path in options.rec:
-        say(f"inspecting {path.name}")
-        found = inspect(path, map=options.map)
-        ready = found.ready_for
-        if ready.startswith("ready for: nothing"):
-            why = "; ".join(finding.sentence for finding in found.findings)
-            seen.lines.append(f"{path}: left out, {ready}{f': {why}' if why else ''}.")
-            continue
-        is_log = log_kind(path) != "parquet" or not is_recording(path)
-        if is_log or found.skewed:
-            say(f"converting {path.name}")
-        try:
-            recordings, done = _used(
-                path, options.map if is_log else None, is_log=is_log, skewed=found.skewed
-            )
-        except InputError as error:
-            seen.lines.append(f"{path}: left out, it cannot be used as it is: {error}.")
-            continue
-        seen.recordings |= recordings
-        if done:
-            seen.converted += recordings
-            ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
-        seen.lines.append(f"{path}: {ready}.")
+def watch(
+    logs: Path | str | Iterable[Path | str],
+    options: WatchOptions | None = None,
+    *,
+    say: Say = quiet,
+    simulated: Callable[[int], object] | None = None,
+    **fields: Any,
+) -> Watched:
+    """Look at recordings or logs once, and say what there is.
+
+    Args:
+        logs: files of recordings, or logs of any format that ``convert`` reads, all of one payload.
+        options: how; ``fields`` are fields of it.
+        say: takes the name of the stage that begins.
+        simulated: called with 1 for every trial that was simulated.
+
+    Raises:
+        InputError: a log that cannot be read.
+    """
+    chosen, seen = made(WatchOptions, options, fields), Watched()
+    for path in [logs] if isinstance(logs, Path | str) else logs:
+        _look(seen, Path(path), chosen.map, say)
+    _conclude(seen, chosen.jobs, say, simulated)
+    return seen
 
 
-def _used(path: Path, log_map: str | None, *, is_log: bool, skewed: bool) -> tuple[dict[str, Recording], str]:
+def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> None:
+    """Inspect a file, and read what is of use."""
+    say(f"inspecting {path.name}")
+    found = inspect(path, map=log_map)
+    ready = found.ready_for
+    if ready.startswith("ready for: nothing"):
+        why = "; ".join(finding.sentence for finding in found.findings)
+        seen.lines.append(f"{path}: left out, {ready}{f': {why}' if why else ''}.")
+        return
+    is_log, skewed = log_kind(path) != "parquet" or not is_recording(path), getattr(found, "skewed", False)
+    if is_log or skewed:
+        say(f"converting {path.name}")
+    try:
+        recordings, done = _used(path, log_map if is_log else None, is_log=is_log, skewed=skewed)
+    except InputError as error:
+        seen.lines.append(f"{path}: left out, it cannot be used as it is: {error}.")
+        return
+    seen.recordings |= recordings
+    if done:
+        seen.converted += recordings
+        ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
+    seen.lines.append(f"{path}: {ready}.")
+
+
+def _used(
+    path: Path, log_map: Path | str | None, *, is_log: bool, skewed: bool
+) -> tuple[dict[str, Recording], str]:
     """What can be used of a file, by names, and what was done for it, empty if nothing.
 
     Raises:
@@ -152,7 +190,7 @@ def _used(path: Path, log_map: str | None, *, is_log: bool, skewed: bool) -> tup
         return named, f"{many} between gaps converted{corrected}"
 
 
-def _conclude(seen: _Seen, jobs: int, say: Say, simulated: Callable[[int], object]) -> None:
+def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], object] | None) -> None:
     """Estimate, calibrate if the robots contradict each other, and diagnose, as far as the recordings allow."""
     carried = seen.of(free=False)
     if not carried:
@@ -162,12 +200,12 @@ def _conclude(seen: _Seen, jobs: int, say: Say, simulated: Callable[[int], objec
         seen.estimate = estimate(carried, say=say)
         if seen.estimate.contradicts:
             say("calibrating")
-            seen.calibration = calibrate(carried, free=seen.of(free=True), say=say)
+            seen.calibration = calibrate(carried, seen.of(free=True), say=say)
             seen.estimate = estimate(carried, calibration=seen.calibration, say=say)
     except InputError as error:
         seen.lines.append(f"No estimate: {error}.")
     if seen.estimate is not None:
-        seen.lines += [_payload(seen.estimate), _robots(seen.calibration), *seen.estimate.flags]
+        seen.lines += [payload_line(seen.estimate), _robots(seen.calibration), *seen.estimate.flags]
     try:
         seen.diagnosis = diagnose(
             carried, calibration=seen.calibration, jobs=jobs, say=say, simulated=simulated
@@ -181,7 +219,8 @@ def _conclude(seen: _Seen, jobs: int, say: Say, simulated: Callable[[int], objec
     seen.lines.append(" ".join([f"Against the simulation: {verdict}.", *named, *rest]))
 
 
-def _payload(found: Estimate) -> str:
+def payload_line(found: Estimate) -> str:
+    """Mass and centre of mass, a sentence."""
     mass, com = "mass not determined", "centre of mass not determined"
     if found.mass is not None:
         mass = "{} +- {} kg".format(*measured(found.mass.mass, found.mass.se))
@@ -204,9 +243,8 @@ def _farthest(found: Calibration) -> list[str]:
     far = []
     for group in shown_groups(found):
         shown, at = SHOWN[group.name], AT[group.name]
-        for robot, (x, se, prior) in enumerate(
-            zip(found.units.x[:, at], found.sd[:, at], found.prior_sd[:, at], strict=True), start=1
-        ):
+        rows = zip(found.units.x[:, at], found.sd[:, at], found.prior_sd[:, at], strict=True)
+        for robot, (x, se, prior) in enumerate(rows, start=1):
             for k in range(len(x)):
                 if prior[k] > 0 and abs(x[k]) > BEYOND * prior[k]:
                     value = "{} +- {}".format(*measured(shown.scale * x[k], shown.scale * se[k]))
@@ -214,18 +252,3 @@ def _farthest(found: Calibration) -> list[str]:
                     far.append((abs(x[k]) / prior[k], place))
     places = [place for _, place in sorted(far, reverse=True)[:MOST]]
     return [f"Farther off than robots are: {'; '.join(places)}."] if places else []
-
-
-def _write(seen: _Seen, folder: Path, made_with: dict[str, Any]) -> None:
-    """Everything into an existing folder: the diagnosis and the JSON of the others at its top, for the page."""
-    if seen.diagnosis is not None:
-        seen.diagnosis.write_into(folder, provenance=made_with)
-    if seen.estimate is not None:
-        write_json(folder / "estimate.json", seen.estimate.to_dict() | {"provenance": made_with})
-    if seen.calibration is not None:
-        write_calibration(folder / CALIBRATION, seen.calibration, made_with)
-        (folder / "calibration").mkdir()
-        write_calibration_into(folder / "calibration", seen.calibration, made_with)
-    for name in seen.converted:
-        write_recording(seen.recordings[name], folder / "recordings" / f"{name}.parquet")
-    write_text(folder / VERDICT, "\n".join(seen.lines) + "\n")
