@@ -8,6 +8,7 @@ same command and nothing else; never an input.
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from estimator.errors import InputError
 from estimator.files import check_place, check_target, holds, system_errors
@@ -28,22 +29,62 @@ SCORES, PARTIAL = "paper.json", "partial"
 """The file in the folder of ``mocobot paper --out``, and the folder in it of a run that is not over."""
 TRUTH = "the truth beside a simulated recording"
 LEAST_BYTES = 12
-"""Of a Parquet file: its first and last bytes, and the length of the footer between them."""
+"""Least size of a Parquet file: its first and last bytes, and the length of the footer between them."""
+
+
+INPUTS = {
+    opt.Inspect: ("rec", "calibration", "model", "map"),
+    opt.Map: ("log", "model"),
+    opt.Convert: ("log", "design", "map"),
+    opt.Estimate: ("rec", "map", "calibration"),
+    opt.Calibrate: ("rec", "free", "prior", "map"),
+    opt.Watch: ("rec", "map"),
+    opt.Diagnose: ("rec", "reference", "tolerances", "model", "map", "calibration"),
+    opt.Compare: ("a", "b"),
+    opt.Simulate: ("payload", "units"),
+    opt.CampaignOptions: ("payload", "units", "tolerances", "calibration"),
+    opt.Replay: ("rec", "estimate", "model", "map", "calibration"),
+}
+"""Options that name files which a command reads, in the order of its provenance."""
+
+
+def inputs_of(options: Any) -> list[Path]:
+    """Files and folders that a command reads, as far as options name them."""
+    found: list[Path] = []
+    for name in next(INPUTS[kind] for kind in type(options).__mro__ if kind in INPUTS):
+        value = getattr(options, name)
+        if value is None:
+            continue
+        if name == "map":
+            found += map_file(value)
+        elif name == "payload":
+            found += [Path(value)] if value.endswith(".xml") else []
+        elif name == "calibration" and value.is_dir():
+            found.append(value / CALIBRATION)
+        else:
+            found += value if isinstance(value, tuple) else [value]
+    return found
+
+
+def map_file(name: str) -> list[Path]:
+    """The file that a map is read from, none for a built-in one."""
+    if not Path(name).is_file():
+        return []
+    from mocobot_logs.map.files import MAPS  # takes time, and files are seldom named like built-in maps
+
+    return [] if name in MAPS else [Path(name)]
 
 
 def check_inspect(options: opt.Inspect) -> None:
     """Everything that can be refused before the log is read."""
     options.check_for(options.model)
-    inputs = [options.rec, *_calibration(options.calibration)]
-    if options.model is not None:
-        inputs += _given(options.model, options.map)
-    _check_files(options.force, inputs, options.json)
+    _check_file(options, options.json)
     _check_logs([options.rec], options.model)
 
 
 def check_map(options: opt.Map) -> None:
     """Everything that can be refused before the log is read."""
-    _check_files(options.force, [options.log, *_given(options.model)], options.out)
+    _check_file(options, options.out)
     _check_logs([options.log], options.model)
 
 
@@ -51,7 +92,8 @@ def check_convert(options: opt.Convert) -> None:
     """Everything that can be refused before the log is read."""
     options.check()
     check_target_of(options, targets(options.out, 1)[0] if options.split_at_gaps else options.out)
-    _check_files(options.force, [*_inputs_of(options), options.out], options.json)
+    if options.json is not None:
+        check_output(options.json, [*inputs_of(options), options.out], force=options.force)
     _check_logs([options.log])
 
 
@@ -62,12 +104,8 @@ def targets(out: Path, count: int) -> list[Path]:
 
 
 def check_target_of(options: opt.Convert, out: Path) -> None:
-    """One recording, under the name that it will have.
-
-    Raises:
-        InputError: it may not be written, or cannot.
-    """
-    inputs = _inputs_of(options)
+    """One recording, under the name that it will have."""
+    inputs = inputs_of(options)
     if output_kind(out) == "folder":
         check_no_input(out, inputs)
         check_folder(out, inputs, holds("bag"), "a bag of an earlier conversion", force=options.force)
@@ -75,21 +113,15 @@ def check_target_of(options: opt.Convert, out: Path) -> None:
         check_output(out, inputs, force=options.force)
 
 
-def _inputs_of(options: opt.Convert) -> list[Path]:
-    return [options.log, *_given(options.design), *map_file(options.map)]
-
-
 def check_estimate(options: opt.Estimate) -> None:
     """Everything that can be refused before a recording is read."""
     options.check()
     _check_recordings(options.rec)
-    inputs = [*options.rec, *map_file(options.map), *_calibration(options.calibration)]
-    if options.pictures and options.out is not None:
-        check_folder(options.out, inputs, holds("estimate"), "an earlier estimate", force=options.force)
+    if options.pictures:
+        _check_folder(options, "estimate")
     else:
-        _check_files(options.force, inputs, options.out)
-    _check_pictures(options)
-    _check_files(options.force, inputs, options.json)
+        _check_file(options, options.out)
+    _check_file(options, options.json)
     _check_logs(options.rec)
 
 
@@ -99,8 +131,8 @@ def check_calibrate(options: opt.Calibrate) -> None:
         raise InputError("no recording with a payload is given; name them first, those of --free after it")
     files = [*options.rec, *options.free]
     _check_recordings(files)
-    inputs = [*files, *_given(options.prior), *map_file(options.map)]
-    _check_results(options, inputs, "calibration", "an earlier calibration")
+    _check_folder(options, "calibration")
+    _check_file(options, options.json)
     _check_logs(files)
 
 
@@ -112,10 +144,7 @@ def check_watch(options: opt.Watch) -> None:
     for stem in stems:
         if stems.count(stem) > 1:
             raise InputError(f"{stem} is the name of two recordings; give each a name of its own")
-    _check_pictures(options)
-    if options.out is not None:
-        inputs = [*options.rec, *map_file(options.map)]
-        check_folder(options.out, inputs, holds("watch"), "an earlier result of watch", force=options.force)
+    _check_folder(options, "watch", "an earlier result of watch")
     _check_logs(options.rec)
 
 
@@ -128,9 +157,8 @@ def check_diagnose(options: opt.Diagnose) -> None:
     _check_recordings(options.rec)
     options.check_for(options.model, options.reference)
     _check_recordings(logs)
-    inputs = [*logs, *_given(options.tolerances, options.model), *map_file(options.map)]
-    inputs += _calibration(options.calibration)
-    _check_results(options, inputs, "diagnosis", "an earlier diagnosis")
+    _check_folder(options, "diagnosis")
+    _check_file(options, options.json)
     _check_logs(logs, options.model)
     for path in filter(Path.exists, map(truth_path, options.rec)) if options.model is None else ():
         read_json(path, TRUTH)  # what it says, nobody asks before the verdict
@@ -138,35 +166,39 @@ def check_diagnose(options: opt.Diagnose) -> None:
 
 def check_compare(options: opt.Compare) -> None:
     """Everything that can be refused before a result is read."""
-    inputs = [options.a, options.b]
-    _check_results(options, inputs, "comparison", "an earlier comparison")
-    _check_there(inputs)
+    _check_folder(options, "comparison")
+    _check_file(options, options.json)
+    _check_there([options.a, options.b])
 
 
 def check_simulate(options: opt.Simulate) -> None:
     """Everything that can be refused before a team is built, the effects' numbers among it."""
-    if options.out is None:
+    out = options.out
+    if out is None:
         raise InputError(
             "out must be given: REC.parquet, or with --trials a folder; see mocobot simulate --help"
         )
-    kinds, given = options.kinds, Path(options.payload or "")
-    inputs = [*([given] if given.is_file() else []), *_given(options.units)]
+    kinds = options.kinds
     if options.trials is None:
-        check_output(options.out, inputs, force=options.force, suffix=".parquet")
-        check_output(truth_path(options.out), inputs, force=options.force)
-    elif options.out.suffix == ".parquet":
-        raise InputError(f"out is {options.out}; with --trials it must be a folder")
+        _check_file(options, out, suffix=".parquet")
+        _check_file(options, truth_path(out))
+    elif out.suffix == ".parquet":
+        raise InputError(f"out is {out}; with --trials it must be a folder")
     else:
-        check_folder(options.out, inputs, holds("simulation"), "an earlier simulation", force=options.force)
+        _check_folder(options, "simulation")
     options.check_for(options.payload, kinds)
     options.check()
-    if options.payload is not None and given.suffix != ".xml":
-        payload_path(options.payload)
+    _check_payload(options.payload)
     if options.effects:
         from mocobot_sim.effects.spec import parse_effect  # numpy, and a file for each effect
 
         for text in options.effects:
             parse_effect(str(text))
+
+
+def _check_payload(payload: str | None) -> None:
+    if payload is not None and not payload.endswith(".xml"):
+        payload_path(payload)
 
 
 def check_effects(options: opt.Effects) -> None:
@@ -178,23 +210,15 @@ def check_effects(options: opt.Effects) -> None:
 def check_campaign(options: opt.Campaign) -> None:
     """Everything that can be refused before a team is built, but for the names of sensors."""
     options.check()
-    inputs = inputs_of_campaign(options)
+    inputs = inputs_of(options)
     _check_there(inputs)
-    if Path(options.payload).suffix != ".xml":
-        payload_path(options.payload)
+    _check_payload(options.payload)
     if is_campaign(options.out):
         check_no_input(options.out, inputs)
         check_place(options.out)
     else:
         check_folder(options.out, inputs, lambda _: False, "a campaign", force=options.force)
-    _check_files(options.force, inputs, options.json)
-
-
-def inputs_of_campaign(options: opt.CampaignOptions) -> list[Path]:
-    """Files that a campaign reads."""
-    payload = Path(options.payload)
-    files = _given(payload if payload.suffix == ".xml" else None, options.units, options.tolerances)
-    return files + _calibration(options.calibration)
+    _check_file(options, options.json)
 
 
 def is_campaign(folder: Path) -> bool:
@@ -239,35 +263,10 @@ def check_report(options: opt.Report) -> None:
 
 def check_replay(options: opt.Replay) -> None:
     """Everything that can be refused before a recording is read."""
-    if options.out is not None and options.web:
-        options.check_for(options.out, options.model)
-    _check_recordings(options.rec)
     options.check_for(options.out, options.model)
-    if options.out is not None:
-        inputs = [*options.rec, *_given(options.estimate, options.model, options.map)]
-        inputs += _calibration(options.calibration)
-        check_output(options.out, inputs, force=options.force, suffix=".rrd")
+    _check_recordings(options.rec)
+    _check_file(options, options.out, suffix=".rrd")
     _check_logs(options.rec, options.model)
-
-
-def _given(*named: Path | str | None) -> list[Path]:
-    return [Path(name) for name in named if name is not None]
-
-
-def map_file(name: str | None) -> list[Path]:
-    """The file that a map is read from, none for a built-in one."""
-    if name is None or not Path(name).is_file():
-        return []
-    from mocobot_logs.map.files import MAPS  # takes time, and files are seldom named like built-in maps
-
-    return [] if name in MAPS else [Path(name)]
-
-
-def _calibration(given: Path | None) -> list[Path]:
-    """The file that a calibration is read from."""
-    if given is None:
-        return []
-    return [given / CALIBRATION if given.is_dir() else given]
 
 
 def _check_recordings(recordings: Sequence[Path]) -> None:
@@ -284,7 +283,7 @@ def _check_recordings(recordings: Sequence[Path]) -> None:
 
 def _check_logs(logs: Sequence[Path], *beside: Path | None) -> None:
     """Files that must be there, the logs of a known format."""
-    _check_there([*logs, *_given(*beside)])
+    _check_there([*logs, *(path for path in beside if path is not None)])
     for path in logs:
         if path.is_file() and path.suffix.lower() not in (".json", ".parquet"):  # of those reading tells more
             log_kind(path)
@@ -320,38 +319,23 @@ def _check_parquet(path: Path) -> None:
         raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({what})")
 
 
-def _check_results(
-    options: opt.Calibrate | opt.Diagnose | opt.Compare, inputs: Sequence[Path], kind: str, what: str
-) -> None:
-    """The folder and the JSON of a result."""
-    _check_pictures(options)
+def _check_folder(options: Any, kind: str, what: str = "") -> None:
+    """The folder of a result, where one is asked for."""
     if options.out is not None:
-        check_folder(options.out, inputs, holds(kind), what, force=options.force)
-    _check_files(options.force, inputs, options.json)
-
-
-def _check_pictures(options: object) -> None:
-    if getattr(options, "pictures", False) and getattr(options, "out", None) is None:
+        called = what or f"an earlier {kind}"
+        check_folder(options.out, inputs_of(options), holds(kind), called, force=options.force)
+    elif getattr(options, "pictures", False):
         raise InputError("pictures needs --out, a folder for them")
 
 
-def _check_files(force: bool, inputs: Sequence[Path], *outputs: Path | None) -> None:
-    for path in _given(*outputs):
-        check_output(path, inputs, force=force)
+def _check_file(options: Any, path: Path | None, suffix: str = "") -> None:
+    """A file to write, where one is asked for."""
+    if path is not None:
+        check_output(path, inputs_of(options), force=options.force, suffix=suffix)
 
 
 def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix: str = "") -> None:
-    """Find out that a file may not be written, or cannot, before the work is done whose result it would hold.
-
-    Args:
-        path: the file.
-        inputs: files and folders that must not be lost.
-        force: whether an existing file may be replaced.
-        suffix: how its name must end; any name will do if empty.
-
-    Raises:
-        InputError: it is an input or lies in one, it exists without ``force``, or see ``check_target``.
-    """
+    """Find out that a file may not be written, or cannot, before the work is done whose result it would hold."""
     check_no_input(path, inputs)
     check_target(path, suffix)
     if path.exists() and not force:
@@ -359,11 +343,7 @@ def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix
 
 
 def check_no_input(path: Path, inputs: Sequence[Path]) -> None:
-    """Find out that an output is an input, or lies in one.
-
-    Raises:
-        InputError: it is, or does.
-    """
+    """Find out that an output is an input, or lies in one."""
     with system_errors(path):
         real = Path(os.path.realpath(path))
         for given in inputs:

@@ -12,7 +12,7 @@ import textwrap
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import Field, dataclass, fields
+from dataclasses import Field, dataclass, field, fields
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -141,7 +141,7 @@ def _run(arguments: Sequence[str]) -> None:
     told = with_config(arguments)
     try:
         options = parse(told.words)
-        set_max_unpacked(getattr(options, "max_unpacked_gib", None))
+        set_max_unpacked(getattr(options, "max_unpacked", None))
         command = type(options).__name__.lower()
         getattr(import_module("mocobot.checks"), f"check_{command}")(options)
         # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
@@ -181,7 +181,7 @@ def help_text() -> str:
 
 
 def _version() -> str:
-    """Of the installed package."""
+    """Version of the installed package."""
     from importlib.metadata import PackageNotFoundError, version  # 20 ms that nothing else needs
 
     try:
@@ -228,12 +228,12 @@ def flags(command: str) -> dict[str, Field[Any]]:
     """Options of a command, without dashes in front, and the fields that they set."""
     tyro = import_module("tyro")
     found = {}
-    for field in fields(kinds()[command]):
-        if tyro.conf.Positional not in get_args(field.type):
+    for entry in fields(kinds()[command]):
+        if tyro.conf.Positional not in get_args(entry.type):
             names = [
-                each.name for each in get_args(field.type) if isinstance(getattr(each, "name", None), str)
+                each.name for each in get_args(entry.type) if isinstance(getattr(each, "name", None), str)
             ]
-            found[(names or [field.name])[0].replace("_", "-")] = field
+            found[(names or [entry.name])[0].replace("_", "-")] = entry
     return found
 
 
@@ -244,12 +244,14 @@ class Configured:
     Attributes:
         words: all of them, as if all had been given there.
         command: which of them is the command, or None.
+        spelled: options as the user spells them, by what they are called.
         table: file and table, as a sentence names them.
         names: options that are the file's.
     """
 
     words: list[str]
     command: str | None = None
+    spelled: Mapping[str, str] = field(default_factory=dict)
     table: str = ""
     names: tuple[str, ...] = ()
 
@@ -263,24 +265,21 @@ class Configured:
         if begin := re.match(rf"({names})(?: and ({names}))?(?= (?:{verbs})\b)", sentence):
             named = " and ".join(f"--{by_field[name]}" for name in begin.groups() if name)
             sentence = named + sentence[begin.end() :]
-        begin = re.match(r"--([a-z][a-z-]*)\b", sentence)
-        return f"{self.table} {sentence}" if begin and begin[1] in self.names else sentence
+        if not (begin := re.match(r"--([a-z][a-z-]*)\b", sentence)):
+            return sentence
+        sentence = self.spelled.get(begin[1], begin[0]) + sentence[begin.end() :]
+        return f"{self.table} {sentence}" if begin[1] in self.names else sentence
 
 
 def with_config(arguments: Sequence[str]) -> Configured:
-    """Arguments with the options of a file behind them; what the command line says itself goes before the file.
-
-    Raises:
-        InputError: the file cannot be read, or has a table or key that is no command or option, or a value that none
-            takes.
-    """
+    """Arguments with the options of a file behind them; what the command line says itself goes before the file."""
     left, file = _taken(arguments)
     command = next((word for word in left if word in COMMANDS), None)
     if command is None:
         return Configured(left)
-    left = _renamed(left, command)
+    left, spelled = _renamed(left, command)
     if file is None:
-        return Configured(left, command)
+        return Configured(left, command, spelled)
     from estimator.strict import read_toml
 
     tables = read_toml(Path(file), "file of options")
@@ -299,7 +298,7 @@ def with_config(arguments: Sequence[str]) -> Configured:
         if not {f"--{flag}", f"--no-{flag}"} & given:
             left += _words(f"{file}: [{command}] {key}", flag, value, known[flag])
             names.append(flag)
-    return Configured(left, command, f"{file}: [{command}]", tuple(names))
+    return Configured(left, command, spelled, f"{file}: [{command}]", tuple(names))
 
 
 def _taken(arguments: Sequence[str]) -> tuple[list[str], str | None]:
@@ -324,21 +323,21 @@ def _newer(flag: str, known: Mapping[str, Any]) -> str:
     return newer if newer in known and flag not in known else flag
 
 
-def _renamed(words: list[str], command: str) -> list[str]:
-    """Words with earlier spellings of options in their newer one."""
-    known, out, seen = flags(command), [], {}
+def _renamed(words: list[str], command: str) -> tuple[list[str], dict[str, str]]:
+    """Words with earlier spellings of options in their newer one, and how each was spelled."""
+    known, out, spelled = flags(command), [], {}
     for word in words:
         name, equals, value = word.partition("=")
         if name.startswith("--"):
             flag = _newer(name[2:].replace("_", "-"), known)
-            if seen.setdefault(flag, name) != name:
-                raise InputError(f"{seen[flag]} and {name} are one option; give it once")
+            if spelled.setdefault(flag, name) != name:
+                raise InputError(f"{spelled[flag]} and {name} are one option; give it once")
             name = f"--{flag}" if flag in known else name
         out.append(name + equals + value)
     if command == "convert" and "--out" in out[:-1]:  # the place to write is a word of its own there
         at = out.index("--out")
-        return [*out[:at], *out[at + 2 :], out[at + 1]]
-    return out
+        out = [*out[:at], *out[at + 2 :], out[at + 1]]
+    return out, spelled
 
 
 def _words(where: str, flag: str, value: Any, entry: Field[Any]) -> list[str]:
@@ -365,11 +364,7 @@ def _close(name: str, known: Sequence[str]) -> str:
 
 
 def parse(words: Sequence[str]) -> Any:
-    """The options of the command that the words name; help is printed, and ends the process.
-
-    Raises:
-        InputError: the words cannot be understood.
-    """
+    """The options of the command that the words name; help is printed, and ends the process."""
     import tyro
     from tyro import (
         _errors,
@@ -507,7 +502,3 @@ VALUES: Mapping[Any, tuple[Callable[[str], Any], str]] = {
     Path: (Path, "PATH"),
 }
 """What makes a value of a word, and how the help calls it."""
-
-
-if __name__ == "__main__":
-    main()

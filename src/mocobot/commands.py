@@ -21,7 +21,7 @@ from estimator.errors import InputError
 from estimator.files import whole_folder, write_json, write_text
 from estimator.strict import read_json
 from mocobot import options as opt
-from mocobot.checks import CALIBRATION, TRUTH, check_target_of, map_file, targets
+from mocobot.checks import TRUTH, check_target_of, inputs_of, targets
 from mocobot.cli import NotGood
 from mocobot.progress import bar, share_bar, stages
 from mocobot.results import Folder, file_facts, provenance
@@ -90,11 +90,10 @@ def _earlier(out: Path, written: Sequence[Path]) -> list[Path]:
 def estimate(options: opt.Estimate) -> None:
     """Estimate what recordings hold, write and print it."""
     notes: list[str] = []
-    inputs = [*options.rec, *_map_and_calibration(options)]
     with stages() as (say, _):
         found = mocobot.estimate(options.rec, options, say=say, note=notes.append)
     if options.out or options.json:
-        values = found.to_dict() | {"provenance": provenance("estimate", options, inputs)}
+        values = found.to_dict() | {"provenance": provenance("estimate", options, inputs_of(options))}
         if options.pictures and options.out:
             with whole_folder(options.out, "estimate") as folder:
                 write_json(folder / "estimate.json", values)
@@ -126,10 +125,11 @@ def _team_picture(options: opt.Estimate, found: Any, path: Path) -> list[str]:
 def calibrate(options: opt.Calibrate) -> None:
     """Find out how the robots differ from their design, write and print it."""
     notes: list[str] = []
-    inputs = [*options.rec, *options.free, *_paths(options.prior), *map_file(options.map)]
     with stages() as (say, _):
         found = mocobot.calibrate(options.rec, options.free, options, say=say, note=notes.append)
-        made_with = provenance("calibrate", options, inputs) if options.out or options.json else {}
+        made_with = (
+            provenance("calibrate", options, inputs_of(options)) if options.out or options.json else {}
+        )
         missing = _write(found, options, made_with, say)
     print("\n".join([*notes, str(found)]))
     if options.out:
@@ -170,8 +170,7 @@ def diagnose(options: opt.Diagnose) -> None:
 def _inputs_of_diagnosis(options: opt.Diagnose) -> list[Path]:
     """Files that a diagnosis is made from."""
     if options.model is None:
-        calibration = _map_and_calibration(options)
-        return [*options.rec, *_paths(options.tolerances), *calibration]
+        return inputs_of(options)
     from mocobot.api.joints import map_path, read_model
 
     robot, logs = read_model(options.model), [*options.rec, *options.reference]
@@ -195,7 +194,7 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
 def watch(options: opt.Watch) -> None:
     """Logs to a first verdict, and a page with all of it."""
     out = options.out
-    made_with = provenance("watch", options, [*options.rec, *map_file(options.map)])
+    made_with = provenance("watch", options, inputs_of(options))
     if out is None and options.open:
         out = Path(tempfile.mkdtemp(prefix="mocobot-watch-")) / "watch"
     page = None
@@ -234,11 +233,12 @@ def simulate(options: opt.Simulate) -> None:
 
     kinds, out, many = options.kinds, options.out, options.trials is not None
     assert out is not None
-    length = f"{len(kinds)} trials" if len(kinds) > 1 else f"{kinds[0]} trial"
-    with share_bar(length, "trial" if len(kinds) > 1 else "s") as tell:
+    kind, *others = kinds
+    length, unit = (f"{len(kinds)} trials", "trial") if others else (f"{kind} trial", "s")
+    with share_bar(length, unit) as tell:
 
         def progress(trial: int, done: int, samples: int) -> None:
-            if len(kinds) == 1:
+            if not others:
                 tell(done / RATE_HZ, samples / RATE_HZ, "")
             else:
                 tell(trial - 1 + done / samples, len(kinds), kinds[trial - 1])
@@ -339,13 +339,6 @@ def replay(options: opt.Replay) -> None:
 
 def _paths(*given: Any) -> list[Path]:
     return [path for path in given if path is not None]
-
-
-def _map_and_calibration(options: opt.Estimate | opt.Diagnose) -> list[Path]:
-    """The files of a map and of a calibration, as far as they are given."""
-    given = options.calibration
-    calibration = given / CALIBRATION if isinstance(given, Path) and given.is_dir() else given
-    return [*map_file(options.map), *_paths(calibration)]
 
 
 def _write(

@@ -105,11 +105,7 @@ def made(kind: type[Made], options: Made | None, given: Mapping[str, Any]) -> Ma
 
 
 def refuse_teams(options: Any, names: Iterable[str]) -> None:
-    """Refuse options of a team where the model of one robot is given.
-
-    Raises:
-        InputError: one of them is not as it is by default.
-    """
+    """Refuse options of a team where the model of one robot is given."""
     default = {field.name: field.default for field in fields(options)}
     for name in names:
         if getattr(options, name) != default[name]:
@@ -117,21 +113,13 @@ def refuse_teams(options: Any, names: Iterable[str]) -> None:
 
 
 def refuse_both(options: Any, one: str, other: str, why: str) -> None:
-    """Refuse two options that exclude each other.
-
-    Raises:
-        InputError: both are given.
-    """
+    """Refuse two options that exclude each other."""
     if getattr(options, one) not in (None, ()) and getattr(options, other) not in (None, ()):
         raise InputError(f"{one} and {other} are both given; {why}")
 
 
 def check_range(options: Any, name: str, least: float, most: float = math.inf) -> None:
-    """Refuse a number that is out of range.
-
-    Raises:
-        InputError: it is.
-    """
+    """Refuse a number that is out of range."""
     value = getattr(options, name)
     if not least <= value <= most:
         allowed = f"at least {least:g}" if most == math.inf else f"from {least:g} to {most:g}"
@@ -139,11 +127,7 @@ def check_range(options: Any, name: str, least: float, most: float = math.inf) -
 
 
 def check_seconds(seconds: float | None) -> None:
-    """Refuse a time limit that is none.
-
-    Raises:
-        InputError: it is.
-    """
+    """Refuse a time limit that is none."""
     if seconds is not None and not 0.0 < seconds <= LONGEST_S:
         raise InputError(f"seconds is {seconds:g}; it must be above 0 and at most {LONGEST_S:g} s")
 
@@ -166,11 +150,7 @@ def check_motion(options: Any, kinds: Sequence[str], needed: Mapping[str, tuple[
 
 
 def kinds_of(trials: str, known: Sequence[str]) -> tuple[str, ...]:
-    """Kind of every trial of a list such as ``random,static``.
-
-    Raises:
-        InputError: one is not known.
-    """
+    """Kind of every trial of a list such as ``random,static``."""
     kinds = tuple(trials.split(","))
     if not set(kinds) <= set(known):
         raise InputError(
@@ -184,7 +164,7 @@ class Files:
     """What every command has that reads a log and writes something."""
 
     force: Force = False
-    max_unpacked_gib: MaxUnpacked = None
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,7 +191,7 @@ class EstimateOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate(EstimateOptions, Files):
+class Estimate(Files, EstimateOptions):
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
 
     rec: Logs
@@ -245,7 +225,7 @@ class CalibrateOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibrate(CalibrateOptions, Files):
+class Calibrate(Files, CalibrateOptions):
     """Find out how every robot differs from its design, from recordings of what the team carries."""
 
     rec: Logs
@@ -302,7 +282,7 @@ class DiagnoseOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagnose(DiagnoseOptions, Files):
+class Diagnose(Files, DiagnoseOptions):
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
     rec: Logs
@@ -335,7 +315,7 @@ class WatchOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Watch(WatchOptions, Files):
+class Watch(Files, WatchOptions):
     """Look at recordings or logs once, and say what there is: inspect, convert, estimate, calibrate if the robots
     contradict each other, diagnose, and make a page."""
 
@@ -468,7 +448,7 @@ class ConvertOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Convert(ConvertOptions, Files):
+class Convert(Files, ConvertOptions):
     """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
@@ -488,7 +468,7 @@ class MapOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Map(MapOptions, Files):
+class Map(Files, MapOptions):
     """Draft the map of a log, for `convert --map`: what is which channel, by names, the units in them, and values."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
@@ -515,7 +495,7 @@ class InspectOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inspect(InspectOptions, Files):
+class Inspect(Files, InspectOptions):
     """Look at a log before anyone trusts a number of it: stamps, channels, clocks, wiring, excitation."""
 
     rec: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
@@ -694,7 +674,7 @@ class ReplayOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay(ReplayOptions, Files):
+class Replay(Files, ReplayOptions):
     """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
     rec: Logs
@@ -708,7 +688,6 @@ OLD_NAMES = {
     "duration": "duration-s",
     "rate": "rate-hz",
     "max-gap": "max-gap-s",
-    "max-unpacked": "max-unpacked-gib",
     "out-dir": "out",
     "save": "out",
 }

@@ -44,13 +44,7 @@ Kind = TypeVar("Kind")
 
 
 def public(kind: type[Kind], below: Any, **more: Any) -> Kind:
-    """A result of a package below as a subclass of its dataclass.
-
-    Args:
-        kind: the subclass.
-        below: the result.
-        more: fields that the subclass has besides, or has otherwise.
-    """
+    """A result of a package below as a subclass of its dataclass."""
     return kind(**{field.name: getattr(below, field.name) for field in fields(below)} | more)
 
 

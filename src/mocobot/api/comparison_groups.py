@@ -172,11 +172,7 @@ XYZ = ("x", "y", "z")
 
 
 def estimate_groups(a: PayloadEstimate, b: PayloadEstimate) -> list[Group]:
-    """Mass, centre of mass, inertia and grasps, as far as both have them.
-
-    Raises:
-        InputError: they are of different numbers of robots.
-    """
+    """Mass, centre of mass, inertia and grasps, as far as both have them."""
     if a.robots != b.robots:
         raise InputError(
             f"the estimates are of {a.robots} and {b.robots} robots; both must be of the same number"
@@ -281,9 +277,6 @@ def calibration_groups(a: Calibration, b: Calibration) -> list[Group]:
 
     The spring scale that all robots share is one error of both where neither has a known weight, for it is of the same
     springs: it leaves a difference as far as both depend on it alike.
-
-    Raises:
-        InputError: they are of different numbers of robots.
     """
     if a.robots != b.robots:
         raise InputError(

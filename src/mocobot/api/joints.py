@@ -63,11 +63,7 @@ def read_logs(
 
 
 def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
-    """The file of a log's map.
-
-    Raises:
-        InputError: none is given, and there is none beside the log or the model.
-    """
+    """The file of a log's map."""
     if given is not None:
         return Path(given)
     for beside in (log.parent / MAP, model.path.parent / MAP):
@@ -80,9 +76,5 @@ def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
 
 
 def map_of(model: SerialModel, log: Path, given: Path | str | None) -> JointMap:
-    """The map of a log.
-
-    Raises:
-        InputError: there is none, or it cannot be read, or does not suit the model.
-    """
+    """The map of a log."""
     return read_joint_map(map_path(model, log, given), model.joints, [bool(s) for s in model.slides])

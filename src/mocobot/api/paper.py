@@ -56,11 +56,7 @@ class Experiment:
         )
 
     def write(self, folder: Path, *, recordings: bool = False) -> None:
-        """Write scores, tables, estimates, fits and plots, and the recordings on request.
-
-        Raises:
-            InputError: a file cannot be written.
-        """
+        """Write scores, tables, estimates, fits and plots, and the recordings on request."""
         plan, result, written = self.plan, self.result, []
 
         def put(name: str, values: Any) -> None:

@@ -54,11 +54,7 @@ class Robots:
     """
 
     def __init__(self, given: GivenCalibration | None) -> None:
-        """Read the calibration, if there is one.
-
-        Raises:
-            InputError: it cannot be read.
-        """
+        """Read the calibration, if there is one."""
         self.calibration: Calibration | None = None
         self.called = "the calibration"
         if isinstance(given, Calibration):
@@ -67,19 +63,11 @@ class Robots:
             self.calibration, self.called = calibration_of(given), str(given)
 
     def of(self, recording: Recording) -> Recording:
-        """A recording that knows them.
-
-        Raises:
-            InputError: the calibration is of another number of robots, or of another design.
-        """
+        """A recording that knows them."""
         return recording if self.calibration is None else calibrated(recording, self.calibration, self.called)
 
     def units(self, source: LogSource, design: OmnidDesign) -> ArmUnit | None:
-        """The same for a log, of robots of a design where the log does not say; None without a calibration.
-
-        Raises:
-            InputError: as ``of``.
-        """
+        """The same for a log, of robots of a design where the log does not say; None without a calibration."""
         if self.calibration is None:
             return None
         known = design if source.metadata is None else source.metadata.design
@@ -87,11 +75,7 @@ class Robots:
 
 
 def calibration_of(path: Path | str) -> Calibration:
-    """The calibration of a file, or of the folder that ``mocobot calibrate --out`` wrote.
-
-    Raises:
-        InputError: the file cannot be read, or is not a whole calibration.
-    """
+    """The calibration of a file, or of the folder that ``mocobot calibrate --out`` wrote."""
     path = Path(path)
     file = path / CALIBRATION if path.is_dir() else path
     return calibration_from_dict(read_json(file, "a calibration"), str(file))
@@ -154,11 +138,7 @@ def _is_log(path: Path) -> bool:
 
 
 def read(path: Path) -> Recording:
-    """Read a recording.
-
-    Raises:
-        InputError: as ``read_recording``; for a log of another format it names the command that converts it.
-    """
+    """Read a recording."""
     try:
         return read_recording(path)
     except InputError:
@@ -172,11 +152,7 @@ def read(path: Path) -> Recording:
 
 
 def check_no_log(path: Path) -> None:
-    """Say what to do with a file or folder that is a log of another format, or of no format that is read.
-
-    Raises:
-        InputError: it is.
-    """
+    """Say what to do with a file or folder that is a log of another format, or of no format that is read."""
     try:
         kind = log_kind(path)
         if kind == "parquet" and is_recording(path):

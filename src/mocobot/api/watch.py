@@ -169,11 +169,7 @@ def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> No
 def _used(
     path: Path, log_map: Path | str | None, *, is_log: bool, skewed: bool
 ) -> tuple[dict[str, Recording], str]:
-    """What can be used of a file, by names, and what was done for it, empty if nothing.
-
-    Raises:
-        InputError: it cannot be converted, not even the parts of it between gaps.
-    """
+    """What can be used of a file, by names, and what was done for it, empty if nothing."""
     clock, corrected = ("correct", ", clocks corrected") if skewed else ("keep", "")
     try:
         if not is_log and not skewed:

@@ -45,18 +45,13 @@ TETHER_STIFFNESS = 0.5
 PUSH_S = (0.5, 2.0)
 """How long a push lasts."""
 DAMPING_RATIO = 0.05
-"""Of a pendulum."""
+"""Damping ratio of a pendulum."""
 SPREAD_IN_UNCALIBRATED = ("phi_zero", "theta_zero", "link_length", "sea_scale", "sea_bias")
 """Causes of which an uncalibrated team has so much everywhere that no single one stands out."""
 
 
 def pushes(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Candidate]:
-    """A push of a second every five seconds of all trials.
-
-    Args:
-        rig: of the trials.
-        tolerance: of a push, by parameter.
-    """
+    """A push of a second every five seconds of all trials."""
     spans = [(t, linear.reduction.time) for t, linear in enumerate(rig.linear)]
     return [
         CAUSES["push"].event(tolerance, Transient(trial, float(start), LIMIT_PUSH_S))
@@ -157,7 +152,7 @@ class Ground:
 
     @classmethod
     def of(cls, scene: TeamScene, trajectories: Sequence[Trajectory], limits: Any) -> "Ground":
-        """Of a team, the commands of its trials, and its detection limits."""
+        """The ground of a team, the commands of its trials, and its detection limits."""
         return cls(scene.robots, GroundTruth.of(scene).p_1c, moving_intervals(trajectories), limits)
 
 
@@ -183,12 +178,7 @@ def gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
 
 
 def one_axis(axes: Any, a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    """Whether two gimbal joints turn about one axis, near enough.
-
-    Args:
-        axes: what ``gimbal_axes`` says.
-        a, b: places, with the keys ``robot`` and ``joint`` from 1.
-    """
+    """Whether two gimbal joints turn about one axis, near enough."""
     first, second = (np.array(axes)[x["robot"] - 1, x["joint"] - 1] for x in (a, b))
     return bool(abs(first @ second) > PARALLEL)
 
@@ -205,11 +195,7 @@ def draw_effect(cause: str, factor: float, ground: Ground, rng: np.random.Genera
 def draw_at(
     cause: str, factor: float, robot: int | None, joint: int | None, ground: Ground, rng: np.random.Generator
 ) -> Effect:
-    """One effect of ``factor`` times the detection limit, at a given place.
-
-    Raises:
-        InputError: no such effect is so large.
-    """
+    """One effect of ``factor`` times the detection limit, at a given place."""
     if cause == "push":
         parameters = _push(factor, ground, rng)
     elif cause == "slosh":

@@ -45,7 +45,7 @@ from mocobot.campaign.effects import (
     push_limits,
 )
 from mocobot.campaign.summary import csv_table, format_campaign, summarise
-from mocobot.checks import CONFIG, CONFIG_FORMAT, inputs_of_campaign
+from mocobot.checks import CONFIG, CONFIG_FORMAT, inputs_of
 from mocobot.cluster import workers_of
 from mocobot.options import CampaignOptions
 from mocobot.results import NAME, folder_provenance, provenance, run_key
@@ -66,7 +66,7 @@ FILES = ("payload", "units", "calibration", "tolerances")
 """Options that may name a file, of which the content counts."""
 Json = dict[str, Any]
 KEPT = ("verdict", "causes", "suspected", "scatter", "residual", "notes")
-"""Of a diagnosis; the rest is large, and for one recording's reader."""
+"""What is kept of a diagnosis; the rest is large, and for one recording's reader."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +87,7 @@ class CampaignPlan(CampaignOptions):
 
     @classmethod
     def of(cls, options: CampaignOptions) -> "CampaignPlan":
-        """The plan that options ask for.
-
-        Raises:
-            InputError: sensors that are not calibrated, or a file that cannot be used.
-        """
+        """The plan that options ask for."""
         if not sensor_preset(options.preset).calibrated:
             raise InputError(
                 f"preset is {options.preset}, which draws robots of its own; use nominal, and --background uncalibrated"
@@ -187,16 +183,7 @@ class CampaignStore:
     """
 
     def __init__(self, out: Path, config: Mapping[str, str], *, force: bool = False) -> None:
-        """Open a campaign's folder, or begin one.
-
-        Args:
-            out: the folder.
-            config: what sets depend on.
-            force: drop what another campaign left there.
-
-        Raises:
-            InputError: it is another campaign's, cannot be read, or cannot be written.
-        """
+        """Open a campaign's folder, or begin one."""
         self.out = out
         file = out / CONFIG
         if file.is_file() and (what := _difference(_read(file), config)):
@@ -217,22 +204,14 @@ class CampaignStore:
         return self.file(one).is_file()
 
     def get(self, one: CampaignSet) -> dict[str, Any]:
-        """The result of a set.
-
-        Raises:
-            InputError: it is not there, or cannot be read.
-        """
+        """The result of a set."""
         found = read_json(self.file(one), RESULT)
         if found.get("set") != json.loads(json.dumps(one.to_dict())):
             raise InputError(f"{self.file(one)}: is not the result of that set; delete it")
         return found
 
     def put(self, result: Mapping[str, Any]) -> None:
-        """Keep a result.
-
-        Raises:
-            InputError: it cannot be written.
-        """
+        """Keep a result."""
         write_json(self.out / SETS / f"{result['set']['key']}.json", result)
 
     def file(self, one: CampaignSet) -> Path:
@@ -361,11 +340,7 @@ class Campaign:
         return format_campaign(self.values)
 
     def write(self, folder: Path, *, pictures: bool = True) -> str:
-        """Write summary, table, report and provenance into the campaign's folder, and name them.
-
-        Raises:
-            InputError: a file cannot be written.
-        """
+        """Write summary, table, report and provenance into the campaign's folder, and name them."""
         written = [folder / name for name in (SUMMARY, TABLE, REPORT)]
         write_json(written[0], self.values)
         write_text(written[1], csv_table(self.values))
@@ -397,7 +372,7 @@ def campaign(
         InputError: an option that cannot be met, a folder of another campaign, or an output that cannot be written.
     """
     plan = CampaignPlan.of(options)
-    made_with = provenance("campaign", options, inputs_of_campaign(options))
+    made_with = provenance("campaign", options, inputs_of(options))
     store = CampaignStore(out, config_of(options), force=force)
     with workers_of(options.scheduler):
         results = run_campaign(plan, store, options.jobs, done, remote=options.scheduler is not None)
@@ -405,13 +380,9 @@ def campaign(
 
 
 def config_of(options: CampaignOptions) -> dict[str, str]:
-    """What sets depend on, as text by name, the code last.
-
-    Raises:
-        InputError: a file cannot be read.
-    """
+    """What sets depend on, as text by name, the code last."""
     values = {name: value for name, value in asdict(options).items() if name not in NO_MATTER}
-    files = inputs_of_campaign(options)
+    files = inputs_of(options)
     for name in FILES:
         given = values[name]
         of = [file for file in files if given is not None and Path(given) in (file, file.parent)]

@@ -37,7 +37,7 @@ from mocobot_sim.effects.catalogue import EFFECTS
 
 Json = dict[str, Any]
 BINS = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 0.99), (0.99, 1.0 + 1e-12))
-"""Of stated probabilities."""
+"""Bins of stated probabilities."""
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
@@ -222,7 +222,7 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
-    """Of a push, where along its line and how long it acts cannot be told; nor is what masses decide."""
+    """Errors of the parameters that data determine: not where along its line a push acts, nor how long."""
     known, named = effect["answer"]["known"], item["parameters"]
     cause = effect["answer"]["cause"]
     skipped = (
