@@ -300,7 +300,7 @@ def paper(options: opt.Paper) -> None:
 
     start = time.perf_counter()
     with share_bar("paper", "steps") as tell:
-        done = run_experiment(options, options.out, force=options.force, tell=tell)
+        done = run_experiment(options, tell)
     print(done)
     print(f"\n{done.physics} Wall time {time.perf_counter() - start:.0f} s.")
     if options.out:

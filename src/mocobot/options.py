@@ -507,8 +507,8 @@ class Inspect(Files, InspectOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PaperOptions(Options):
-    """What the paper's experiment consists of, and where it runs."""
+class Paper(Options):
+    """Run the paper's experiment and print Tables II-V, published figures beside ours."""
 
     payload: tuple[str, ...] = ("a", "b", "c", "d")
     """Payload configurations."""
@@ -522,23 +522,17 @@ class PaperOptions(Options):
     """The paper's own method alone, without the calibrations and fits beside it."""
     jobs: Jobs = 2
     scheduler: Scheduler = None
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for paper.json, tables.txt, the estimates and plots; a run that was interrupted goes on there."""
+    force: Force = False
+    recordings: bool = False
+    """Write the recordings, too (needs --out)."""
 
     def check(self) -> None:
         """Raise an InputError for a payload that does not exist, or a number that is out of range."""
         for payload in self.payload:
             payload_path(payload)
         check_range(self, "jobs", 1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Paper(PaperOptions):
-    """Run the paper's experiment and print Tables II-V, published figures beside ours."""
-
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for paper.json, tables.txt, the estimates and plots; a run that was interrupted goes on there."""
-    force: Force = False
-    recordings: bool = False
-    """Write the recordings, too (needs --out)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -171,6 +171,22 @@ def test_a_simulated_recording_is_the_commands(tmp_path, capsys):
     assert rec.log.p_W1.shape == (len(rec.time), 3)
 
 
+def test_options_are_one_object_or_words():
+    rec = mocobot.simulate("b", vias=6, seed=5)
+    options = mocobot.EstimateOptions(method="joint", cutoff_hz=4.0)
+    found = mocobot.estimate(rec, options).to_dict()
+    assert found == mocobot.estimate(rec, method="joint", cutoff_hz=4.0).to_dict()
+    assert found == mocobot.estimate(rec, replace(options, cutoff_hz=5.0), cutoff_hz=4.0).to_dict()
+    told = mocobot.simulate("b", vias=1, effects=["sea_bias:robot=2,joint=1,bias=0.1"]).truth.effects
+    assert told == (mocobot.make_effect("sea_bias", {"bias_Nm": 0.1}, robot=2, joint=1),)
+    with pytest.raises(TypeError, match="colour"):
+        mocobot.estimate(rec, colour="red")
+    with pytest.raises(mocobot.InputError, match="self_calibrate and method are both given"):
+        mocobot.estimate(rec, options, self_calibrate=True)
+    with pytest.raises(mocobot.InputError, match="rate_hz is 5; it must be from 20 to 2000"):
+        mocobot.convert("none.csv", rate_hz=5)
+
+
 def test_effects_act_on_robots_as_they_were_built():
     bias = mocobot.make_effect("sea_bias", {"bias_Nm": 1.0}, robot=2, joint=1)
     clean, faulty = (

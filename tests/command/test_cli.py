@@ -18,9 +18,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import mocobot
 from command import refused, run
+from estimator.files import LIST
 from estimator.recording.parquet import write_recording
-from mocobot.cli import main, parse, with_config
+from mocobot.cli import TASKS, main, parse, with_config
 from recordings import small_recording
 
 Edit = Callable[[pa.Table], pa.Table]
@@ -169,6 +171,15 @@ def test_estimate_of_a_simulated_trial(recording, tmp_path, capsys):
     assert "[[Mass and centre of mass" in text
 
 
+def test_json_for_machines_and_pictures_on_demand(recording, tmp_path, capsys):
+    out, values = tmp_path / "est", tmp_path / "est.json"
+    assert run(capsys, "estimate", recording, "--json", values, "--out", out, "--pictures")[0] == 0
+    assert {path.name for path in out.iterdir()} == {LIST, "estimate.json", "report.txt", "team.png"}
+    assert (out / "estimate.json").read_bytes() == values.read_bytes()
+    assert mocobot.report(out) == out / "report.html"
+    assert "pictures needs --out" in refused(capsys, "estimate", recording, "--pictures")
+
+
 def test_same_seed_same_bytes_in_place_of_others(recording, tmp_path):
     """Into folders that are made, and over a file only if asked (refusals: test_first_trial)."""
     path = tmp_path / "new" / "folder" / "rec.parquet"
@@ -183,13 +194,19 @@ def test_same_seed_same_bytes_in_place_of_others(recording, tmp_path):
 COMMANDS = ("paper", "estimate", "diagnose", "simulate", "convert", "inspect", "replay", "report")
 
 
-def test_help_of_the_installed_command():
+def test_help_lists_commands_by_task_with_examples_that_can_be_read():
+    """And needs no numpy: test_api."""
     done = subprocess.run(
         [sys.executable, "-m", "mocobot", "--help"], capture_output=True, text=True, check=True
     )
     assert "usage: mocobot" in done.stdout
-    assert all(name in done.stdout for name in COMMANDS)
     assert done.stderr == ""
+    words = " ".join(done.stdout.split())
+    for task, (commands, example) in TASKS.items():
+        assert f"{task}:" in done.stdout
+        assert all(f"\n  {name} " in done.stdout for name in commands)
+        assert f"$ {example}" in words
+        parsed(*example.split()[1:])
 
 
 @pytest.mark.parametrize("arguments", [("--version",), ("estimate", "--version")])
@@ -274,6 +291,19 @@ def test_a_file_says_what_the_command_line_would(file):
     simulate = parsed("simulate", f"--config={file}", "--trials", "random")
     assert simulate.effects == ("drag:coefficient=1", "sea_bias:robot=1,joint=1,bias=0.1")
     assert (simulate.out, simulate.vias) == (Path("trials"), 4)
+
+
+def test_earlier_spellings_are_taken(capsys):
+    for earlier, now in (
+        ("simulate --duration 9 --out-dir a --trials static", "simulate --duration-s 9 --out a --trials static"),
+        ("replay a --save b.rrd", "replay a --out b.rrd"),
+        ("convert a --rate 50 b --max-gap=1", "convert a --rate-hz=50 b --max_gap_s 1"),
+        ("convert --out b a --force", "convert a b --force"),
+    ):
+        assert parsed(*earlier.split()) == parsed(*now.split())
+    said = refused(capsys, "replay", "a", "--save", "b.rrd", "--out", "c.rrd")
+    assert "--save and --out are one option; give it once" in said
+    assert "--duration is for a periodic" in refused(capsys, "simulate", "--duration", 9, "--out", "a.parquet")
 
 
 def test_the_command_line_goes_before_the_file(file):

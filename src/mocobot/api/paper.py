@@ -11,7 +11,7 @@ from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
 from mocobot.checks import SCORES
 from mocobot.cluster import workers_of
-from mocobot.options import PaperOptions
+from mocobot.options import Paper
 from mocobot.results import NAME, folder_provenance, provenance, run_key
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.store import Store
@@ -99,19 +99,11 @@ class Experiment:
         return written
 
 
-def run_experiment(
-    options: PaperOptions,
-    out: Path | None,
-    *,
-    force: bool,
-    tell: Callable[[float, float, str], object],
-) -> Experiment:
+def run_experiment(options: Paper, tell: Callable[[float, float, str], object]) -> Experiment:
     """Run the paper's experiment; an interrupted run goes on in its folder.
 
     Args:
-        options: of the experiment.
-        out: the folder, or None.
-        force: drop what a run with other options left there.
+        options: of the experiment; ``force`` drops what a run with other options left in the folder.
         tell: takes what is done, what there is to do, and the stage that runs.
 
     Raises:
@@ -122,7 +114,7 @@ def run_experiment(
         options.payload, options.preset, options.trials, options.seed, staged_only=options.staged_only
     )
     made_with = provenance("paper", options)
-    store = Store(out, run_key(asdict(plan)), force=force) if out else None
+    store = Store(options.out, run_key(asdict(plan)), force=options.force) if options.out else None
     with workers_of(options.scheduler):
         result = run_paper(plan, options.jobs, tell, store, remote=options.scheduler is not None)
     return Experiment(plan, result, made_with, store)
