@@ -295,7 +295,10 @@ def test_a_file_says_what_the_command_line_would(file):
 
 def test_earlier_spellings_are_taken(capsys):
     for earlier, now in (
-        ("simulate --duration 9 --out-dir a --trials static", "simulate --duration-s 9 --out a --trials static"),
+        (
+            "simulate --duration 9 --out-dir a --trials static",
+            "simulate --duration-s 9 --out a --trials static",
+        ),
         ("replay a --save b.rrd", "replay a --out b.rrd"),
         ("convert a --rate 50 b --max-gap=1", "convert a --rate-hz=50 b --max_gap_s 1"),
         ("convert --out b a --force", "convert a b --force"),
@@ -303,7 +306,9 @@ def test_earlier_spellings_are_taken(capsys):
         assert parsed(*earlier.split()) == parsed(*now.split())
     said = refused(capsys, "replay", "a", "--save", "b.rrd", "--out", "c.rrd")
     assert "--save and --out are one option; give it once" in said
-    assert "--duration is for a periodic" in refused(capsys, "simulate", "--duration", 9, "--out", "a.parquet")
+    assert "--duration is for a periodic" in refused(
+        capsys, "simulate", "--duration", 9, "--out", "a.parquet"
+    )
 
 
 def test_the_command_line_goes_before_the_file(file):

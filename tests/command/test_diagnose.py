@@ -8,7 +8,6 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import pyarrow as pa
 import pytest
 
 from diagnose_run import (
@@ -19,7 +18,6 @@ from diagnose_run import (
     run,
     unlabelled_and_heavier,
     with_metadata,
-    with_nan,
     without_robots,
 )
 from diagnosed import check_schema
@@ -130,14 +128,6 @@ def still(v: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "edit", "words"),
     [
-        ("nan.parquet", changed("omnid1.phi2", with_nan), ["nan.parquet", "omnid1.phi2", "row 500"]),
-        (
-            "gap.parquet",
-            lambda t: pa.concat_tables([t.slice(0, 400), t.slice(450)]),
-            ["gap.parquet", "gap", "row 400"],
-        ),
-        ("deg.parquet", changed(".theta", np.rad2deg), ["deg.parquet", "degrees"]),
-        ("column.parquet", lambda t: t.drop_columns(["omnid2.tau1"]), ["missing column 'omnid2.tau1'"]),
         ("two.parquet", without_robots(2), ["two.parquet", "is a robot missing"]),
         ("one.parquet", without_robots(1), ["one.parquet has one robot"]),
         ("still.parquet", changed("omnid", still), ["do not determine the grasps"]),
