@@ -96,7 +96,7 @@ def test_inspect(log, capsys):
     code, text, _ = run(capsys, "inspect", "my.csv", "--map", "my.toml")
     assert code == 0
     assert "[[Log my.csv]]" in text
-    assert mocobot.map("my.csv").text == Path("my.toml").read_text()
+    assert mocobot.map(log).text == Path("my.toml").read_text()
     assert "No map was given" in refused(capsys, "inspect", "my.csv")
 
 
