@@ -12,7 +12,7 @@ import argparse
 import os
 from pathlib import Path
 
-from mocobot import serial
+import mocobot
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "data" / "tx40"
@@ -29,9 +29,9 @@ def main() -> None:
     if not log.is_file():
         raise SystemExit(f"missing: {log}; models/tx40/README.md says where it is published")
 
-    model = serial.read_model(ROOT / "models" / "tx40" / "tx40.xml")
-    print(serial.inspect(log, model), "\n")
-    print(serial.diagnose(model, log))
+    model = ROOT / "models" / "tx40" / "tx40.xml"
+    print(mocobot.inspect(log, model), "\n")
+    print(mocobot.diagnose(log, model))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from mocobot import serial
+import mocobot
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER, NAME = ROOT / "data" / "emps", "DATA_EMPS.mat"
@@ -70,9 +70,9 @@ def main() -> None:
             )
             log = Path(made) / NAME
             simulate(log)
-        model = serial.read_model(ROOT / "models" / "emps" / "emps.xml")
-        print(serial.inspect(log, model), "\n")
-        print(serial.diagnose(model, log))
+        model = ROOT / "models" / "emps" / "emps.xml"
+        print(mocobot.inspect(log, model), "\n")
+        print(mocobot.diagnose(log, model))
 
 
 if __name__ == "__main__":

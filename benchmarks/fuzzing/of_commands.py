@@ -12,9 +12,8 @@ import mocobot
 from discrepancy.joints.model import load_model
 from discrepancy.team.causes import read_tolerances
 from estimator.errors import InputError
-from mocobot.cli import COMMANDS
-from mocobot.comparison.compare import compare
-from mocobot.parsing import with_config
+from mocobot.api.comparison import compare
+from mocobot.cli import with_config
 from mocobot_logs.joints.parse import read_joint_map
 from mocobot_sim.effects.catalogue import EXAMPLE, parse_effect
 from mocobot_sim.scene.as_built import read_units
@@ -70,7 +69,7 @@ def _effect(path: Path) -> None:
 KINDS = {
     "units": Kind("units.json", _text(json.dumps({"as_built": [{"phi_zero_rad": [0.01, 0, 0]}, {}, {}]})), read_units),
     "options": Kind(
-        "options.toml", _text(OPTIONS), lambda path: with_config(COMMANDS, ["simulate", "--config", str(path)])
+        "options.toml", _text(OPTIONS), lambda path: with_config(["simulate", "--config", str(path)])
     ),
     "effect": Kind("effect.txt", _text(EXAMPLE), _effect),
     "tolerances": Kind("tolerances.toml", _text(TOLERANCES), read_tolerances),

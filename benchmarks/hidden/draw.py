@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hidden.limits import LIMITS, pendulum_limit_kg
-from mocobot.campaign.ground import Ground
+from mocobot.campaign.effects import Ground
 
 LENGTHS_M = (0.08, 0.5)
 """Of pendulums."""

@@ -13,9 +13,7 @@ from hidden.draw import Tabled
 from hidden.logger import Logger
 from hidden.schedule import Schedule
 from hidden.sealed import Sealed
-from mocobot.campaign.background import draw_background
-from mocobot.campaign.draw import draw_effect
-from mocobot.campaign.ground import Ground, gimbal_axes
+from mocobot.campaign.effects import Ground, draw_background, draw_effect, gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset

@@ -23,8 +23,7 @@ import tyro
 
 from estimator.recording.parquet import write_recording
 from independent.generate import ANSWERS, FORMS, Noise, generate
-from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
-from mocobot.campaign.ground import gimbal_axes
+from mocobot.campaign.effects import SPREAD_IN_UNCALIBRATED, gimbal_axes
 from mocobot_sim.scene.scene import build_team
 from sealed import store
 from sealed.backgrounds import BACKGROUNDS, Background

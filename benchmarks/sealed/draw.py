@@ -8,8 +8,7 @@ import numpy as np
 
 from discrepancy.team.causes import CAUSES
 from hidden.draw import ground_of
-from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
-from mocobot.campaign.draw import UNDECIDABLE, draw_effect
+from mocobot.campaign.effects import SPREAD_IN_UNCALIBRATED, UNDECIDABLE, draw_effect
 from mocobot_sim.effects import EFFECTS, Effect
 from sealed.backgrounds import Background, limit_over_nominal
 from sealed.forms.base import Form

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from mocobot.campaign.ground import moving_intervals
+from mocobot.campaign.effects import moving_intervals
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home

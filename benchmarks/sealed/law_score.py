@@ -13,7 +13,7 @@ import numpy as np
 
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
-from mocobot.campaign.ground import one_axis
+from mocobot.campaign.effects import one_axis
 from sealed.law_truth import true_series
 
 Item = Mapping[str, Any]

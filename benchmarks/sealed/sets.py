@@ -13,7 +13,7 @@ from hidden.generator import PAYLOADS, HiddenSet
 from hidden.generator import generate as generate_hidden
 from hidden.logger import Logger
 from hidden.schedule import SHORT, Schedule
-from mocobot.campaign.ground import gimbal_axes
+from mocobot.campaign.effects import gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.effects.geometry import GraspFlex, robot_mass_kg
 from mocobot_sim.effects.readings import TorqueLag, TorqueSkew

@@ -24,7 +24,8 @@ REFERENCE = {
         "mocobot_sim.effects",
     ),
     "Estimate, calibrate, compare": ("mocobot.api.estimation", "mocobot.api.calibration", "mocobot.api.comparison"),
-    "Inspect and diagnose": ("mocobot.api.inspection", "mocobot.api.diagnosis"),
+    "Options": ("mocobot.options",),
+    "Inspect and diagnose": ("mocobot.api.inspection", "mocobot.api.diagnosis", "mocobot.api.watch"),
     "Convert and replay": ("mocobot.api.conversion", "mocobot.api.replay", "estimator.inputs"),
     "Errors": ("estimator.errors", "mocobot_sim.errors"),
 }  # fmt: skip
@@ -117,13 +118,11 @@ def _notebook(path: Path) -> str:
 
 def _reference() -> dict[str, str]:
     """Pages on the public names, by what ``mocobot`` says is public."""
-    source = (ROOT / "src" / "mocobot" / "__init__.py").read_text(encoding="utf-8")
-    homes = next(
-        ast.literal_eval(node.value)
-        for node in ast.parse(source).body
-        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "_NAMES"
-    )
-    out, left = {}, {home: names.split() for home, names in homes.items()}
+    source = (ROOT / "src" / "mocobot" / "__init__.pyi").read_text(encoding="utf-8")
+    out: dict[str, str] = {}
+    left: dict[str, list[str]] = {}
+    for home, name in re.findall(r"^from (\S+) import (\w+) as", source, re.MULTILINE):
+        left.setdefault(home, []).append(name)
     for title, prefixes in REFERENCE.items():
         blocks = [f"# {title}", ""]
         for home in [home for prefix in prefixes for home in left if f"{home}.".startswith(f"{prefix}.")]:

@@ -1,102 +1,247 @@
 """What each command refuses before it loads numpy, MuJoCo or anything else that takes time: ``check_`` and its name.
 
-Each raises an InputError for an option or an output that cannot be met, or a missing file.
+Options check themselves (``mocobot.options``); here are files to read and places to write. One rule for every command:
+nothing that exists is overwritten unasked. ``--force`` replaces a file, and a folder that is an earlier result of the
+same command and nothing else; never an input.
 """
 
-import math
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any
 
-import mocobot_report
-from discrepancy.cause_names import JOINTS, TEAM, excluded_from
 from estimator.errors import InputError
-from estimator.files import check_place, holds
+from estimator.files import check_place, check_target, holds, system_errors
 from estimator.strict import read_json
 from mocobot import options as opt
-from mocobot.campaign.folder import is_campaign
-from mocobot.files.targets import (
-    calibration_file,
-    check_folder,
-    check_formats,
-    check_no_input,
-    check_no_team,
-    check_output,
-    check_recordings,
-    check_there,
-    map_file,
-)
-from mocobot.options import Kind
-from mocobot_logs.formats import output_kind
+from mocobot_logs.formats import PARQUET as MAGIC
+from mocobot_logs.formats import log_kind, output_kind
+from mocobot_report import sought
 from mocobot_sim.effect_names import check_effect_name
-from mocobot_sim.scene.models import payload_path, truth_path
+from mocobot_sim.scene.model_files import payload_path
+from mocobot_sim.trial.sidecar import truth_path
+
+CALIBRATION = "calibration.json"
+"""The file in the folder of ``mocobot calibrate --out``."""
+CONFIG, CONFIG_FORMAT = "config.json", "mocobot-campaign-config"
+"""What the folder of a campaign is known by."""
+SCORES, PARTIAL = "paper.json", "partial"
+"""The file in the folder of ``mocobot paper --out``, and the folder in it of a run that is not over."""
+TRUTH = "the truth beside a simulated recording"
+LEAST_BYTES = 12
+"""Least size of a Parquet file: its first and last bytes, and the length of the footer between them."""
 
 
-def check_fits(name: str, value: float | None, needed: tuple[str, ...], trajectories: Sequence[str]) -> None:
-    """Refuse a number that says nothing about any of the motions.
-
-    Raises:
-        InputError: it is given, and no trajectory is one of those that need it.
-    """
-    if value is not None and not set(needed) & set(trajectories):
-        given = "this one is" if len(trajectories) == 1 else "these are"
-        raise InputError(
-            f"{name} is for a {' or '.join(needed)} trajectory; {given} {', '.join(trajectories)}"
-        )
-
-
-VERDICT, PAGE = "verdict.txt", "report.html"
-
-
-def _given(*named: Path | str | None) -> list[Path]:
-    return [Path(name) for name in named if name is not None]
+INPUTS = {
+    opt.Inspect: ("rec", "calibration", "model", "map"),
+    opt.Map: ("log", "model"),
+    opt.Convert: ("log", "design", "map"),
+    opt.Estimate: ("rec", "map", "calibration"),
+    opt.Calibrate: ("rec", "free", "prior", "map"),
+    opt.Watch: ("rec", "map"),
+    opt.Diagnose: ("rec", "reference", "tolerances", "model", "map", "calibration"),
+    opt.Compare: ("a", "b"),
+    opt.Simulate: ("payload", "units"),
+    opt.CampaignOptions: ("payload", "units", "tolerances", "calibration"),
+    opt.Replay: ("rec", "estimate", "model", "map", "calibration"),
+}
+"""Options that name files which a command reads, in the order of its provenance."""
 
 
-def _check_read(logs: Sequence[Path], *beside: Path | None) -> None:
-    """Files that must be there, the logs of a known format."""
-    check_there([*logs, *_given(*beside)])
-    check_formats(logs)
+def inputs_of(options: Any) -> list[Path]:
+    """Files and folders that a command reads, as far as options name them."""
+    found: list[Path] = []
+    for name in next(INPUTS[kind] for kind in type(options).__mro__ if kind in INPUTS):
+        value = getattr(options, name)
+        if value is None:
+            continue
+        if name == "map":
+            found += map_file(value)
+        elif name == "payload":
+            found += [Path(value)] if value.endswith(".xml") else []
+        elif name == "calibration" and value.is_dir():
+            found.append(value / CALIBRATION)
+        else:
+            found += value if isinstance(value, tuple) else [value]
+    return found
 
 
-def _check_jobs(jobs: int) -> None:
-    if jobs < 1:
-        raise InputError(f"jobs is {jobs}; it must be at least 1")
+def map_file(name: str) -> list[Path]:
+    """The file that a map is read from, none for a built-in one."""
+    if not Path(name).is_file():
+        return []
+    from mocobot_logs.map.files import MAPS  # takes time, and files are seldom named like built-in maps
+
+    return [] if name in MAPS else [Path(name)]
+
+
+def check_inspect(options: opt.Inspect) -> None:
+    """Everything that can be refused before the log is read."""
+    options.check_for(options.model)
+    _check_file(options, options.json)
+    _check_logs([options.rec], options.model)
+
+
+def check_map(options: opt.Map) -> None:
+    """Everything that can be refused before the log is read."""
+    _check_file(options, options.out)
+    _check_logs([options.log], options.model)
+
+
+def check_convert(options: opt.Convert) -> None:
+    """Everything that can be refused before the log is read."""
+    options.check()
+    check_target_of(options, targets(options.out, 1)[0] if options.split_at_gaps else options.out)
+    if options.json is not None:
+        check_output(options.json, [*inputs_of(options), options.out], force=options.force)
+    _check_logs([options.log])
+
+
+def targets(out: Path, count: int) -> list[Path]:
+    """Numbered names for the parts of a log."""
+    width = len(str(count))
+    return [out.with_name(f"{out.stem}-{k:0{width}}{out.suffix}") for k in range(1, count + 1)]
+
+
+def check_target_of(options: opt.Convert, out: Path) -> None:
+    """One recording, under the name that it will have."""
+    inputs = inputs_of(options)
+    if output_kind(out) == "folder":
+        check_no_input(out, inputs)
+        check_folder(out, inputs, holds("bag"), "a bag of an earlier conversion", force=options.force)
+    else:
+        check_output(out, inputs, force=options.force)
+
+
+def check_estimate(options: opt.Estimate) -> None:
+    """Everything that can be refused before a recording is read."""
+    options.check()
+    _check_recordings(options.rec)
+    if options.pictures:
+        _check_folder(options, "estimate")
+    else:
+        _check_file(options, options.out)
+    _check_file(options, options.json)
+    _check_logs(options.rec)
+
+
+def check_calibrate(options: opt.Calibrate) -> None:
+    """Everything that can be refused before a recording is read."""
+    if not options.rec:
+        raise InputError("no recording with a payload is given; name them first, those of --free after it")
+    files = [*options.rec, *options.free]
+    _check_recordings(files)
+    _check_folder(options, "calibration")
+    _check_file(options, options.json)
+    _check_logs(files)
 
 
 def check_watch(options: opt.Watch) -> None:
     """Everything that can be refused before a log is read."""
-    _check_jobs(options.jobs)
-    check_recordings(options.rec)
+    options.check()
+    _check_recordings(options.rec)
     stems = [path.stem for path in options.rec]
     for stem in stems:
         if stems.count(stem) > 1:
             raise InputError(f"{stem} is the name of two recordings; give each a name of its own")
-    if options.out is not None:
-        inputs = [*options.rec, *map_file(options.map)]
-        check_folder(options.out, inputs, holds("watch"), "an earlier result of watch", force=options.force)
-    _check_read(options.rec)
+    _check_folder(options, "watch", "an earlier result of watch")
+    _check_logs(options.rec)
 
 
-SCORES, PARTIAL = "paper.json", "partial"
+def check_diagnose(options: opt.Diagnose) -> None:
+    """Everything that can be refused before a recording is read."""
+    if not options.rec and options.exclude:
+        raise InputError("no recording given; name them before --exclude")
+    options.check()
+    logs = [*options.rec, *options.reference]
+    _check_recordings(options.rec)
+    options.check_for(options.model, options.reference)
+    _check_recordings(logs)
+    _check_folder(options, "diagnosis")
+    _check_file(options, options.json)
+    _check_logs(logs, options.model)
+    for path in filter(Path.exists, map(truth_path, options.rec)) if options.model is None else ():
+        read_json(path, TRUTH)  # what it says, nobody asks before the verdict
+
+
+def check_compare(options: opt.Compare) -> None:
+    """Everything that can be refused before a result is read."""
+    _check_folder(options, "comparison")
+    _check_file(options, options.json)
+    _check_there([options.a, options.b])
+
+
+def check_simulate(options: opt.Simulate) -> None:
+    """Everything that can be refused before a team is built, the effects' numbers among it."""
+    out = options.out
+    if out is None:
+        raise InputError(
+            "out must be given: REC.parquet, or with --trials a folder; see mocobot simulate --help"
+        )
+    kinds = options.kinds
+    if options.trials is None:
+        _check_file(options, out, suffix=".parquet")
+        _check_file(options, truth_path(out))
+    elif out.suffix == ".parquet":
+        raise InputError(f"out is {out}; with --trials it must be a folder")
+    else:
+        _check_folder(options, "simulation")
+    options.check_for(options.payload, kinds)
+    options.check()
+    _check_payload(options.payload)
+    if options.effects:
+        from mocobot_sim.effects.spec import parse_effect  # numpy, and a file for each effect
+
+        for text in options.effects:
+            parse_effect(str(text))
+
+
+def _check_payload(payload: str | None) -> None:
+    if payload is not None and not payload.endswith(".xml"):
+        payload_path(payload)
+
+
+def check_effects(options: opt.Effects) -> None:
+    """Names of effects."""
+    for name in options.name:
+        check_effect_name(name)
+
+
+def check_campaign(options: opt.Campaign) -> None:
+    """Everything that can be refused before a team is built, but for the names of sensors."""
+    options.check()
+    inputs = inputs_of(options)
+    _check_there(inputs)
+    _check_payload(options.payload)
+    if is_campaign(options.out):
+        check_no_input(options.out, inputs)
+        check_place(options.out)
+    else:
+        check_folder(options.out, inputs, lambda _: False, "a campaign", force=options.force)
+    _check_file(options, options.json)
+
+
+def is_campaign(folder: Path) -> bool:
+    """Whether a folder holds a campaign, whole or begun."""
+    try:
+        return read_json(folder / CONFIG, "what a campaign is of").get("format") == CONFIG_FORMAT
+    except InputError:
+        return False
 
 
 def check_paper(options: opt.Paper) -> None:
     """Everything that can be refused before the experiment is planned."""
-    for payload in options.payload:
-        payload_path(payload)
+    options.check()
     if options.recordings and not options.out:
-        raise InputError("--recordings needs --out")
-    _check_jobs(options.jobs)
+        raise InputError("recordings needs --out")
     if options.out and _is_interrupted(options.out):
         check_place(options.out)
     elif options.out:
-        check_folder(
-            options.out,
-            [],
-            lambda folder: (folder / SCORES).is_file(),
-            "an earlier experiment",
-            force=options.force,
-        )
+
+        def is_ours(folder: Path) -> bool:
+            return (folder / SCORES).is_file()
+
+        check_folder(options.out, [], is_ours, "an earlier experiment", force=options.force)
 
 
 def _is_interrupted(folder: Path) -> bool:
@@ -108,304 +253,134 @@ def _is_interrupted(folder: Path) -> bool:
     return names == {PARTIAL} or names >= {PARTIAL, SCORES}
 
 
-def check_estimate(options: opt.Estimate) -> None:
-    """Everything that can be refused before a recording is read."""
-    check_recordings(options.rec)
-    for name, given in (
-        ("--calibration", options.calibration is not None),
-        (f"--method {options.method}", options.method != "auto"),
-    ):
-        if options.self_calibrate and given:
-            raise InputError(f"--self-calibrate and {name} are both given; choose one")
-    if options.out is not None:
-        inputs = [*options.rec, *map_file(options.map), *calibration_file(options.calibration)]
-        check_output(options.out, inputs, force=options.force)
-    _check_read(options.rec)
-
-
-def check_calibrate(options: opt.Calibrate) -> None:
-    """Everything that can be refused before a recording is read."""
-    if not options.rec:
-        raise InputError("no recording with a payload is given; name them first, those of --free after it")
-    files = [*options.rec, *options.free]
-    check_recordings(files)
-    if options.out is not None:
-        inputs = [*files, *_given(options.prior), *map_file(options.map)]
-        check_folder(options.out, inputs, holds("calibration"), "an earlier calibration", force=options.force)
-    _check_read(files)
-
-
-TRUTH = "the truth beside a simulated recording"
-LONGEST_S = 1e6
-
-
-def check_diagnose(options: opt.Diagnose) -> None:
-    """Everything that can be refused before a recording is read."""
-    if not options.rec and options.exclude:
-        raise InputError("no recording given; name them before --exclude")
-    _check_jobs(options.jobs)
-    check_odds(options.odds)
-    check_recordings(options.rec)
-    if options.model is not None:
-        _check_joints(options, options.model)
-        return
-    if options.reference:
-        raise InputError("--reference goes with --model: a healthy log of the same robot")
-    check_seconds(options.seconds, "--seconds")
-    if options.out is not None:
-        inputs = [*options.rec, *_given(options.tolerances), *map_file(options.map)]
-        inputs += calibration_file(options.calibration)
-        check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
-    _check_excluded(options.exclude, TEAM)
-    check_there(options.rec)
-    check_formats(options.rec)
-    for path in filter(Path.exists, map(truth_path, options.rec)):
-        read_json(path, TRUTH)  # what it says, nobody asks before the verdict
-
-
-MOST_ODDS = 1000.0
-
-
-def check_odds(odds: float) -> None:
-    """Odds of a cause beforehand."""
-    if not 0.0 < odds <= MOST_ODDS:
-        raise InputError(f"odds is {odds:g}; it must be greater than 0 and at most {MOST_ODDS:g}")
-
-
-def check_seconds(seconds: float | None, name: str = "seconds") -> None:
-    """When a search ends."""
-    if seconds is not None and not 0.0 < seconds <= LONGEST_S:
-        raise InputError(f"{name} is {seconds:g}; it must be above 0 and at most {LONGEST_S:g} s")
-
-
-def _check_joints(options: opt.Diagnose, model: Path) -> None:
-    """What can be refused of logs of one robot's joints, but for maps that nobody named."""
-    check_no_team(options, ("calibration", "scheduler"))
-    plain = opt.Diagnose(options.rec)
-    for name in ("laws", "odds", "whole", "jobs"):
-        if getattr(options, name) != getattr(plain, name):
-            raise InputError(f"--{name} is of a team's robots; with --model there is none")
-    check_seconds(options.seconds, "--seconds")
-    logs = [*options.rec, *options.reference]
-    check_recordings(logs)
-    if options.out is not None:
-        inputs = [*logs, *_given(model, options.tolerances, options.map)]
-        check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
-    _check_excluded(options.exclude, JOINTS)
-    _check_read(logs, model)
-
-
-def _check_excluded(excluded: Sequence[str], causes: Sequence[str]) -> None:
-    excluded_from(causes, excluded)
-    if set(causes) <= set(excluded):
-        raise InputError("every cause is excluded; nothing is left to look for")
-
-
-SLOWEST_HZ, FASTEST_HZ = 20.0, 2000.0
-"""Bounds of the recording's rate: the estimator's filter passes 5 Hz."""
-LONGEST_GAP_S = 10.0
-
-
-def check_convert(options: opt.Convert) -> None:
-    """Everything that can be refused before the log is read."""
-    check_target(options, targets(options.out, 1)[0] if options.split_at_gaps else options.out)
-    if options.json is not None:
-        check_output(options.json, [*_inputs(options), options.out], force=options.force)
-    for option, value, low, high in (
-        ("--rate", options.rate, SLOWEST_HZ, FASTEST_HZ),
-        ("--max-gap", options.max_gap, 0.0, LONGEST_GAP_S),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"{option} is {value:g}; it must be from {low:g} to {high:g}")
-    _check_read([options.log])
-
-
-def targets(out: Path, count: int) -> list[Path]:
-    """Numbered names for the parts of a log."""
-    width = len(str(count))
-    return [out.with_name(f"{out.stem}-{k:0{width}}{out.suffix}") for k in range(1, count + 1)]
-
-
-def check_target(options: opt.Convert, out: Path) -> None:
-    """One recording, under the name that it will have.
-
-    Raises:
-        InputError: it may not be written, or cannot.
-    """
-    if output_kind(out) != "folder":
-        check_output(out, _inputs(options), force=options.force)
-        return
-    check_no_input(out, _inputs(options))
-    check_folder(out, _inputs(options), holds("bag"), "a bag of an earlier conversion", force=options.force)
-
-
-def _inputs(options: opt.Convert) -> list[Path]:
-    return [options.log, *_given(options.design), *map_file(options.map)]
-
-
-def check_map(options: opt.Map) -> None:
-    """Everything that can be refused before the log is read."""
-    if options.out is not None:
-        check_output(options.out, [options.log, *_given(options.model)], force=options.force)
-    _check_read([options.log], options.model)
-
-
-def check_replay(options: opt.Replay) -> None:
-    """Everything that can be refused before a recording is read."""
-    if options.save is not None and options.web:
-        raise InputError("--save and --web are both given; choose a file or a browser")
-    check_recordings(options.rec)
-    if options.model is not None:
-        check_no_team(options, ("estimate", "calibration", "diagnosis", "payload", "truth"))
-    elif options.map is not None:
-        raise InputError("--map goes with --model; logs of a team are converted to recordings first")
-    if options.save is not None:
-        inputs = [*options.rec, *_given(options.estimate, options.model, options.map)]
-        inputs += calibration_file(options.calibration)
-        check_output(options.save, inputs, force=options.force, suffix=".rrd")
-    _check_read(options.rec, options.model)
-
-
-def check_inspect(options: opt.Inspect) -> None:
-    """Everything that can be refused before the log is read."""
-    inputs = [options.rec, *calibration_file(options.calibration)]
-    if options.model is not None:
-        check_no_team(options, ("design", "calibration"))
-        inputs += _given(options.model, options.map)
-    if options.json is not None:
-        check_output(options.json, inputs, force=options.force)
-    _check_read([options.rec], options.model)
-
-
 def check_report(options: opt.Report) -> None:
     """A folder that is none, and a page that may not be written, or cannot."""
     if options.dir.is_file() and options.dir.suffix != ".json":
         return  # the command finds out what kind of file it is
-    mocobot_report.check_folder(options.dir)
-    check_output(options.out or options.dir / mocobot_report.NAME, force=options.force, suffix=mocobot_report.SUFFIX)
+    sought.check_folder(options.dir)
+    check_output(options.out or options.dir / sought.NAME, force=options.force, suffix=sought.SUFFIX)
 
 
-def check_compare(options: opt.Compare) -> None:
-    """Everything that can be refused before a result is read."""
+def check_replay(options: opt.Replay) -> None:
+    """Everything that can be refused before a recording is read."""
+    options.check_for(options.out, options.model)
+    _check_recordings(options.rec)
+    _check_file(options, options.out, suffix=".rrd")
+    _check_logs(options.rec, options.model)
+
+
+def _check_recordings(recordings: Sequence[Path]) -> None:
+    """At least one recording, each once."""
+    if not recordings:
+        raise InputError("no recording given; name at least one file")
+    seen: set[str] = set()
+    for path in recordings:
+        real = os.path.realpath(path)
+        if real in seen:
+            raise InputError(f"{path} is given twice, and would count twice")
+        seen.add(real)
+
+
+def _check_logs(logs: Sequence[Path], *beside: Path | None) -> None:
+    """Files that must be there, the logs of a known format."""
+    _check_there([*logs, *(path for path in beside if path is not None)])
+    for path in logs:
+        if path.is_file() and path.suffix.lower() not in (".json", ".parquet"):  # of those reading tells more
+            log_kind(path)
+
+
+def _check_there(paths: Sequence[Path]) -> None:
+    """A file or folder to read is missing, or cut; what else may be wrong with it, reading tells."""
+    for path in paths:
+        try:
+            path.stat()
+        except (FileNotFoundError, NotADirectoryError):
+            raise InputError(f"{path}: there is no such file") from None
+        except (OSError, ValueError):
+            continue
+        if path.is_file():
+            _check_parquet(path)
+
+
+def _check_parquet(path: Path) -> None:
+    """An empty or a cut Parquet file; whatever does not look like one is let pass."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(MAGIC))
+            size = file.seek(0, os.SEEK_END)
+            file.seek(-min(size, len(MAGIC)), os.SEEK_END)
+            end = file.read()
+    except (OSError, ValueError):
+        return  # a folder, or what may not be read: reading tells
+    if head != MAGIC and (size or path.suffix.lower() != ".parquet"):
+        return
+    if size < LEAST_BYTES or end != MAGIC:
+        what = f"Parquet file size is {size} bytes" if size < LEAST_BYTES else "its end is missing"
+        raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({what})")
+
+
+def _check_folder(options: Any, kind: str, what: str = "") -> None:
+    """The folder of a result, where one is asked for."""
     if options.out is not None:
-        inputs = [options.a, options.b]
-        check_folder(options.out, inputs, holds("comparison"), "an earlier comparison", force=options.force)
-    check_there([options.a, options.b])
+        called = what or f"an earlier {kind}"
+        check_folder(options.out, inputs_of(options), holds(kind), called, force=options.force)
+    elif getattr(options, "pictures", False):
+        raise InputError("pictures needs --out, a folder for them")
 
 
-CAMPAIGN_KINDS = ("random", "periodic", "static")
+def _check_file(options: Any, path: Path | None, suffix: str = "") -> None:
+    """A file to write, where one is asked for."""
+    if path is not None:
+        check_output(path, inputs_of(options), force=options.force, suffix=suffix)
 
 
-def check_campaign(options: opt.Campaign) -> None:
-    """Everything that can be refused before a team is built, but for the names of causes and of sensors."""
-    kinds = campaign_kinds(options)
-    check_fits("--vias", options.vias, ("random",), kinds)
-    check_fits("--duration", options.duration, ("periodic",), kinds)
-    for name, least in (("jobs", 1), ("teams", 1), ("sets", 0), ("seed", 0)):
-        if getattr(options, name) < least:
-            raise InputError(f"--{name} is {getattr(options, name)}; it must be at least {least}")
-    if not options.background:
-        raise InputError("--background names no robots; it must be calibrated, uncalibrated or both")
-    if len(set(options.background)) < len(options.background):
-        raise InputError(f"--background {' '.join(options.background)} names the same robots twice")
-    if not options.sizes or not all(0.0 < size < math.inf for size in options.sizes):
-        raise InputError(f"--sizes is {options.sizes}; they must be numbers above 0")
-    if options.calibration is not None and options.units is None:
-        raise InputError("--calibration is of given robots; say with --units how they truly are")
-    inputs = inputs_of(options)
-    check_there(inputs)
-    if Path(options.payload).suffix != ".xml":
-        payload_path(options.payload)
-    if is_campaign(options.out):
-        check_no_input(options.out, inputs)
-        check_place(options.out)
-    else:
-        check_folder(options.out, inputs, lambda _: False, "a campaign", force=options.force)
+def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix: str = "") -> None:
+    """Find out that a file may not be written, or cannot, before the work is done whose result it would hold."""
+    check_no_input(path, inputs)
+    check_target(path, suffix)
+    if path.exists() and not force:
+        raise InputError(f"{path}: exists; give --force to replace it, or name another file")
 
 
-def campaign_kinds(options: opt.Campaign) -> tuple[str, ...]:
-    """Kind of every trial.
+def check_no_input(path: Path, inputs: Sequence[Path]) -> None:
+    """Find out that an output is an input, or lies in one."""
+    with system_errors(path):
+        real = Path(os.path.realpath(path))
+        for given in inputs:
+            source = Path(os.path.realpath(given))
+            if real == source or (source in real.parents and source.is_dir()):
+                where = "is an input" if real == source else f"lies in the input {given}"
+                raise InputError(f"{path}: {where}; write somewhere else")
+
+
+def check_folder(
+    path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str, *, force: bool
+) -> None:
+    """Find out that a folder may not be written, or cannot, before the work is done whose result it would hold.
+
+    Args:
+        path: folder to be created or replaced.
+        inputs: files that must not be lost.
+        is_ours: whether an existing folder is an earlier result and nothing else.
+        what: the kind of result, for messages.
+        force: whether such a folder may be replaced; an empty one always may.
 
     Raises:
-        InputError: one is of no known kind.
+        InputError: it is a file, or holds an input or something that is no such result, or such a result without
+            ``force``, or is the current folder, or nothing can be put there.
     """
-    return tuple(_kinds(options.trials, CAMPAIGN_KINDS))
-
-
-def inputs_of(options: opt.Campaign) -> list[Path]:
-    """Files that are read."""
-    given = Path(options.payload)
-    named = [given if given.suffix == ".xml" else None, options.units, options.tolerances]
-    return [path for path in named if path is not None] + calibration_file(options.calibration)
-
-
-KINDS = get_args(Kind)
-
-
-def check_simulate(options: opt.Simulate) -> None:
-    """Everything that can be refused before a team is built, the effects' numbers among it."""
-    kinds = simulate_kinds(options)
-    given = Path(options.payload or "")
-    inputs = [*([given] if given.is_file() else []), *_given(options.units)]
-    if options.out is not None:
-        check_output(options.out, inputs, force=options.force, suffix=".parquet")
-        check_output(truth_path(options.out), inputs, force=options.force)
-    elif options.out_dir is not None:
-        check_folder(
-            options.out_dir, inputs, holds("simulation"), "an earlier simulation", force=options.force
-        )
-    check_fits("--vias", options.vias, ("random", "free"), kinds)
-    check_fits("--duration", options.duration, ("periodic",), kinds)
-    check_fits("--robots", options.robots, ("free",), kinds)
-    for one, other, why in (
-        ("payload", "robots", "a payload says how many robots there are"),
-        ("payload", "model", "the model has its own payload, so leave one out"),
-        ("units", "model", "the model has robots of its own, so leave one out"),
-    ):
-        if getattr(options, one) is not None and getattr(options, other) is not None:
-            raise InputError(f"--{one} and --{other} are both given; {why}")
-    if options.payload is not None and given.suffix != ".xml":
-        payload_path(options.payload)
-    for text in options.effect:
-        check_effect_name(text.partition(":")[0])
-    if options.effect:
-        from mocobot_sim.effects.catalogue import parse_effect  # numpy, and a file for each effect
-
-        for text in options.effect:
-            parse_effect(text)
-
-
-def simulate_kinds(options: opt.Simulate) -> list[str]:
-    """Kind of every trial.
-
-    Raises:
-        InputError: neither one trial is named nor several, or one of no known kind.
-    """
-    if options.trials is None:
-        if options.out is None:
-            raise InputError(
-                "--out REC.parquet, or --trials with --out-dir DIR, must be given; see mocobot simulate --help"
-            )
-        if options.out_dir is not None:
-            raise InputError(
-                "--out-dir is for several trials; name their kinds with --trials, or leave it out"
-            )
-        return [options.trajectory]
-    if options.out is not None or options.out_dir is None:
-        raise InputError("--trials needs --out-dir DIR, a folder for its recordings, in place of --out")
-    return _kinds(options.trials, KINDS)
-
-
-def _kinds(trials: str, known: Sequence[str]) -> list[str]:
-    kinds = trials.split(",")
-    if not set(kinds) <= set(known):
-        raise InputError(
-            f"--trials is {trials!r}; it must be a list such as random,random,periodic,static of {', '.join(known)}"
-        )
-    return kinds
-
-
-def check_effects(options: opt.Effects) -> None:
-    """Names of effects."""
-    for name in options.name:
-        check_effect_name(name)
+    real = Path(os.path.realpath(path))
+    with system_errors(path):
+        if real.exists() and not real.is_dir():
+            raise InputError(f"{path}: is a file; name a folder to write")
+        if real in (here := Path.cwd(), *here.parents):
+            raise InputError(f"{path}: is the current folder, or above it; name a folder of its own")
+        for entry in inputs:
+            if real in Path(os.path.realpath(entry)).parents:
+                raise InputError(f"{path}: holds {entry}, which would be lost; name another folder")
+        if real.exists() and any(real.iterdir()):
+            if not is_ours(real):
+                raise InputError(f"{path}: exists and is not {what}; name a new folder")
+            if not force:
+                raise InputError(f"{path}: is {what}; give --force to replace it, or name a new folder")
+    check_place(path)

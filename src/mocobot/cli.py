@@ -1,44 +1,91 @@
-"""The ``mocobot`` command: a thin edge over the estimator and the simulator."""
+"""The ``mocobot`` command: words to options, options to what runs them, and whatever is wrong to one sentence."""
 
+import difflib
 import io
+import math
 import os
+import re
+import shutil
 import signal
 import sys
+import textwrap
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
+from dataclasses import Field, dataclass, field, fields
+from functools import cache
 from importlib import import_module
-from typing import Any, NoReturn, TextIO, cast
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NoReturn, TextIO, Union, cast, get_args, get_origin
 
 from estimator.errors import InputError
 from estimator.inputs import printable, set_max_unpacked
-from mocobot import options
-from mocobot.parsing import parse, with_config
-from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
 
-COMMANDS = {
-    "watch": options.Watch,
-    "paper": options.Paper,
-    "estimate": options.Estimate,
-    "calibrate": options.Calibrate,
-    "diagnose": options.Diagnose,
-    "convert": options.Convert,
-    "map": options.Map,
-    "replay": options.Replay,
-    "inspect": options.Inspect,
-    "report": options.Report,
-    "compare": options.Compare,
-    "campaign": options.Campaign,
-    "simulate": options.Simulate,
-    "effects": options.Effects,
+TASKS = {
+    "Look at a log": (
+        {
+            "inspect": "stamps, channels, clocks, wiring, excitation, before anyone trusts a number",
+            "map": "draft which column is which channel, by names, units and values",
+            "convert": "to a recording on one grid and one clock, or a recording to another format",
+        },
+        "mocobot inspect monday.csv --map monday.toml",
+    ),
+    "Estimate": (
+        {
+            "estimate": "grasps, mass, centre of mass and inertia of what a team carries",
+            "calibrate": "how every robot differs from its design",
+        },
+        "mocobot estimate monday.parquet tuesday.parquet --out est.json",
+    ),
+    "Find what is wrong": (
+        {
+            "watch": "all of it at once: inspect, estimate, calibrate if need be, diagnose, and a page",
+            "diagnose": "what the simulation gets wrong, the physical cause, and what fixing it is worth",
+            "compare": "two estimates, calibrations or diagnoses: what changed beyond its errors",
+        },
+        "mocobot diagnose monday.csv --model robot.xml --out verdict",
+    ),
+    "Simulate and test": (
+        {
+            "simulate": "trials of a team, with effects hidden in it, and the truth beside each",
+            "effects": "what can be hidden: parameters, units and ranges",
+            "campaign": "try your own experiment blind, and count what is found, missed and invented",
+            "paper": "the paper's experiment, published figures beside ours",
+        },
+        "mocobot simulate --effect sea_bias:robot=2,joint=1,bias=0.08 --out faulty.parquet",
+    ),
+    "Show": (
+        {
+            "report": "one HTML page of a result folder",
+            "replay": "recordings as a moving scene, estimate against truth, all signals (Rerun)",
+        },
+        "mocobot report verdict",
+    ),
 }
-"""Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
-a function that refuses what it can before anything is loaded that takes time."""
+"""What the help lists: commands with what they are for, by task, and an example of each task."""
+COMMANDS = [name for commands, _ in TASKS.values() for name in commands]
+"""Each has a dataclass of options of its name in ``mocobot.options``, a function in ``mocobot.checks`` that refuses
+what it can before anything is loaded that takes time, and one in ``mocobot.commands`` that runs it."""
+PROG, CONFIG = "mocobot", "--config"
+ABOUT = (
+    "Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what the simulation "
+    "gets wrong.",
+    "Exit codes: 0 done; 1 done, and with --strict the answer is not good; 2 refused, with one sentence that says why; "
+    "130 interrupted; 141 nobody reads the output any more. --version prints the version. COMMAND --help lists the "
+    "options of a command; COMMAND --config FILE.toml takes more options from a file's table [COMMAND].",
+)
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
 ENDING = (signal.SIGTERM, signal.SIGHUP)
 """Signals that end the command as an interruption does: with what it began cleared away."""
+NARROWEST, WIDEST = 40, 100
+"""Columns that the help takes at least and at most."""
+
+
+class NotGood(Exception):
+    """The work is done and written, and with ``--strict`` the answer is not good: one sentence that says why."""
 
 
 class _Shown:
@@ -54,12 +101,6 @@ class _Shown:
     def __getattr__(self, name: str) -> Any:
         """All else is standard output's own."""
         return getattr(self._out, name)
-
-
-def _end(number: int, _: object) -> NoReturn:
-    for each in ENDING:
-        signal.signal(each, signal.SIG_IGN)  # once is enough
-    sys.exit(128 + number)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -87,6 +128,74 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(CLOSED)
 
 
+def _run(arguments: Sequence[str]) -> None:
+    if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
+        sys.stdout.reconfigure(errors="backslashreplace")
+    name = next((word for word in arguments if word in COMMANDS), None)
+    if "--version" in arguments:
+        print(f"mocobot {_version()}")
+        return
+    if name is None and {"-h", "--help"} & set(arguments):
+        print(help_text())
+        return
+    told = with_config(arguments)
+    try:
+        options = parse(told.words)
+        set_max_unpacked(getattr(options, "max_unpacked", None))
+        command = type(options).__name__.lower()
+        getattr(import_module("mocobot.checks"), f"check_{command}")(options)
+        # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
+        with redirect_stdout(cast("TextIO", _Shown(sys.stdout))):
+            _command(command)(options)
+    except InputError as error:
+        raise InputError(told.in_words_of_the_user(str(error))) from error
+
+
+def _command(name: str) -> Callable[[Any], None]:
+    """What runs the options: imported only now, for neither the help nor a refusal needs MuJoCo or the estimator."""
+    try:
+        return getattr(import_module("mocobot.commands"), name)
+    except (AttributeError, ImportError, RuntimeError) as error:
+        renderer = os.environ.get("MUJOCO_GL")
+        if not renderer:
+            raise
+        said = " ".join(str(error).split())
+        raise InputError(
+            f"MUJOCO_GL is {renderer!r} and MuJoCo does not load so ({said}); unset it"
+        ) from error
+
+
+def help_text() -> str:
+    """The commands by task, with an example of each task."""
+    width = max(NARROWEST, min(WIDEST, shutil.get_terminal_size((80, 24)).columns))
+    lines = [f"usage: {PROG} COMMAND [OPTIONS]", "", *textwrap.wrap(ABOUT[0], width)]
+    for task, (commands, example) in TASKS.items():
+        lines += ["", f"{task}:"]
+        for name, said in commands.items():
+            lines += textwrap.wrap(said, width, initial_indent=f"  {name:11}", subsequent_indent=" " * 13)
+        lines += textwrap.wrap(
+            example, width, initial_indent="  $ ", subsequent_indent="      ", break_on_hyphens=False
+        )
+    return "\n".join([*lines, "", *textwrap.wrap(ABOUT[1], width)])
+
+
+def _version() -> str:
+    """Version of the installed package."""
+    from importlib.metadata import PackageNotFoundError, version  # 20 ms that nothing else needs
+
+    try:
+        return version("mocobot")
+    except PackageNotFoundError:
+        return "(not installed, run from its source)"
+
+
+def _end(number: int, _: object) -> NoReturn:
+    for each in ENDING:
+        signal.signal(each, signal.SIG_IGN)  # once is enough
+    sys.exit(128 + number)
+
+
 def _flush() -> None:
     """Print what is still to be printed; help ends the process, so that there may be some whatever happened."""
     try:
@@ -108,54 +217,288 @@ def _exit(sentence: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def _run(arguments: Sequence[str]) -> None:
-    if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
-        sys.stdout.reconfigure(errors="backslashreplace")
-    if "--version" in arguments:
-        print(f"mocobot {_version()}")
-        return
-    configured = with_config(COMMANDS, arguments)
-    with configured.told():
+@cache
+def kinds() -> dict[str, type]:
+    """The dataclass of options of every command."""
+    options = import_module("mocobot.options")
+    return {name: getattr(options, name.capitalize()) for name in COMMANDS}
+
+
+def flags(command: str) -> dict[str, Field[Any]]:
+    """Options of a command, without dashes in front, and the fields that they set."""
+    tyro = import_module("tyro")
+    found = {}
+    for entry in fields(kinds()[command]):
+        if tyro.conf.Positional not in get_args(entry.type):
+            names = [
+                each.name for each in get_args(entry.type) if isinstance(getattr(each, "name", None), str)
+            ]
+            found[(names or [entry.name])[0].replace("_", "-")] = entry
+    return found
+
+
+@dataclass(frozen=True)
+class Configured:
+    """Arguments of the command line, with those of a file.
+
+    Attributes:
+        words: all of them, as if all had been given there.
+        command: which of them is the command, or None.
+        spelled: options as the user spells them, by what they are called.
+        table: file and table, as a sentence names them.
+        names: options that are the file's.
+    """
+
+    words: list[str]
+    command: str | None = None
+    spelled: Mapping[str, str] = field(default_factory=dict)
+    table: str = ""
+    names: tuple[str, ...] = ()
+
+    def in_words_of_the_user(self, sentence: str) -> str:
+        """A sentence on options with these as the user writes them, and with the file that gives the first one."""
+        if self.command is None:
+            return sentence
+        by_field = {field.name: name for name, field in flags(self.command).items()}
+        names = "|".join(by_field)
+        verbs = "is|are|goes|names|must|needs"
+        if begin := re.match(rf"({names})(?: and ({names}))?(?= (?:{verbs})\b)", sentence):
+            named = " and ".join(f"--{by_field[name]}" for name in begin.groups() if name)
+            sentence = named + sentence[begin.end() :]
+        if not (begin := re.match(r"--([a-z][a-z-]*)\b", sentence)):
+            return sentence
+        sentence = self.spelled.get(begin[1], begin[0]) + sentence[begin.end() :]
+        return f"{self.table} {sentence}" if begin[1] in self.names else sentence
+
+
+def with_config(arguments: Sequence[str]) -> Configured:
+    """Arguments with the options of a file behind them; what the command line says itself goes before the file."""
+    left, file = _taken(arguments)
+    command = next((word for word in left if word in COMMANDS), None)
+    if command is None:
+        return Configured(left)
+    left, spelled = _renamed(left, command)
+    if file is None:
+        return Configured(left, command, spelled)
+    from estimator.strict import read_toml
+
+    tables = read_toml(Path(file), "file of options")
+    for name, table in tables.items():
+        if name not in COMMANDS or not isinstance(table, Mapping):
+            hint = _close(name, COMMANDS) or f"its tables are named after commands: {', '.join(COMMANDS)}"
+            raise InputError(f"{file}: there is no command {name!r}; {hint}")
+    given = {word.partition("=")[0].replace("_", "-") for word in left if word.startswith("--")}
+    known, names = flags(command), []
+    for key, value in tables.get(command, {}).items():
+        flag = _newer(key.replace("_", "-"), known)
+        if flag not in known:
+            listed = [name.replace("-", "_") for name in known]
+            hint = _close(key, listed) or f"its options are {', '.join(listed)}"
+            raise InputError(f"{file}: [{command}] has no option {key!r}; {hint}")
+        if not {f"--{flag}", f"--no-{flag}"} & given:
+            left += _words(f"{file}: [{command}] {key}", flag, value, known[flag])
+            names.append(flag)
+    return Configured(left, command, spelled, f"{file}: [{command}]", tuple(names))
+
+
+def _taken(arguments: Sequence[str]) -> tuple[list[str], str | None]:
+    """The other arguments, and the file of options."""
+    left, file, rest = [], None, iter(arguments)
+    for word in rest:
+        name, equals, value = word.partition("=")
+        if name != CONFIG:
+            left.append(word)
+            continue
+        if file is not None:
+            raise InputError(f"{CONFIG} is given twice; one file can have tables for several commands")
+        file = value if equals else next(rest, None)
+        if not file:
+            raise InputError(f"{CONFIG} needs a file: {CONFIG} FILE.toml")
+    return left, file
+
+
+def _newer(flag: str, known: Mapping[str, Any]) -> str:
+    """The newer spelling of an option, where a command has that and not the earlier one."""
+    newer = import_module("mocobot.options").OLD_NAMES.get(flag)
+    return newer if newer in known and flag not in known else flag
+
+
+def _renamed(words: list[str], command: str) -> tuple[list[str], dict[str, str]]:
+    """Words with earlier spellings of options in their newer one, and how each was spelled."""
+    known, out, spelled = flags(command), [], {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        if name.startswith("--"):
+            flag = _newer(name[2:].replace("_", "-"), known)
+            if spelled.setdefault(flag, name) != name:
+                raise InputError(f"{spelled[flag]} and {name} are one option; give it once")
+            name = f"--{flag}" if flag in known else name
+        out.append(name + equals + value)
+    if command == "convert" and "--out" in out[:-1]:  # the place to write is a word of its own there
+        at = out.index("--out")
+        out = [*out[:at], *out[at + 2 :], out[at + 1]]
+    return out, spelled
+
+
+def _words(where: str, flag: str, value: Any, entry: Field[Any]) -> list[str]:
+    """A value as the command line has it."""
+    tyro, allowed = import_module("tyro"), get_args(entry.type)
+    values = value if isinstance(value, list) else [value]
+    if any(isinstance(each, Mapping | list) for each in values):
+        raise InputError(f"{where} is {value!r}; it must be a value, or a list of values")
+    if isinstance(value, bool):
+        if entry.type is not bool and bool not in allowed:
+            raise InputError(
+                f"{where} is {str(value).lower()}; it is not an option that is switched on or off"
+            )
+        alone = tyro.conf.FlagCreatePairsOff in allowed
+        return [f"--{flag}"] if value else [] if alone else [f"--no-{flag}"]
+    if tyro.conf.UseAppendAction in allowed:
+        return [word for each in values for word in (f"--{flag}", str(each))]
+    return [f"--{flag}", *map(str, values)] if values else []
+
+
+def _close(name: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {close[0]!r}?" if close else ""
+
+
+def parse(words: Sequence[str]) -> Any:
+    """The options of the command that the words name; help is printed, and ends the process."""
+    import tyro
+    from tyro import (
+        _errors,
+    )  # boxes of text would not be one sentence; pyproject.toml says which versions have this
+
+    def refuse(event: _errors.ParseErrorEvent) -> None:
+        raise InputError(_sentence(event, next((word for word in words if word in COMMANDS), None)))
+
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
+    subcommands: Any = Union[  # noqa: UP007  (of a tuple that is made)
+        tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in kinds().items())
+    ]
+    with _errors.on_parse_error(refuse):
         try:
-            options = parse(COMMANDS, configured.words)
+            return tyro.cli(
+                subcommands,
+                prog=PROG,
+                args=words,
+                config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
+                registry=_registry(),
+            )
         except OSError as error:
             if error.filename is None:  # a closed pipe
                 raise
-            raise InputError(
-                f"{error.filename}: cannot be written ({error.strerror})"
-            ) from error  # a completion
-        name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
-        set_max_unpacked(getattr(options, "max_unpacked", None))
-        getattr(import_module("mocobot.checks"), f"check_{name}")(options)
-        # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
-        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
-        with redirect_stdout(cast("TextIO", _Shown(sys.stdout))):
-            _command(name)(options)
+            said = f"{error.filename}: cannot be written ({error.strerror})"  # a completion
+            raise InputError(said) from error
 
 
-def _version() -> str:
-    """Of the installed package."""
-    from importlib.metadata import PackageNotFoundError, version  # 20 ms that nothing else needs
+def _sentence(event: Any, command: str | None) -> str:
+    """What tyro finds wrong, as the sentence of an error."""
+    from tyro import _errors
 
+    more = f"see {PROG} {command} --help" if command else f"see {PROG} --help"
+    match event:
+        case _errors.MissingSubcommand():
+            return f"no command given; it must be one of {', '.join(COMMANDS)}"
+        case _errors.UnrecognizedArgs(tokens=tokens):
+            return _unknown(tokens, command, more)
+        case _errors.MissingArgs(unrecognized_tokens=tokens) if tokens:
+            return _unknown(tokens, command, more)
+        case _errors.MissingArgs(missing_arguments=missing):
+            names = [_name(each.arg, and_value=True) for each in missing]
+            return f"{' and '.join(names)} must be given; {more}"
+        case _errors.InvalidChoice(argument=argument, value=value, choices=choices):
+            return f"{_name(argument)} is {value!r}; it must be one of {', '.join(choices)}"
+        case _errors.BadValue(argument=argument):
+            needs = "must be given" if argument.is_positional() else "needs a value"
+            return f"{_name(argument, and_value=True)} {needs}; {more}"
+        case _errors.InstantiationFailure(argument=argument, message=message) if argument is not None:
+            return f"{_name(argument)} {' '.join(message.split())}"
+    return f"these arguments cannot be understood; {more}"
+
+
+def _unknown(tokens: Sequence[str], command: str | None, more: str) -> str:
+    """Arguments that nothing takes, and what may have been meant."""
+    token = next((each for each in tokens if each.startswith("-")), tokens[0])
+    if command is None and not token.startswith("-"):
+        hint = _close(token, COMMANDS) or f"the commands are {', '.join(COMMANDS)}"
+        return f"there is no command {token!r}; {hint}"
+    if not token.startswith("-"):
+        return f"{command} has no use for {token!r} there; {more}"
+    known = list(flags(command)) if command else []
+    close = difflib.get_close_matches(token.strip("-").partition("=")[0], known, n=1)
+    hint = f"did you mean --{close[0]}?" if close else more
+    return f"{command or 'the command line'} has no option {token}; {hint}"
+
+
+def _name(argument: Any, *, and_value: bool = False) -> str:
+    """How an argument is called on the command line."""
+    metavar = str(argument.lowered.metavar)
+    if argument.is_positional():
+        return metavar
+    flag = argument.lowered.name_or_flags[0]
+    return f"{flag} {metavar}" if and_value else flag
+
+
+def _registry() -> Any:
+    """How words become values: what may be left out cannot be named, and messages are for users."""
+    from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
+
+    registry = ConstructorRegistry()
+
+    @registry.primitive_rule
+    def _(info: Any) -> Any:
+        kind, choices = _without_none(info.type), None
+        if get_origin(kind) is Literal and kind is not info.type:
+            choices = tuple(get_args(kind))
+            make, metavar = str, f"{{{','.join(choices)}}}"
+        elif kind in VALUES:
+            make, metavar = VALUES[kind]
+        else:
+            return None
+        return PrimitiveConstructorSpec(
+            nargs=1,
+            metavar=metavar,
+            instance_from_str=lambda words: make(words[0]),
+            is_instance=lambda _: True,
+            str_from_instance=lambda value: ["none" if value is None else str(value)],
+            choices=choices,
+        )
+
+    return registry
+
+
+def _without_none(kind: Any) -> Any:
+    """The type of a value that may be left out."""
+    allowed = get_args(kind)
+    if get_origin(kind) in (Union, UnionType) and len(allowed) == 2 and NoneType in allowed:
+        return next(each for each in allowed if each is not NoneType)
+    return kind
+
+
+def _whole(text: str) -> int:
     try:
-        return version("mocobot")
-    except PackageNotFoundError:
-        return "(not installed, run from its source)"
+        return int(text)
+    except ValueError:
+        raise ValueError(f"is {text!r}; it must be a whole number") from None
 
 
-def _command(name: str) -> Callable[[Any], None]:
-    """What runs the options: imported only now, for neither the help nor a refusal needs MuJoCo or the estimator."""
+def _number(text: str) -> float:
     try:
-        return import_module(f"mocobot.commands.{name}").run
-    except (AttributeError, ImportError, RuntimeError) as error:
-        renderer = os.environ.get("MUJOCO_GL")
-        if not renderer:
-            raise
-        said = " ".join(str(error).split())
-        raise InputError(
-            f"MUJOCO_GL is {renderer!r} and MuJoCo does not load so ({said}); unset it"
-        ) from error
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"is {text!r}; it must be a number")
+    return value
 
 
-if __name__ == "__main__":
-    main()
+VALUES: Mapping[Any, tuple[Callable[[str], Any], str]] = {
+    int: (_whole, "INT"),
+    float: (_number, "FLOAT"),
+    str: (str, "NAME"),
+    Path: (Path, "PATH"),
+}
+"""What makes a value of a word, and how the help calls it."""

@@ -100,8 +100,7 @@ def _check_workers(client: Any, scheduler: str) -> None:
 
 def versions() -> dict[str, str]:
     """What must be the same on every machine."""
-    from mocobot.files.provenance import PACKAGES, version_of
-    from mocobot.files.resume import code_digest
+    from mocobot.results import PACKAGES, code_digest, version_of
 
     found = {name: version_of(name) or "none" for name in PACKAGES}
     return found | {"python": platform.python_version(), "mocobot": code_digest()[:12]}

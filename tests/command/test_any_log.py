@@ -17,18 +17,17 @@ from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_text
 from mocobot_logs.bag.write import write_bag
 from mocobot_sim.trial.sensors import PRESETS, measure
-from mocobot_sim.trial.trial_log import TrialLog
 
 NAMES = ("alice", "bob", "carol")
 
 
 @pytest.fixture(scope="module")
-def recording(random_a: TrialLog) -> Recording:
+def recording(random_a) -> Recording:
     return measure(random_a, PRESETS["nominal"], np.random.default_rng(2), payload="a")
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(tmp_path, monkeypatch) -> Iterator[Path]:
     """A place with its own temporary folder, which must be empty in the end."""
     (scratch := tmp_path / "scratch").mkdir()
     (place := tmp_path / "place").mkdir()
@@ -39,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.fixture
-def log(folder: Path, recording: Recording, capsys: pytest.CaptureFixture[str]) -> Path:
+def log(folder, recording, capsys) -> Path:
     """The recording as CSV with names and units of its own, and its map."""
     columns = {}
     for key, values in recording.columns().items():
@@ -54,7 +53,7 @@ def log(folder: Path, recording: Recording, capsys: pytest.CaptureFixture[str]) 
     return path
 
 
-def test_estimate(folder: Path, log: Path, recording: Recording, capsys: pytest.CaptureFixture[str]) -> None:
+def test_estimate(folder, log, recording, capsys):
     write_recording(recording, folder / "rec.parquet")
     code, text, err = run(capsys, "estimate", "my.csv", "--map", "my.toml", "--out", "est.json")
     assert (code, err) == (0, "")
@@ -70,9 +69,7 @@ def test_estimate(folder: Path, log: Path, recording: Recording, capsys: pytest.
     assert mocobot.estimate("my.csv", map="my.toml").mass == mocobot.estimate(["my.csv"], map="my.toml").mass
 
 
-def test_bags_and_recordings_together(
-    folder: Path, recording: Recording, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bags_and_recordings_together(folder, recording, capsys):
     """A folder counts as all its files; a bag written here comes back bit by bit."""
     write_recording(recording, folder / "rec.parquet")
     write_bag(recording, folder / "bag")
@@ -86,9 +83,7 @@ def test_bags_and_recordings_together(
     assert names == ["rec.parquet", *sorted(path.name for path in (folder / "bag").iterdir())]
 
 
-def test_a_table_with_the_columns_of_a_recording(
-    folder: Path, recording: Recording, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_with_the_columns_of_a_recording(folder, recording, capsys):
     """Without metadata it is a log, and the report says how it is read."""
     write_recording(recording, folder / "rec.parquet")
     pq.write_table(pq.read_table("rec.parquet").replace_schema_metadata({}), "table.parquet")
@@ -97,14 +92,15 @@ def test_a_table_with_the_columns_of_a_recording(
     assert text.startswith("table.parquet: read as 3 robots, joint level")
 
 
-def test_inspect(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_inspect(log, capsys):
     code, text, _ = run(capsys, "inspect", "my.csv", "--map", "my.toml")
     assert code == 0
     assert "[[Log my.csv]]" in text
+    assert mocobot.map(log).text == Path("my.toml").read_text()
     assert "No map was given" in refused(capsys, "inspect", "my.csv")
 
 
-def test_diagnose(folder: Path, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diagnose(folder, log, capsys):
     before = sorted(path.name for path in folder.iterdir())
     code, text, err = run(capsys, "diagnose", "my.csv", "--map", "my.toml", "--no-closed-loop", "--jobs", "1")
     assert (code, err) == (0, "")
@@ -114,9 +110,7 @@ def test_diagnose(folder: Path, log: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize("command", ["estimate", "diagnose"])
-def test_what_is_refused_names_the_users_file(
-    folder: Path, log: Path, recording: Recording, capsys: pytest.CaptureFixture[str], command: str
-) -> None:
+def test_what_is_refused_names_the_users_file(folder, log, recording, capsys, command):
     write_recording(recording, folder / "rec.parquet")
     rows = log.read_text().splitlines()
     (folder / "holes.csv").write_text("\n".join([*rows[:300], *rows[400:]]) + "\n")

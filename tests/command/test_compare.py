@@ -22,9 +22,7 @@ from estimator.arm.unit import AT
 from estimator.calibrate.json import calibration_to_dict
 from estimator.files import write_json
 from invented_calibration import invented_calibration
-from mocobot.comparison import rules
-from mocobot.comparison.difference import Group
-from mocobot.comparison.estimates import grasp_groups
+from mocobot.api.comparison_groups import Group, grasp_groups
 
 RNG = np.random.default_rng(7)
 
@@ -35,7 +33,7 @@ def spread(size: int) -> np.ndarray:
     return root @ root.T
 
 
-def test_one_number() -> None:
+def test_one_number():
     """Closed form: 3 and 5 with errors of 0.6 and 0.8 differ by 2, which has an error of 1."""
     group = Group.of(
         "mass", "kg", ("",), (np.array([3.0]), np.eye(1) * 0.36), (np.array([5.0]), np.eye(1) * 0.64)
@@ -44,7 +42,7 @@ def test_one_number() -> None:
     assert (group.chi2, group.dof, group.p) == pytest.approx((4.0, 1, 0.045500264))
 
 
-def test_false_alarms_are_as_rare_as_they_are_said_to_be() -> None:
+def test_false_alarms_are_as_rare_as_they_are_said_to_be():
     """Draws of one truth, with correlations and a common error: p is uniform, by scipy's own distribution."""
     A, B, by_a, by_b = spread(3), spread(3), *RNG.standard_normal((2, 3))
     p, chi = [], []
@@ -61,7 +59,7 @@ def test_false_alarms_are_as_rare_as_they_are_said_to_be() -> None:
         )
 
 
-def test_errors_that_move_together_are_heeded() -> None:
+def test_errors_that_move_together_are_heeded():
     """A difference against a correlation of 0.99 is clear where each number alone is not."""
     C = 0.5 * np.array([[1.0, 0.99], [0.99, 1.0]])
     zero, apart = np.zeros(2), np.array([0.6, -0.6])
@@ -72,13 +70,13 @@ def test_errors_that_move_together_are_heeded() -> None:
     assert [(i, j, pytest.approx(r)) for i, j, r in group.together] == [("2", "1", 0.99)]
 
 
-def test_numbers_without_errors() -> None:
+def test_numbers_without_errors():
     none, one = np.zeros((1, 1)), np.ones(1)
     assert Group.of("n", "", ("",), (one, none), (one, none)).p == 1.0
     assert Group.of("n", "", ("",), (one, none), (2 * one, none)).p == 0.0
 
 
-def test_a_linear_combination_with_no_error_at_all() -> None:
+def test_a_linear_combination_with_no_error_at_all():
     """Three shares that add up to one: two directions are tested, and the third must not count."""
     C = np.eye(3) - np.full((3, 3), 1 / 3)
     a = np.full(3, 1 / 3)
@@ -86,7 +84,7 @@ def test_a_linear_combination_with_no_error_at_all() -> None:
     assert (group.dof, group.chi2) == (2, pytest.approx(0.5**2))
 
 
-def test_rotations_around_half_a_turn() -> None:
+def test_rotations_around_half_a_turn():
     """The nearer of the two rotation vectors that mean the same: 179.9 and 180.1 deg are 0.2 deg apart."""
     payload = invented_calibration().payloads[0]
 
@@ -100,7 +98,7 @@ def test_rotations_around_half_a_turn() -> None:
 
 
 @pytest.fixture(scope="module")
-def estimates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def estimates(tmp_path_factory) -> Path:
     """Twice one payload, and the same with 50 g of slosh in it."""
     folder = tmp_path_factory.mktemp("compare")
     slosh = mocobot.make_effect(
@@ -112,9 +110,7 @@ def estimates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_two_estimates_of_one_payload(
-    estimates: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_estimates_of_one_payload(estimates, tmp_path, capsys):
     out = tmp_path / "ab"
     code, said, _ = run(
         capsys, "compare", estimates / "a.json", estimates / "b.json", "--strict", "--out", out
@@ -128,7 +124,7 @@ def test_two_estimates_of_one_payload(
     assert (out / "comparison.png").stat().st_size > 10_000
 
 
-def test_a_payload_that_got_heavier(estimates: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_payload_that_got_heavier(estimates, capsys):
     code, said, err = run(capsys, "compare", estimates / "a.json", estimates / "c.json", "--strict")
     assert code == 1
     assert err.startswith("mocobot: they differ: mass (by 0.0")
@@ -140,7 +136,7 @@ def test_a_payload_that_got_heavier(estimates: Path, capsys: pytest.CaptureFixtu
     assert "grasp of robot 2, position" not in {group.name for group in found.changed_groups}
 
 
-def test_two_calibrations_share_the_scale_of_the_springs() -> None:
+def test_two_calibrations_share_the_scale_of_the_springs():
     """Two of the same robots, with a known weight and without: then it is an error of one of them alone."""
     a = invented_calibration()
     at = AT["stiffness_ratio"]
@@ -154,7 +150,7 @@ def test_two_calibrations_share_the_scale_of_the_springs() -> None:
     np.testing.assert_allclose(found["robot 1, spring stiffness"].se ** 2, 2 * held + scale**2)
 
 
-def test_a_spring_that_got_softer() -> None:
+def test_a_spring_that_got_softer():
     a = invented_calibration()
     moved = np.zeros_like(a.units.x)
     moved[1, AT["stiffness_ratio"]] = 0.0, -0.01, 0.0
@@ -173,7 +169,7 @@ class _calibration:
         return calibration_to_dict(self.below)
 
 
-def test_two_diagnoses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_diagnoses(tmp_path, capsys):
     """A cause that changed its size, one that the other could have seen, and one that it could not."""
     a = small_diagnosis()
     assert len(a["causes"]) == 1
@@ -207,9 +203,7 @@ def test_two_diagnoses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert group.ratio[0] == pytest.approx(10.0 / np.sqrt(2.0))
 
 
-def test_nothing_is_compared_with_something_else(
-    estimates: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_nothing_is_compared_with_something_else(estimates, tmp_path, capsys):
     write_json(tmp_path / "verdict" / "diagnosis.json", small_diagnosis())
     (tmp_path / "empty").mkdir()
     (tmp_path / "other.json").write_text('{"format": "mine"}')
@@ -224,10 +218,3 @@ def test_nothing_is_compared_with_something_else(
     ):
         sentence = refused(capsys, "compare", est, tmp_path / other)
         assert said.replace("verdict", str(tmp_path / "verdict")) in sentence
-
-
-def test_rules_say_where_they_come_from() -> None:
-    text = Path(rules.__file__).read_text()
-    names = [name for name in vars(rules) if name.isupper()]
-    assert len(names) == 4
-    assert sum(text.count(f" {origin}") for origin in ("Chosen:", "Derived:", "Measured:")) == len(names)

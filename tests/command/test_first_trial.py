@@ -27,23 +27,23 @@ INSIDE = "cannot be written (.../rec.parquet is a file)"
 PAYLOADS, PRESETS = "the payloads are a, b, c, d", "the presets are ideal, nominal, uncalibrated"
 
 WORDS = {
-    "": "no command given; it must be one of watch, paper, estimate, ...",
+    "": "no command given; it must be one of inspect, map, convert, ...",
     "estimat rec.parquet": "there is no command 'estimat'; did you mean 'estimate'?",
-    "rec.parquet": "there is no command 'rec.parquet'; the commands are watch, paper, estimate, ...",
+    "rec.parquet": "there is no command 'rec.parquet'; the commands are inspect, map, convert, ...",
     "--colour red": "the command line has no option --colour; see mocobot --help",
     "estimate rec.parquet --metod joint": "estimate has no option --metod; did you mean --method?",
     "estimate rec.parquet --rec rec.parquet": "estimate has no option --rec; see mocobot estimate --help",
     "estimate rec.parquet --out": "--out EST.json needs a value; see mocobot estimate --help",
-    "simulate": "--out REC.parquet, or --trials with --out-dir DIR, must be given; see mocobot simulate --help",
-    "simulate --out-dir new": "--out REC.parquet, or --trials with --out-dir DIR, must be given; ...",
-    "simulate --out new.parquet --out-dir new": "--out-dir is for several trials; name their kinds with --trials, ...",
-    "simulate --out new.parquet --trials static": "--trials needs --out-dir DIR, a folder for its recordings, ...",
+    "simulate": "--out must be given: REC.parquet, or with --trials a folder; see mocobot simulate --help",
+    "simulate --out-dir new": "new: the file's name must end in .parquet",
+    "simulate --out new.parquet --out-dir new": "--out and --out-dir are one option; give it once",
+    "simulate --out new.parquet --trials static": "--out is new.parquet; with --trials it must be a folder",
     "simulate --arms 0": "simulate has no option --arms; see mocobot simulate --help",
     "simulate --efect joint_friction --out new.parquet": "simulate has no option --efect; did you mean --effect?",
     "effects rust": "effect 'rust' does not exist; the effects are phi_zero, theta_zero, ...",
     "effects joint_fricton": "effect 'joint_fricton' does not exist; did you mean 'joint_friction'?",
     "convert": "IN and OUT must be given; see mocobot convert --help",
-    "convert log.csv --out new.parquet": "OUT must be given; see mocobot convert --help",
+    "convert log.csv": "OUT must be given; see mocobot convert --help",
     "inspect": "LOG must be given; see mocobot inspect --help",
     "inspect log.csv rec.parquet": "inspect has no use for 'rec.parquet' there; see mocobot inspect --help",
     "report": "DIR must be given; see mocobot report --help",
@@ -55,31 +55,23 @@ WORDS = {
 SIMULATE = {
     "--payload z": f"payload 'z' does not exist; {PAYLOADS}",
     "--payload ''": f"payload '' does not exist; {PAYLOADS}",
-    "--payload None": f"payload 'None' does not exist; {PAYLOADS}",
     "--payload none.xml": "none.xml: not a readable MJCF (No such file or directory)",
     "--payload half.xml": "half.xml: not a readable MJCF or URDF, it is not well-formed XML (no element found: ...)",
     "--preset Nominal": f"preset 'Nominal' does not exist; {PRESETS}",
     "--trajectory circle": "--trajectory is 'circle'; it must be one of random, periodic, static, free",
-    "--level tool": "--level is 'tool'; it must be one of joint, wrist",
-    "--vias 0": "vias is 0; it must be at least 1",
+    "--vias 0": "--vias is 0; it must be at least 1",
     "--vias nan": "--vias is 'nan'; it must be a whole number",
-    "--vias 2.5": "--vias is '2.5'; it must be a whole number",
-    "--vias 100000000": "vias is 100000000; that many could last longer than 3600 s",
+    "--vias 100000000": "--vias is 100000000; that many could last longer than 3600 s",
     "--vias 3 --trajectory static": "--vias is for a random or free trajectory; this one is static",
     "--duration 10": "--duration is for a periodic trajectory; this one is random",
     "--trajectory periodic --duration -1": "duration is -1.0 s; it must be at least 4 s and at most 3600 s",
-    "--trajectory periodic --duration 1": "duration is 1.0 s; it must be at least 4 s and at most 3600 s",
     "--trajectory periodic --duration inf": "--duration is 'inf'; it must be a number",
     "--robots 3": "--robots is for a free trajectory; this one is random",
     "--trajectory free --duration 9": "--duration is for a periodic trajectory; this one is free",
-    "--trajectory free --robots 0": "robots is 0; it must be at least 1 and at most 100",
-    "--trajectory free --robots 101": "robots is 101; it must be at least 1 and at most 100",
-    "--trajectory free --vias 0": "vias is 0; it must be at least 1",
-    "--trajectory free --vias 100000000": "vias is 100000000; that many could last longer than 3600 s",
-    "--trajectory free --payload z": f"payload 'z' does not exist; {PAYLOADS}",
+    "--trajectory free --robots 0": "--robots is 0; it must be at least 1 and at most 100",
+    "--trajectory free --robots 101": "--robots is 101; it must be at least 1 and at most 100",
     "--trajectory free --model folder": "model folder carries a payload; robots of a free trial hold nothing",
-    "--seed -1": "seed is -1; it must be at least 0",
-    "--seed=": "--seed is ''; it must be a whole number",
+    "--seed -1": "--seed is -1; it must be at least 0",
     "--effect rust": "effect 'rust' does not exist; the effects are phi_zero, theta_zero, ...",
     "--effect joint_fricton:robot=2": "effect 'joint_fricton' does not exist; did you mean 'joint_friction'?",
     "--effect drag:c=1": "effect 'drag:c=1': there is no 'c'; drag takes coefficient, turning, quadratic, ...",
@@ -97,14 +89,12 @@ SIMULATE = {
 
 PAPER = {
     "--payload a x": f"payload 'x' does not exist; {PAYLOADS}",
-    "--payload a b a": "payload is 'a b a'; give each once",
+    "--payload a b a": "--payload is 'a b a'; give each once",
     "--payload": "no payload given; name at least one",
     "--preset perfect": f"preset 'perfect' does not exist; {PRESETS}",
-    "--trials 0": "trials is 0; it must be at least 1",
-    "--trials 1e3": "--trials is '1e3'; it must be a whole number",
-    "--seed -1": "seed is -1; it must be at least 0",
-    "--jobs 0": "jobs is 0; it must be at least 1",
-    "--jobs two": "--jobs is 'two'; it must be a whole number",
+    "--trials 0": "--trials is 0; it must be at least 1",
+    "--seed -1": "--seed is -1; it must be at least 0",
+    "--jobs 0": "--jobs is 0; it must be at least 1",
     "--recordings": "--recordings needs --out",
 }
 """Options of ``paper``."""
@@ -112,24 +102,19 @@ PAPER = {
 OPTIONS = {
     "estimate": "no recording given; name at least one file",
     "estimate rec.parquet ./rec.parquet": "rec.parquet is given twice, and would count twice",
-    "estimate rec.parquet --cutoff-hz 0": "cutoff_hz is 0.0; it must lie between 0 and 50 Hz",
+    "estimate rec.parquet --cutoff-hz 0": "--cutoff-hz is 0.0; it must lie between 0 and 50 Hz",
     "estimate rec.parquet --cutoff-hz nan": "--cutoff-hz is 'nan'; it must be a number",
-    "estimate rec.parquet --cutoff-hz 5Hz": "--cutoff-hz is '5Hz'; it must be a number",
     "estimate rec.parquet --method best": "--method is 'best'; it must be one of auto, fit, staged, joint",
     "diagnose": "no recording given; name at least one file",
     "diagnose --exclude push rec.parquet": "no recording given; name them before --exclude",
     "diagnose rec.parquet --exclude ghost": "cause 'ghost' does not exist; the causes are phi_zero, theta_zero, ...",
-    "diagnose rec.parquet rec.parquet": "rec.parquet is given twice, and would count twice",
-    "diagnose rec.parquet --jobs 0": "jobs is 0; it must be at least 1",
-    "diagnose rec.parquet --laws rarely": "--laws is 'rarely'; it must be one of auto, always, never",
+    "diagnose rec.parquet --jobs 0": "--jobs is 0; it must be at least 1",
     "diagnose rec.parquet --tolerances none.toml":
         "none.toml: not a readable file of tolerances (No such file or directory)",
-    "convert log.csv new.parquet --rate fast": "--rate is 'fast'; it must be a number",
     "convert log.csv new.parquet --rate 1000":
         "log.csv: robot 1: samples come 0.01 s apart, at 100 Hz; for a recording of 1000 Hz 250 to 20000 Hz are "
         "needed, so this log allows a rate of at most 400 Hz",
     "convert log.csv new.parquet --max-gap 50ms": "--max-gap is '50ms'; it must be a number",
-    "convert log.csv new.parquet --clock fix": "--clock is 'fix'; it must be one of keep, correct",
     "convert log.csv new.parquet --crop 1-2":
         "--crop is '1-2'; it must be FROM:TO in seconds from the log's start, such as 12:95, 12: or :95",
     "convert log.csv new.parquet --crop": "--crop FROM:TO needs a value; see mocobot convert --help",
@@ -144,8 +129,6 @@ OPTIONS = {
     "map": "LOG must be given; see mocobot map --help",
     "map log.csv --out page.html": f"page.html: {FORCE}",
     "map log.h5": f"log.h5: is of no known format; a log is {LOGS}",
-    "convert log.csv new.parquet --trial walk": "--trial is 'walk'; it must be one of random, periodic, static, free",
-    "convert log.csv new.parquet --episode one": "--episode is 'one'; it must be a whole number",
     "convert log.csv new.parquet --map none.toml":
         "map none.toml: there is no such file, and the built-in maps are omnid-ros2, ...",
     "convert log.csv new.parquet --map empty.toml": "map empty.toml: missing key 'version'; ...",
@@ -157,9 +140,8 @@ OPTIONS = {
     "inspect rec.parquet --design none.toml": "none.toml: not a readable design file (No such file or directory)",
     "inspect rec.parquet --episode 3": "rec.parquet: is not a LeRobot dataset, so it has no episode 3",
     "replay --save new.rrd": "no recording given; name at least one file",
-    "replay rec.parquet": "there is no display to open the viewer on; write a file with --save replay.rrd, or ...",
+    "replay rec.parquet": "there is no display to open the viewer on; write a file with --out replay.rrd, or ...",
     "replay rec.parquet --save new.rrd --web": "--save and --web are both given; choose a file or a browser",
-    "replay rec.parquet rec.parquet --save new.rrd": "rec.parquet is given twice, and would count twice",
     "replay rec.parquet --save new.mp4": "new.mp4: the file's name must end in .rrd",
     "replay rec.parquet --save new.rrd --payload z": f"payload 'z' does not exist; {PAYLOADS}",
     "replay rec.parquet --save new.rrd --payload none.xml":
@@ -194,7 +176,6 @@ OUTPUTS = {
     "estimate rec.parquet --force --out rec.parquet": "rec.parquet: is an input; write somewhere else",
     "estimate none.parquet --out folder": "folder: is a folder; name the file to write",
     "estimate none.parquet --out /dev/null": "/dev/null: is not a regular file; name another one to write",
-    "estimate none.parquet --out /proc/new": "/proc/new: cannot be written (...)",
     "diagnose none.parquet --out log.csv": "log.csv: is a file; name a folder to write",
     "diagnose none.parquet --force --out bag": "bag: exists and is not an earlier diagnosis; name a new folder",
     "diagnose none.parquet --out verdict":
@@ -204,7 +185,6 @@ OUTPUTS = {
     "diagnose verdict/none.parquet --force --out verdict":
         "verdict: holds verdict/none.parquet, which would be lost; name another folder",
     "diagnose none.parquet --out rec.parquet/new": f"rec.parquet/new: {INSIDE}",
-    "diagnose none.parquet --out /proc/new": "/proc/new: cannot be written (...)",
     "convert none.csv rec.parquet": f"rec.parquet: {FORCE}",
     "convert log.csv log.csv --force": "log.csv: is an input; write somewhere else",
     "convert bag bag/new.csv --force": "bag/new.csv: lies in the input bag; write somewhere else",
@@ -213,16 +193,11 @@ OUTPUTS = {
     "convert none.csv paper --force": "paper: exists and is not a bag of an earlier conversion; name a new folder",
     "convert none.csv bag --force": "none.csv: there is no such file",
     "convert bag bag --force": "bag: is an input; write somewhere else",
-    "convert none.csv rec.parquet/new.csv": f"rec.parquet/new.csv: {INSIDE}",
-    "convert none.csv /proc/new": "/proc/new: cannot be written (...)",
     "inspect none.parquet --json log.csv": f"log.csv: {FORCE}",
     "inspect rec.parquet --json rec.parquet --force": "rec.parquet: is an input; write somewhere else",
-    "inspect none.parquet --json rec.parquet/new.json": f"rec.parquet/new.json: {INSIDE}",
     "replay none.parquet --save old.rrd": f"old.rrd: {FORCE}",
-    "replay none.parquet --save rec.parquet/new.rrd": f"rec.parquet/new.rrd: {INSIDE}",
     "report verdict --out page.html": f"page.html: {FORCE}",
     "report verdict --out verdict": "verdict: is a folder; name the file to write",
-    "report verdict --out rec.parquet/new.html": f"rec.parquet/new.html: {INSIDE}",
 }  # fmt: skip
 """Outputs that may not be written, or cannot; inputs that are missing show that these are not looked at before."""
 
@@ -264,7 +239,7 @@ INSPECTED = {
 
 
 @pytest.fixture(scope="module")
-def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def desk(tmp_path_factory) -> Path:
     """A folder as it looks after an hour: one recording, logs of other formats, results, broken files."""
     desk = tmp_path_factory.mktemp("desk")
     recording = small_recording(rows=600)
@@ -290,9 +265,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def answer(
-    desk: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> Callable[[str], str]:
+def answer(desk, capsys, monkeypatch) -> Callable[[str], str]:
     """The sentence that refuses a command line; it leaves every file as it was."""
     monkeypatch.chdir(desk)
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "RERUN"):
@@ -332,6 +305,6 @@ LINES = {
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_one_sentence(answer: Callable[[str], str], line: str) -> None:
+def test_one_sentence(answer, line):
     sentence = answer(line)
     assert said(sentence, LINES[line]), sentence

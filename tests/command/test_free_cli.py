@@ -21,15 +21,13 @@ READY = "mocobot calibrate --free yes, an estimate no (the robots hold nothing)"
 
 
 @pytest.fixture(scope="module")
-def free(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def free(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("free") / "free.parquet"
     mocobot.simulate(trajectory="free", robots=2, vias=8, preset="uncalibrated", seed=3).write(path)
     return path
 
 
-def test_simulate_writes_the_same_as_from_python(
-    free: Path, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_simulate_writes_the_same_as_from_python(free, tmp_path, capsys):
     out = tmp_path / "again.parquet"
     arguments = ["--trajectory", "free", "--robots", 2, "--vias", 8, "--preset", "uncalibrated", "--seed", 3]
     code, said, _ = command.run(capsys, "simulate", *arguments, "--out", out)
@@ -42,21 +40,21 @@ def test_simulate_writes_the_same_as_from_python(
     assert truth["as_built"] == carrying["as_built"][:2], "one seed is one team"
 
 
-def test_a_payload_says_how_many_robots_there_are(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_a_payload_says_how_many_robots_there_are(tmp_path, capsys):
     arguments = ["--trajectory", "free", "--payload", "a", "--robots", 3, "--out", tmp_path / "new.parquet"]
     sentence = "--payload and --robots are both given; a payload says how many robots there are"
     assert command.refused(capsys, "simulate", *arguments) == f"mocobot: {sentence}"
 
 
 @pytest.mark.parametrize(("name", "done"), [("estimate", "estimated"), ("diagnose", "diagnosed")])
-def test_nothing_comes_of_a_payload(free: Path, capsys: pytest.CaptureFixture, name: str, done: str) -> None:
+def test_nothing_comes_of_a_payload(free, capsys, name, done):
     assert command.refused(capsys, name, free) == (
         f"mocobot: {free}: trial is 'free': the robots hold nothing, so nothing can be {done}; "
         "mocobot calibrate --free takes it"
     )
 
 
-def test_inspect_leaves_out_what_needs_a_payload(free: Path, capsys: pytest.CaptureFixture) -> None:
+def test_inspect_leaves_out_what_needs_a_payload(free, capsys):
     code, said, _ = command.run(capsys, "inspect", free, "--strict")
     assert code == 0
     assert (
@@ -73,7 +71,7 @@ def test_inspect_leaves_out_what_needs_a_payload(free: Path, capsys: pytest.Capt
     assert told["segments"]["moving_s"] > 3.0
 
 
-def test_inspect_still_looks_at_every_channel(free: Path, tmp_path: Path) -> None:
+def test_inspect_still_looks_at_every_channel(free, tmp_path):
     recording = read_recording(free)
     phi = recording.phi.copy()
     phi[900:1000, 0, 1] = phi[900, 0, 1]  # in the midst of the haste
@@ -86,7 +84,7 @@ def test_inspect_still_looks_at_every_channel(free: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".mcap", ".csv"])
-def test_convert_goes_round(free: Path, tmp_path: Path, capsys: pytest.CaptureFixture, suffix: str) -> None:
+def test_convert_goes_round(free, tmp_path, capsys, suffix):
     there, back = tmp_path / f"log{suffix}", tmp_path / "back.parquet"
     said = command.run(capsys, "convert", free, there)[1]
     assert "robot 2: not determined, the robots hold nothing, so they do not move together" in said
@@ -111,9 +109,7 @@ def test_convert_goes_round(free: Path, tmp_path: Path, capsys: pytest.CaptureFi
         assert not target.exists()
 
 
-def test_a_map_may_say_that_the_robots_hold_nothing(
-    free: Path, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_a_map_may_say_that_the_robots_hold_nothing(free, tmp_path, capsys):
     log, log_map = tmp_path / "log.csv", tmp_path / "map.toml"
     command.run(capsys, "convert", free, log)
     command.run(capsys, "map", log, "--out", log_map)
@@ -124,7 +120,7 @@ def test_a_map_may_say_that_the_robots_hold_nothing(
     assert "the robots hold nothing" in command.refused(capsys, "estimate", log, "--map", log_map)
 
 
-def test_replay_draws_the_robots_alone(free: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_replay_draws_the_robots_alone(free, tmp_path, capsys):
     code, said, _ = command.run(capsys, "replay", free, "--truth", "--save", tmp_path / "free.rrd")
     assert code == 0
     assert (

@@ -43,15 +43,13 @@ def in_time() -> Iterator[None]:
 
 
 @pytest.fixture
-def pipe(tmp_path: Path) -> Path:
+def pipe(tmp_path) -> Path:
     """Nobody ever writes into it."""
     os.mkfifo(tmp_path / "pipe.toml")
     return tmp_path / "pipe.toml"
 
 
-def test_a_pipe_or_a_device_is_no_input(
-    pipe: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pipe_or_a_device_is_no_input(pipe, tmp_path, capsys):
     write_recording(small_recording(rows=150), tmp_path / "rec.parquet")
     for words in (
         ("estimate", "rec.parquet", "--config", pipe),
@@ -82,7 +80,7 @@ def test_a_pipe_or_a_device_is_no_input(
         ("#" + "a" * (1 << 20), "larger than 1 MiB"),
     ],
 )
-def test_boundless_toml(tmp_path: Path, text: str, said: str) -> None:
+def test_boundless_toml(tmp_path, text, said):
     file = tmp_path / "file.toml"
     file.write_text(text)
     begin = time.monotonic()
@@ -92,7 +90,7 @@ def test_boundless_toml(tmp_path: Path, text: str, said: str) -> None:
     assert time.monotonic() - begin < 10.0
 
 
-def test_plain_toml_is_read(tmp_path: Path) -> None:
+def test_plain_toml_is_read(tmp_path):
     file = tmp_path / "file.toml"
     file.write_text("# " + "a." * 30 + "\na.b.'c.d' = [[1, 2.5], ['" + "x." * 60 + "']]\n[e]\nf = 0x7fff\n")
     assert read_toml(file, "file")["a"]["b"]["c.d"][0] == [1, 2.5]
@@ -108,7 +106,7 @@ def test_plain_toml_is_read(tmp_path: Path) -> None:
         ("[" * 50 + "]" * 50, r"version is \["),
     ],
 )
-def test_boundless_metadata_of_a_bag(tmp_path: Path, version: str, said: str) -> None:
+def test_boundless_metadata_of_a_bag(tmp_path, version, said):
     bomb = "a0: &a0 [x]\n" + "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 10))
     head = bomb if version.startswith("*") else ""
     text = f"{head}rosbag2_bagfile_information:\n  version: {version}\n  storage_identifier: mcap\n"
@@ -151,7 +149,7 @@ BODY = '<body name="payload"><joint name="j"/><geom size=".1" mass="1"/></body>'
         ("<a", "", "not well-formed XML"),
     ],
 )
-def test_boundless_models(pipe: Path, tmp_path: Path, before: str, inside: str, said: str) -> None:
+def test_boundless_models(pipe, tmp_path, before, inside, said):
     file = tmp_path / "model.xml"
     file.write_text(f"<mujoco>{before}<worldbody>{BODY}{inside}</worldbody></mujoco>")
     for read in (load_model, load_payload):
@@ -164,7 +162,7 @@ def test_boundless_models(pipe: Path, tmp_path: Path, before: str, inside: str, 
     assert load_model(file).joints == ("j",)
 
 
-def test_a_height_field_in_a_picture_and_entities(tmp_path: Path) -> None:
+def test_a_height_field_in_a_picture_and_entities(tmp_path):
     size = (30_000).to_bytes(4, "big")
     (tmp_path / "h.png").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + 2 * size)
     file = tmp_path / "model.xml"
@@ -179,15 +177,13 @@ def test_a_height_field_in_a_picture_and_entities(tmp_path: Path) -> None:
             read(file)
 
 
-def test_a_truth_that_cannot_be_read_is_told_before_the_work(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_truth_that_cannot_be_read_is_told_before_the_work(tmp_path, capsys):
     write_recording(small_recording(rows=150), tmp_path / "rec.parquet")
     (tmp_path / "rec.truth.json").write_text("[" * 200_000)
     assert "rec.truth.json: not valid JSON" in refused(capsys, "diagnose", tmp_path / "rec.parquet")
 
 
-def test_help_in_a_narrow_terminal() -> None:
+def test_help_in_a_narrow_terminal():
     done = subprocess.run(
         [sys.executable, "-m", "mocobot", "--help"], env=os.environ | {"COLUMNS": "5"}, capture_output=True, timeout=60,
         check=False,
@@ -196,12 +192,10 @@ def test_help_in_a_narrow_terminal() -> None:
     assert b"estimate" in done.stdout
 
 
-def test_control_characters_are_shown_escaped(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_control_characters_are_shown_escaped(tmp_path, capsys, monkeypatch):
     shown = "\\x1b[31m"
     assert shown in refused(capsys, "inspect", tmp_path / f"{ESCAPE}.csv")
-    monkeypatch.setattr("mocobot.commands.effects.run", lambda _: print(f"é {ESCAPE}\n\tx"))
+    monkeypatch.setattr("mocobot.commands.effects", lambda _: print(f"é {ESCAPE}\n\tx"))
     assert run(capsys, "effects") == (0, f"é {shown}\n\tx\n", "")
     file = tmp_path / "log.csv"
     file.write_text("time\u00a0[s],x\n" + "".join(f"{k / 100},{k}\n" for k in range(300)), encoding="utf-8")
@@ -209,7 +203,7 @@ def test_control_characters_are_shown_escaped(
     assert (code, tomllib.loads(draft)["time"]["column"]) == (0, "time\u00a0[s]")
 
 
-def test_names_like_formulas_are_drawn_as_they_are(tmp_path: Path) -> None:
+def test_names_like_formulas_are_drawn_as_they_are(tmp_path):
     found = invented_calibration()
     names = (r"$\frac{$_x", "_y$", f"$${ESCAPE}", "日$^_$")
     trials = tuple(replace(trial, name=names[k % len(names)]) for k, trial in enumerate(found.trials))
@@ -226,7 +220,7 @@ def test_names_like_formulas_are_drawn_as_they_are(tmp_path: Path) -> None:
         assert not axis.title.get_parse_math()
 
 
-def test_every_picture_and_every_pool_is_of_that_kind() -> None:
+def test_every_picture_and_every_pool_is_of_that_kind():
     texts = {path: path.read_text(encoding="utf-8") for path in SRC.rglob("*.py")}
     drawn = [text for text in texts.values() if "FigureCanvasAgg(" in text]
     assert len(drawn) >= 5
@@ -260,9 +254,7 @@ Parallel(n_jobs=2, **ends_with_this())(delayed(work)(k) for k in range(2))
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_command_that_is_told_to_end_clears_away_what_it_began(
-    tmp_path: Path, number: signal.Signals
-) -> None:
+def test_a_command_that_is_told_to_end_clears_away_what_it_began(tmp_path, number):
     process = subprocess.Popen(
         [sys.executable, "-c", COMMAND, tmp_path / "new" / "out"],
         stdout=subprocess.PIPE,
@@ -278,7 +270,7 @@ def test_a_command_that_is_told_to_end_clears_away_what_it_began(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_workers_end_with_a_parent_that_is_killed() -> None:
+def test_workers_end_with_a_parent_that_is_killed():
     process = subprocess.Popen([sys.executable, "-c", POOL], stdout=subprocess.PIPE, text=True)
     with process:
         assert process.stdout is not None

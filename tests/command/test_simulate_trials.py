@@ -19,7 +19,7 @@ BIAS = "sea_bias:robot=2,joint=3,bias=0.1"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """A team of uncalibrated robots, one torque sensor more wrong than that, pushed in the second of its trials."""
     out = tmp_path_factory.mktemp("trials") / "new" / "trials"
     arguments = ["simulate", *SHORT, "--trials", "random,random,periodic", "--out-dir", out, "--effect", PUSH]
@@ -33,7 +33,7 @@ def mocobot_main(arguments: list[object]) -> None:
     main([str(argument) for argument in arguments])
 
 
-def test_every_trial_has_its_file_and_its_truth(folder: Path) -> None:
+def test_every_trial_has_its_file_and_its_truth(folder):
     names = ["trial1_random", "trial2_random", "trial3_periodic"]
     assert sorted(p.name for p in folder.iterdir()) == sorted(
         [LIST, *(f"{name}.{end}" for name in names for end in ("parquet", "truth.json"))]
@@ -42,7 +42,7 @@ def test_every_trial_has_its_file_and_its_truth(folder: Path) -> None:
     assert truths == truths[:1] * 3, "not one team"
 
 
-def test_the_trials_are_those_of_one_team_simulated_one_by_one(folder: Path) -> None:
+def test_the_trials_are_those_of_one_team_simulated_one_by_one(folder):
     """The push is in the second alone, and the bias in all."""
     bias = mocobot.make_effect("sea_bias", {"bias_Nm": 0.1}, robot=2, joint=3)
     for name, kind, number, same in (
@@ -59,7 +59,7 @@ def test_the_trials_are_those_of_one_team_simulated_one_by_one(folder: Path) -> 
         assert np.array_equal(found.tau, alone.tau) is same, name
 
 
-def test_robots_come_from_a_truth(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_robots_come_from_a_truth(folder, tmp_path, capsys):
     """Zeros, lengths and springs, those that effects have changed among them; the sensors are those asked for."""
     units, out = folder / "trial1_random.truth.json", tmp_path / "rec.parquet"
     code, said, _ = run(capsys, "simulate", *SHORT[:4], "--units", units, "--preset", "ideal", "--out", out)
@@ -80,9 +80,7 @@ def test_robots_come_from_a_truth(folder: Path, tmp_path: Path, capsys: pytest.C
         ({"as_built": [{}]}, "as_built has 1 units; the payload has 3 grasps"),
     ],
 )  # fmt: skip
-def test_robots_that_cannot_be(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], values: object, sentence: str
-) -> None:
+def test_robots_that_cannot_be(tmp_path, capsys, values, sentence):
     file = tmp_path / "team.json"
     file.write_text(json.dumps(values))
     said = refused(capsys, "simulate", *SHORT[:4], "--units", file, "--out", tmp_path / "rec.parquet")
@@ -90,9 +88,7 @@ def test_robots_that_cannot_be(
     assert sorted(tmp_path.iterdir()) == [file]
 
 
-def test_robots_are_drawn_or_given_but_not_both(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_robots_are_drawn_or_given_but_not_both(folder, tmp_path, capsys):
     units = folder / "trial1_random.truth.json"
     arguments = ["--units", units, "--preset", "uncalibrated", "--out", tmp_path / "rec.parquet"]
     assert refused(capsys, "simulate", *arguments) == (
@@ -101,9 +97,7 @@ def test_robots_are_drawn_or_given_but_not_both(
     )
 
 
-def test_a_folder_is_replaced_if_asked_and_if_it_is_one_of_trials(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_is_replaced_if_asked_and_if_it_is_one_of_trials(folder, tmp_path, capsys):
     arguments = ["simulate", "--trials", "random,static", "--out-dir"]
     sentence = refused(capsys, *arguments, folder)
     assert sentence.endswith("is an earlier simulation; give --force to replace it, or name a new folder")
@@ -114,7 +108,7 @@ def test_a_folder_is_replaced_if_asked_and_if_it_is_one_of_trials(
     )
 
 
-def test_effects_are_listed_with_units_and_ranges(capsys: pytest.CaptureFixture[str]) -> None:
+def test_effects_are_listed_with_units_and_ranges(capsys):
     code, out, err = run(capsys, "effects")
     assert (code, err) == (0, "")
     for name, kind in EFFECTS.items():
@@ -126,7 +120,7 @@ def test_effects_are_listed_with_units_and_ranges(capsys: pytest.CaptureFixture[
     assert "joint_friction\n" not in out
 
 
-def test_no_trials_are_none() -> None:
+def test_no_trials_are_none():
     with pytest.raises(mocobot.InputError, match="no trial given"):
         mocobot.simulate_trials("b", [])
     with pytest.raises(

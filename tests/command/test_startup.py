@@ -12,7 +12,7 @@ import pytest
 
 from command import refused, run
 from mocobot.cli import COMMANDS
-from mocobot.options import Kind
+from mocobot.options import TrialKind as Kind
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = {"numpy", "scipy", "pyarrow", "mujoco", "dm_control", "numba", "matplotlib", "plotly", "joblib"}
@@ -55,12 +55,12 @@ NUMBERS = {
 """Mistakes in the numbers of an effect."""
 
 
-def test_every_command_refuses_something_at_once() -> None:
+def test_every_command_refuses_something_at_once():
     assert set(REFUSED) == set(COMMANDS)
 
 
 @pytest.mark.parametrize("name", REFUSED | NAMES_AND_FILES)
-def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> None:
+def test_a_refusal_loads_nothing_that_takes_time(name, tmp_path):
     for file in ("whole.csv", "whole.h5", "whole.xml", "empty.parquet"):
         (tmp_path / file).touch()
     (tmp_path / "cut.parquet").write_bytes(b"PAR1" + bytes(100))
@@ -88,7 +88,7 @@ def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("text", NUMBERS)
-def test_an_effects_numbers_are_refused_without_the_simulator(text: str, tmp_path: Path) -> None:
+def test_an_effects_numbers_are_refused_without_the_simulator(text, tmp_path):
     code = (
         "import sys, mocobot.cli\n"
         f"try: mocobot.cli.main(['simulate', '--effect', {text!r}, '--out', 'new.parquet'])\n"
@@ -104,7 +104,7 @@ def test_an_effects_numbers_are_refused_without_the_simulator(text: str, tmp_pat
     assert NUMBERS[text] in done.stderr
 
 
-def test_effects_are_known_without_the_simulator() -> None:
+def test_effects_are_known_without_the_simulator():
     code = (
         "import sys, mocobot_sim.effects.catalogue as spec\n"
         "assert len(spec.EFFECTS) == 25 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
@@ -127,7 +127,7 @@ for module in (numpy.linalg._umath_linalg, scipy.linalg._fblas):
 
 
 @pytest.mark.parametrize("first", ["mocobot", "numpy, mocobot", "numpy, scipy.special, mocobot"])
-def test_matrices_have_one_thread_whatever_is_imported_first(first: str) -> None:
+def test_matrices_have_one_thread_whatever_is_imported_first(first):
     """Of two that the environment asks for: results must not depend on how many there are."""
     done = subprocess.run(
         [sys.executable, "-c", f"import {first}\n{THREADS}"],
@@ -137,7 +137,7 @@ def test_matrices_have_one_thread_whatever_is_imported_first(first: str) -> None
     assert found == {"numpy.linalg._umath_linalg": "1", "scipy.linalg._fblas": "1"}
 
 
-def test_kinds_of_trials_are_those_of_recordings() -> None:
+def test_kinds_of_trials_are_those_of_recordings():
     from typing import get_args
 
     from estimator.recording.metadata import TRIALS
@@ -145,7 +145,7 @@ def test_kinds_of_trials_are_those_of_recordings() -> None:
     assert get_args(Kind) == tuple(TRIALS)
 
 
-def test_simulating_needs_numba_only_when_it_runs() -> None:
+def test_simulating_needs_numba_only_when_it_runs():
     """Nor does it filter anything: ``scipy.signal`` takes 0.4 s to load."""
     code = (
         "import sys, mocobot\nmocobot.simulate\n"
@@ -163,7 +163,7 @@ CODE = (
 
 
 @pytest.mark.parametrize("home", [True, False])
-def test_machine_code_goes_to_the_users_cache(tmp_path: Path, home: bool) -> None:
+def test_machine_code_goes_to_the_users_cache(tmp_path, home):
     """Where nothing can be put beside the source; without such a folder either it is compiled, and not kept."""
     site, cache = tmp_path / "site", tmp_path / "cache"
     for package in ("mocobot_sim", "estimator"):
@@ -180,7 +180,7 @@ def test_machine_code_goes_to_the_users_cache(tmp_path: Path, home: bool) -> Non
     assert kept.startswith(str(cache)) if home else kept == "nowhere"
 
 
-def test_a_completion_is_written_where_it_can_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_completion_is_written_where_it_can_be(tmp_path, capsys):
     code, _, _ = run(capsys, "--tyro-write-completion", "bash", tmp_path / "mocobot")
     assert code == 0
     assert "campaign" in (tmp_path / "mocobot").read_text()

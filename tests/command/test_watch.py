@@ -13,12 +13,13 @@ from command import refused, run
 from estimator.errors import InputError
 from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_text
-from mocobot.commands import watch
+from mocobot import commands
+from mocobot.api import watch
 from recordings import small_recording
 
 
 @pytest.fixture(scope="module")
-def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trial(tmp_path_factory) -> Path:
     """A short trial of robots as designed."""
     path = tmp_path_factory.mktemp("watch") / "monday.parquet"
     mocobot.simulate("b", vias=9, seed=5).write(path)
@@ -26,7 +27,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+def no_diagnosis(monkeypatch) -> list[dict[str, Any]]:
     """In place of the diagnosis, which takes long: what it was asked, and a refusal; no pictures on the page."""
     asked: list[dict[str, Any]] = []
 
@@ -40,7 +41,7 @@ def no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-def test_a_healthy_team(trial: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_healthy_team(trial, tmp_path, capsys):
     """All of it in one folder, with a page, and the same numbers as from the commands one by one."""
     out = tmp_path / "new" / "seen"
     code, said, _ = run(capsys, "watch", trial, "--out", out, "--strict", "--jobs", 1)
@@ -64,9 +65,7 @@ def test_a_healthy_team(trial: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "is an earlier result of watch; give --force" in refused(capsys, "watch", trial, "--out", out)
 
 
-def test_robots_that_contradict_each_other_are_calibrated(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], no_diagnosis: list[dict[str, Any]]
-) -> None:
+def test_robots_that_contradict_each_other_are_calibrated(tmp_path, capsys, no_diagnosis):
     """And the diagnosis is told of it; a sensor that is far off is named."""
     bias = mocobot.make_effect("sea_bias", {"bias_Nm": 0.15}, robot=3, joint=2)
     for k, kind in enumerate(("random", "periodic")):
@@ -89,9 +88,7 @@ def test_robots_that_contradict_each_other_are_calibrated(
     assert (out / "report.html").read_text() == "the page"
 
 
-def test_a_log_is_converted_and_one_of_no_use_left_out(
-    trial: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], no_diagnosis: list[dict[str, Any]]
-) -> None:
+def test_a_log_is_converted_and_one_of_no_use_left_out(trial, tmp_path, capsys, no_diagnosis):
     log, brief, out = tmp_path / "log.csv", tmp_path / "brief.parquet", tmp_path / "seen"
     write_text(log, read_recording(trial).columns())
     write_recording(small_recording(rows=150), brief)
@@ -108,7 +105,7 @@ def test_a_log_is_converted_and_one_of_no_use_left_out(
     assert (out / "verdict.txt").read_text().splitlines()[0].startswith(f"{log}: ready")
 
 
-def test_nothing_of_use(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_of_use(tmp_path, capsys):
     brief = tmp_path / "brief.parquet"
     write_recording(small_recording(rows=150), brief)
     code, said, _ = run(capsys, "watch", brief)
@@ -117,25 +114,21 @@ def test_nothing_of_use(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert run(capsys, "watch", brief, "--strict")[0] == 1
 
 
-def test_the_page_is_opened(
-    trial: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, no_diagnosis: list[Any]
-) -> None:
+def test_the_page_is_opened(trial, capsys, monkeypatch, no_diagnosis):
     opened: list[str] = []
-    monkeypatch.setattr(watch.webbrowser, "open", opened.append)
+    monkeypatch.setattr(commands.webbrowser, "open", opened.append)
     run(capsys, "watch", trial, "--open")
     (address,) = opened
     assert address.startswith("file:///")
     assert Path(address.removeprefix("file://")).is_file()
 
 
-def test_names_of_recordings_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_of_recordings_are_told_apart(tmp_path, capsys):
     files = [tmp_path / "a" / "trial.parquet", tmp_path / "b" / "trial.parquet"]
     assert "trial is the name of two recordings" in refused(capsys, "watch", *files)
 
 
-def test_a_log_with_a_hole_is_cut_and_one_that_cannot_be_used_left_out(
-    trial: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], no_diagnosis: list[dict[str, Any]]
-) -> None:
+def test_a_log_with_a_hole_is_cut_and_one_that_cannot_be_used_left_out(trial, tmp_path, capsys, no_diagnosis):
     """One hole or one stamp that runs back had ended the command for all files."""
     columns, out = read_recording(trial).columns(), tmp_path / "seen"
     time = columns["time"]

@@ -53,7 +53,9 @@ def points_nowhere(target: str, page: Path) -> bool:
 def names_of(module: str) -> frozenset[str]:
     """Names that a module defines or imports at its top level."""
     found: set[str] = set()
-    todo: list[ast.stmt] = ast.parse(module_files()[module].read_text(encoding="utf-8")).body
+    file = module_files()[module]
+    stub = file.with_suffix(".pyi")  # where public names are listed that are imported when they are used
+    todo: list[ast.stmt] = ast.parse((stub if stub.is_file() else file).read_text(encoding="utf-8")).body
     todo += [node for branch in todo if isinstance(branch, ast.If) for node in branch.body]
     for node in todo:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):

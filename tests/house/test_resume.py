@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mocobot.files import resume
+from mocobot import results as resume
 from source_tree import SRC, imported_modules, module_files
 
 FILES = {
@@ -24,10 +24,10 @@ FILES = {
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An installation of a few files, which digests are then of."""
-    for name in ("src/mocobot/files/resume.py", "src/mocobot_view/scene.py", *FILES.values()):
+    for name in ("src/mocobot/results.py", "src/mocobot_view/scene.py", *FILES.values()):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("as it was")
-    monkeypatch.setattr(resume, "__file__", str(tmp_path / "src/mocobot/files/resume.py"))
+    monkeypatch.setattr(resume, "__file__", str(tmp_path / "src/mocobot/results.py"))
     monkeypatch.setattr(resume, "models_dir", lambda: tmp_path / "models")
     resume.code_digest.cache_clear()
     yield tmp_path
@@ -78,4 +78,4 @@ def test_whatever_estimates_and_simulates_is_looked_at() -> None:
         for path in module_files(package).values():
             needed |= {module.split(".")[0] for module in imported_modules(path)}
     ours = {path.name for path in SRC.iterdir() if (path / "__init__.py").is_file()}
-    assert needed & ours <= set(resume.SOURCES)
+    assert needed & ours <= set(resume.CODE)

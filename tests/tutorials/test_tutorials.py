@@ -20,12 +20,12 @@ SAID = {
 notebooks = pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
 
 
-def test_there_are_three() -> None:
+def test_there_are_three():
     assert {path.stem for path in TUTORIALS} == set(SAID)
 
 
 @notebooks
-def test_a_tutorial_is_kept_without_outputs(path: Path) -> None:
+def test_a_tutorial_is_kept_without_outputs(path):
     cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     assert cells[0]["cell_type"] == "markdown"
     code = [cell for cell in cells if cell["cell_type"] == "code"]
@@ -35,7 +35,7 @@ def test_a_tutorial_is_kept_without_outputs(path: Path) -> None:
 
 @pytest.mark.slow
 @notebooks
-def test_a_tutorial_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tutorial_runs(path, tmp_path, monkeypatch):
     """In a kernel of its own, with warnings as they come there; a cell that fails raises here."""
     import nbformat
     from nbclient import NotebookClient

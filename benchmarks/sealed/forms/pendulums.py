@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 
 from estimator.arrays import Array, inertia_parameters
 from hidden.limits import pendulum_limit_kg
-from mocobot.campaign.draw import REACH_M
+from mocobot.campaign.effects import REACH_M
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from sealed.forms.base import Form, Place, near, vector

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocobot.campaign.draw import REACH_M
+from mocobot.campaign.effects import REACH_M
 from mocobot_sim.trial.actors import Actor
 from sealed.forms.base import Form, Place, direction, near, vector
 from sealed.forms.parts import PointForce

@@ -80,7 +80,7 @@ class Diagnosed(ABC, Generic[V]):
 
 def draw(
     values: Mapping[str, Any], traces: Sequence[Trace], channels: Sequence[Channel], unit: Callable[[str], str],
-    folder: Path,
+    folder: Path, *, pictures: bool = True,
 ) -> None:  # fmt: skip
     """Write residuals and, where plots can be drawn, pictures of a diagnosis; arguments as of ``save_plots``.
 

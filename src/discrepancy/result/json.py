@@ -81,7 +81,7 @@ remains             sentences on what the verdict leaves open: misfit above clea
 notes               sentences
 
 ``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
-(``mocobot.files.provenance``).
+(``mocobot.results``).
 """
 
 from __future__ import annotations

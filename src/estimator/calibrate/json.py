@@ -40,7 +40,7 @@ open                       sentences: what these recordings do not decide, and w
 frames                     {defined_by, theta_x_zero_sd_deg}: "encoders", each {i} turned about its x axis by the zero
                            of that theta_x, of which a standard deviation is assumed; or "drawing", and 0
 
-Files add ``provenance`` (``mocobot.files.provenance``); readers ignore it, ``frames`` and any other key at the top.
+Files add ``provenance`` (``mocobot.results``); readers ignore it, ``frames`` and any other key at the top.
 """
 
 from __future__ import annotations

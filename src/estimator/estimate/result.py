@@ -37,7 +37,7 @@ frames                     only where the encoders define the frames {i}, turned
 why_not_fit                only where one fit was wanted and could not be made: a sentence on why
 calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
 
-``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
+``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.results``).
 Readers ignore it and any other key.
 """
 

@@ -1,8 +1,18 @@
-"""Calibrate the robots of a team from what they carry."""
+"""Calibrate the robots of a team from what they carry.
+
+A calibration's folder:
+
+calibration.json           see ``estimator.calibrate.json``
+report.txt                 what the command prints
+omnid1.toml ...            every robot's numbers as they are
+model, or model-1 ...      the calibrated team in MuJoCo, one for each payload; ``mocobot simulate --model`` takes it
+deviations.png, recordings.png, shares.png
+                           parameters against priors, what recordings leave over, what each of them contributes
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,30 +21,37 @@ import numpy as np
 
 from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
-from estimator.calibrate.calibration import Prior, read_prior
-from estimator.calibrate.flanges import in_drawing_frames
 from estimator.calibrate.json import calibration_to_dict
-from estimator.calibrate.text import format_calibration
+from estimator.calibrate.outcome.flanges import in_drawing_frames
+from estimator.calibrate.outcome.text import format_calibration
+from estimator.calibrate.outcome.unit_toml import unit_toml
+from estimator.calibrate.prior import Prior, read_prior
 from estimator.errors import InputError
-from estimator.files import holds, whole_folder
+from estimator.extras import draws_plots
+from estimator.files import write_json, write_text
 from estimator.recording.model import Recording
-from mocobot.api.given import Given, recordings_of
-from mocobot.api.public import public
-from mocobot.files import calibrations
-from mocobot.files.targets import check_folder
+from mocobot.api.recordings import Given, Say, calibration_of, quiet, recordings_of
+from mocobot.checks import CALIBRATION
+from mocobot.options import CalibrateOptions, made
+from mocobot.results import Folder, public
 
 TILT_RAD, ARM_MASS_RATIO = float(np.deg2rad(0.2)), 0.1
 """Standard deviations of what is free on demand only, where the prior has none."""
 WEIGHED = 1e-3
 """Relative standard error of a weight that is given without one."""
+Weight = float | tuple[float, float]
+REPORT, MODEL = "report.txt", "model"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Calibration(Below):
+class Calibration(Folder, Below):
     """The robots as they are and what they carry, printable, a table in a notebook, and a folder of files.
 
-    The attributes are those of ``estimator.calibrate.calibration.Calibration``.
+    The attributes are those of ``estimator.calibrate.calibration.Calibration``. ``simulate`` takes the ``model`` in
+    the folder.
     """
+
+    result = "calibration"
 
     def __str__(self) -> str:
         """The text report."""
@@ -54,62 +71,78 @@ class Calibration(Below):
         """Strict JSON with units in the keys; see ``estimator.calibrate.json``."""
         return calibration_to_dict(self)
 
-    def write(self, folder: Path | str) -> None:
-        """Write JSON, report, every robot's numbers, pictures and the team's model; an earlier calibration is replaced.
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> list[str]:
+        """Write everything that is listed at the head of this module into an existing folder.
 
-        ``mocobot report`` makes a page of the folder; ``simulate`` takes its ``model``.
+        Args:
+            folder: it.
+            pictures: whether pictures are drawn, too.
+            more: further keys of the JSON.
+
+        Returns:
+            What could not be made, and why, one sentence each.
 
         Raises:
-            InputError: the folder holds something else, or cannot be written.
+            InputError: something cannot be written.
         """
-        check_folder(Path(folder), [], holds("calibration"), "an earlier calibration", force=True)
-        with whole_folder(Path(folder), "calibration") as whole:
-            calibrations.write_into(whole, self)
+        from mocobot_sim.extended.calibrated import write_calibrated  # MuJoCo, which reading does not need
+
+        notes = []
+        for k in range(len(self.payloads)):
+            name = MODEL if len(self.payloads) == 1 else f"{MODEL}-{k + 1}"
+            try:
+                write_calibrated(self, folder / name, k)
+            except InputError as error:  # numbers that no body has, robots that are not the simulated ones
+                notes.append(f"there is no {name}: {error}")
+        for robot in range(1, self.robots + 1):
+            write_text(folder / f"omnid{robot}.toml", unit_toml(self, robot))
+        if pictures and draws_plots():
+            from mocobot_report.calibration.plots import save_plots  # matplotlib, which reading does not need
+
+            save_plots(self, folder)
+        write_json(folder / CALIBRATION, self.to_dict() | more)
+        write_text(folder / REPORT, f"{self}\n")
+        return notes
 
 
 def calibrate(
-    recordings: Given | Iterable[Given],
-    *,
+    logs: Given | Iterable[Given],
     free: Given | Iterable[Given] = (),
-    map: Path | str | None = None,
-    prior: Prior | Path | str | None = None,
-    payload_of: Mapping[str, str] | None = None,
-    known_mass: Mapping[str, float | tuple[float, float]] | float | None = None,
-    parallel_flanges: bool = False,
-    tilt: bool = False,
-    arm_masses: bool = False,
-    say: Callable[[str], object] = lambda _: None,
+    options: CalibrateOptions | None = None,
+    *,
+    say: Say = quiet,
+    note: Say = quiet,
+    **fields: Any,
 ) -> Calibration:
     """Find out how every robot differs from its design, and what the team carries.
 
     Args:
-        recordings: of one team with payloads, or paths of their files, or of logs that ``convert`` reads as they are;
-            several, so that each can be foretold by the others.
+        logs: recordings of one team with payloads, or paths of their files, or of logs that ``convert`` reads as they
+            are; several, so that each can be predicted by the others.
         free: the same of the robots with nothing in their hands, which tell what the arms weigh.
-        map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
-        prior: how far the robots may be off, or the TOML file that says so; None for robots out of the box.
-        payload_of: labels of payloads by a recording's name, in place of what its metadata says.
-        known_mass: weighed payloads by label, mass or (mass, standard error) [kg]; a number alone where there is one
-            payload. 0.1 % if no standard error is given. One decides the springs' common scale.
-        parallel_flanges: the z axes of all flanges are parallel; decides the zeros of theta_x, and results are in the
-            frames of drawings.
-        tilt: bases may not stand level (0.2 deg, where the prior says nothing).
-        arm_masses: each arm's masses may be off (10 %, where the prior says nothing).
+        options: how; ``fields`` are fields of it. Labels and weights may be mappings: ``known_mass={"c": (10.48,
+            0.005)}`` [kg], or a number where there is one payload.
         say: takes the name of the stage that begins.
+        note: takes how a log was read, as text.
 
     Raises:
         InputError: recordings that cannot be used or do not belong together, or a weight of no payload.
     """
+    chosen = made(CalibrateOptions, options, fields)
+    prior = chosen.prior
     assumed = prior if isinstance(prior, Prior) else Prior() if prior is None else read_prior(prior)
-    if tilt and assumed.tilt_rad == 0:
+    if chosen.tilt and assumed.tilt_rad == 0:
         assumed = replace(assumed, tilt_rad=TILT_RAD)
-    if arm_masses and assumed.arm_mass_ratio == 0:
+    if chosen.arm_masses and assumed.arm_mass_ratio == 0:
         assumed = replace(assumed, arm_mass_ratio=ARM_MASS_RATIO)
-    say("reading")
-    read, alone = _read(recordings, free, map)
-    read = _labelled(read, payload_of or {})
-    found = fit(read, alone, assumed, _weights(known_mass, read), say)
-    if parallel_flanges:
+    held, alone = (
+        [given] if isinstance(given, Recording | Path | str) else list(given) for given in (logs, free)
+    )
+    labels, masses = _labels(chosen.payload_of or {}, held), _masses(chosen.known_mass)
+    read = list(recordings_of([*held, *alone], chosen.map, say=say, note=note))
+    carried = _labelled(read[: len(held)], labels)
+    found = fit(carried, read[len(held) :], assumed, _weights(masses, carried), say)
+    if chosen.parallel_flanges:
         say("flanges")
         found = in_drawing_frames(found)
     return public(Calibration, found)
@@ -121,47 +154,82 @@ def read_calibration(path: Path | str) -> Calibration:
     Raises:
         InputError: the file cannot be read, or is not a whole calibration.
     """
-    return public(Calibration, calibrations.read_calibration(path))
+    return public(Calibration, calibration_of(path))
 
 
-def _read(
-    recordings: Given | Iterable[Given], free: Given | Iterable[Given], map: Path | str | None
-) -> tuple[list[Recording], list[Recording]]:
-    """Both kinds, for which a map may be of use together."""
-    each, alone = (
-        [given] if isinstance(given, Recording | Path | str) else list(given) for given in (recordings, free)
+def write_calibration(path: Path, calibration: Below, made_with: Mapping[str, Any] | None = None) -> None:
+    """Write the JSON of a calibration, with provenance on request; the file appears whole or not at all.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    write_json(
+        path, calibration_to_dict(calibration) | ({"provenance": dict(made_with)} if made_with else {})
     )
-    read = list(recordings_of([*each, *alone], map))
-    return read[: len(each)], read[len(each) :]
+
+
+def _labels(given: Mapping[str, str] | Iterable[str], logs: Sequence[Given]) -> dict[str, str]:
+    """Labels by the name of a recording, from a mapping or from ``REC=LABEL``."""
+    if isinstance(given, Mapping):
+        return dict(given)
+    names = [log.name if isinstance(log, Recording) else str(log) for log in logs]
+    out: dict[str, str] = {}
+    for entry in given:
+        name, equals, label = entry.rpartition("=")
+        known = next((one for one in names if name and name in (one, Path(one).name)), None)
+        if not equals or not label or known is None:
+            raise InputError(
+                f"payload_of is {entry!r}; it must be REC=LABEL with one of the recordings {', '.join(names)}"
+            )
+        if known in out:
+            raise InputError(f"payload_of names {known} twice")
+        out[known] = label
+    return out
 
 
 def _labelled(recordings: Sequence[Recording], labels: Mapping[str, str]) -> list[Recording]:
     """Recordings with labels of their own; a name may come without its folder."""
-    out, names = [], dict.fromkeys(labels, False)
+    out, unmet = [], dict(labels)
     for recording in recordings:
         name = next((n for n in (recording.name, Path(recording.name).name) if n in labels), None)
-        if name is None:
-            out.append(recording)
-            continue
-        names[name] = True
-        out.append(replace(recording, metadata=replace(recording.metadata, payload=labels[name])))
-    for name, met in names.items():
-        if not met:
-            raise InputError(
-                f"payload of {name}: no such recording is given; there are "
-                f"{', '.join(recording.name for recording in recordings)}"
-            )
+        if name is not None:
+            unmet.pop(name, None)
+            recording = replace(recording, metadata=replace(recording.metadata, payload=labels[name]))
+        out.append(recording)
+    for name in unmet:
+        there = ", ".join(recording.name for recording in recordings)
+        raise InputError(f"payload of {name}: no such recording is given; there are {there}")
     return out
 
 
-def _weights(
-    known: Mapping[str, float | tuple[float, float]] | float | None, recordings: Sequence[Recording]
-) -> dict[str, tuple[float, float]]:
-    """Masses with standard errors by label, "" for none."""
-    if known is None:
-        return {}
-    if not isinstance(known, Mapping):
-        known = {"": known}
+def _masses(given: Mapping[str, Weight] | Weight | Iterable[str]) -> dict[str, Weight]:
+    """Mass, or mass and standard error [kg], by label, "" for that of the only payload."""
+    if isinstance(given, Mapping):
+        return dict(given)
+    if isinstance(given, float | int):
+        return {"": given}
+    out: dict[str, Weight] = {}
+    for entry in map(str, given or ()):
+        label, _, rest = entry.rpartition("=")
+        number, plus_minus, error = rest.partition("+-")
+        try:
+            mass = float(number)
+            se = float(error) if plus_minus else WEIGHED * mass
+        except ValueError:
+            mass = se = float("nan")
+        if not (0 < mass < 1e6 and 0 < se < 1e6):
+            raise InputError(
+                f"known_mass is {entry!r}; it must be [LABEL=]KG or [LABEL=]KG+-SE with numbers greater than 0, such "
+                "as c=10.48+-0.005"
+            )
+        if label in out:
+            raise InputError(f"known_mass names payload {label!r} twice")
+        out[label] = mass, se
+    return out
+
+
+def _weights(known: Mapping[str, Weight], recordings: Sequence[Recording]) -> dict[str, tuple[float, float]]:
+    """Masses with standard errors by label of a payload."""
     labels = {recording.metadata.payload or "" for recording in recordings}
     out = {}
     for label, given in known.items():

@@ -1,45 +1,169 @@
-"""Compare two results."""
+"""Two results side by side: what differs by more than its errors.
 
+Keys of the JSON:
+
+format, version     "mocobot-comparison", 1
+kind                "estimate", "calibration" or "diagnosis"
+a, b                what was compared: names of files or folders
+changed             whether anything differs by more than its errors
+groups              list of {name, unit, chi2, dof, p, changed, together, quantities}: p of so large a difference by
+                    chance, correlations heeded; together is a list of {entries [2], correlation} of errors that move
+                    together; chi2 is null if there is a difference and no error
+quantities          list of {name, a, a_se, b, b_se, difference, se, ratio}; the difference is b - a; ratio is null as
+                    chi2
+level               probability of a false alarm anywhere, and least_p, what it leaves to each group
+changes             sentences: what only one of them has
+notes               sentences
+"""
+
+import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from estimator.files import holds, whole_folder
-from mocobot.api.public import public
-from mocobot.comparison import comparison as below
-from mocobot.comparison.compare import Written
-from mocobot.comparison.compare import compare as compare_below
-from mocobot.comparison.text import format_comparison, write_into
-from mocobot.files.targets import check_folder
+import numpy as np
+
+from discrepancy.result.read import FORMAT as DIAGNOSIS
+from discrepancy.result.read import NAME as DIAGNOSIS_NAME
+from discrepancy.result.read import parse_diagnosis
+from estimator.calibrate.json import FORMAT as CALIBRATION
+from estimator.calibrate.json import calibration_from_dict
+from estimator.errors import InputError
+from estimator.estimate.result import FORMAT as ESTIMATE
+from estimator.estimate.result import PayloadEstimate
+from estimator.extras import draws_plots
+from estimator.files import write_json, write_text
+from estimator.statistics import measured
+from estimator.strict import read_json
+from mocobot.api import comparison_groups as groups_of
+from mocobot.api.comparison_groups import LEVEL, TOGETHER, Group
+from mocobot.checks import CALIBRATION as CALIBRATION_NAME
+from mocobot.results import Folder
+
+FORMAT, VERSION = "mocobot-comparison", 1
+NAME, REPORT, PICTURE = "comparison.json", "report.txt", "comparison.png"
+KINDS = {ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis"}
+SOUGHT = "an estimate of `mocobot estimate`, or a calibration or diagnosis of `mocobot calibrate` or `diagnose --out`"
+WIDTH = 110
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(below.Comparison):
+class Comparison(Folder):
     """What two results of one kind say differently, printable, and a folder of files.
 
-    The attributes are those of ``mocobot.comparison.comparison.Comparison``.
+    Attributes:
+        kind: ``"estimate"``, ``"calibration"`` or ``"diagnosis"``.
+        a, b: what they are called.
+        groups: what both give, with the differences.
+        changes: what only one of them has, or says otherwise, one sentence each.
+        notes: what to know before trusting the differences, one sentence each.
     """
 
-    def __str__(self) -> str:
-        """The text report."""
-        return format_comparison(self)
+    kind: str
+    a: str
+    b: str
+    groups: tuple[Group, ...]
+    changes: tuple[str, ...]
+    notes: tuple[str, ...]
+    result = "comparison"
+
+    @property
+    def least_p(self) -> float:
+        """Probability below which a group has changed."""
+        return LEVEL / max(1, len(self.groups))
+
+    @property
+    def changed_groups(self) -> tuple[Group, ...]:
+        """Those that differ by more than their errors, the clearest first."""
+        found = [group for group in self.groups if group.p < self.least_p]
+        return tuple(sorted(found, key=lambda group: -group.chi2 / max(1, group.dof)))
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything did."""
+        return bool(self.changed_groups or self.changes)
+
+    @property
+    def what_changed(self) -> str:
+        """The groups of numbers that did, the clearest first."""
+        return "; ".join(f"{group.name} ({_clearest(group)})" for group in self.changed_groups)
 
     def __repr__(self) -> str:
         """One line."""
         groups = f"{len(self.changed_groups)} of {len(self.groups)} groups changed"
         return f"<Comparison of two results, {self.kind}: {groups}>"
 
-    def write(self, folder: Path | str) -> None:
-        """Write JSON, text and a picture; an earlier comparison is replaced.
+    def __str__(self) -> str:
+        """The text report."""
+        plural = "diagnoses" if self.kind == "diagnosis" else f"{self.kind}s"
+        lines = [f"Two {plural}: A is {self.a}", f"{'':{len(plural) + 6}}B is {self.b}", ""]
+        lines += _fill(self.verdict)
+        lines += [line for sentence in self.changes for line in _fill(sentence, "- ")]
+        names = [_label(group, entry) for group in self.groups for entry in group.entries]
+        width = max(map(len, names), default=0)
+        if self.groups:
+            lines += ["", f"{'':{width}}{'A':>24}{'B':>24}{'B - A':>24}{'over its error':>16}"]
+        changed = self.changed_groups
+        for group in self.groups:
+            lines += [
+                f"{_label(group, entry):{width}}{row}{' *' * (group in changed)}"
+                for entry, row in zip(group.entries, _rows(group), strict=True)
+            ]
+        if close := [group.name for group in self.groups if group.together]:
+            said = f"Errors within a group move together (correlation above {TOGETHER}), which the test heeds"
+            lines += ["", *_fill(f"{said}: {'; '.join(close)}.", "- ")]
+        lines += [line for note in self.notes for line in _fill(note, "- ")]
+        return "\n".join(lines).rstrip()
+
+    @property
+    def verdict(self) -> str:
+        """What changed, in a sentence."""
+        tests = f"{len(self.groups)} groups of numbers are tested together, one false alarm in a hundred comparisons"
+        if not self.groups and not self.changes:
+            return "NOTHING TO COMPARE: they have no number in common."
+        if not self.changed:
+            return f"NOTHING CHANGED beyond its errors ({tests})."
+        if not self.changed_groups:
+            return "CHANGED; what both give agrees within its errors." if self.groups else "CHANGED."
+        return f"CHANGED beyond its errors, marked with a star ({tests}): {self.what_changed}."
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON as documented at the head of this module."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "kind": self.kind,
+            "a": self.a,
+            "b": self.b,
+            "changed": self.changed,
+            "groups": [_values(group, group.p < self.least_p) for group in self.groups],
+            "level": LEVEL,
+            "least_p": self.least_p,
+            "changes": list(self.changes),
+            "notes": list(self.notes),
+        }
+
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
+        """Write JSON, text and a picture into an existing folder.
+
+        Args:
+            folder: it.
+            pictures: whether the picture is drawn, too.
+            more: further keys of the JSON.
 
         Raises:
-            InputError: the folder holds something else, or cannot be written.
+            InputError: something cannot be written.
         """
-        check_folder(Path(folder), [], holds("comparison"), "an earlier comparison", force=True)
-        with whole_folder(Path(folder), "comparison") as whole:
-            write_into(whole, self)
+        write_json(folder / NAME, self.to_dict() | more)
+        write_text(folder / REPORT, f"{self}\n")
+        if pictures and self.groups and draws_plots():
+            from mocobot.plots import save_comparison  # matplotlib
+
+            save_comparison(self, folder / PICTURE)
 
 
-def compare(a: Path | str | Written, b: Path | str | Written) -> Comparison:
+def compare(a: Any, b: Any) -> Comparison:
     """Compare two estimates, calibrations or diagnoses: what changed beyond its errors.
 
     Args:
@@ -48,4 +172,130 @@ def compare(a: Path | str | Written, b: Path | str | Written) -> Comparison:
     Raises:
         InputError: one cannot be read, they are of different kinds, or of different numbers of robots.
     """
-    return public(Comparison, compare_below(a, b))
+    one, other = _read(a), _read(b)
+    if one.kind != other.kind:
+        raise InputError(
+            f"{one.name} is {_a(one.kind)} and {other.name} {_a(other.kind)}; both must be of one kind"
+        )
+    x, y, changes = one.value, other.value, []
+    if one.kind == "estimate":
+        groups, notes = groups_of.estimate_groups(x, y), groups_of.estimate_notes(x, y)
+    elif one.kind == "calibration":
+        groups, notes = groups_of.calibration_groups(x, y), groups_of.calibration_notes(x, y)
+    else:
+        if {x.get("machine"), y.get("machine")} >= {"team", "joints"}:
+            raise InputError(
+                f"{one.name} and {other.name} are diagnoses of a team and of one robot's joints; both must be of one "
+                "kind"
+            )
+        groups, notes = groups_of.diagnosis_groups(x, y), groups_of.diagnosis_notes(x, y)
+        changes = groups_of.diagnosis_changes(x, y)
+    if shared := sorted({name for digest, name in one.files.items() if digest in other.files}):
+        first = (
+            f"Both were made from {', '.join(shared)}: errors that come from there are in both, and differences are "
+            "better known than is said."
+        )
+        notes = [first, *notes]
+    return Comparison(one.kind, one.name, other.name, tuple(groups), tuple(changes), tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Result:
+    """A result as it was read: its name, its kind, itself, and what it says of the files that it was made from."""
+
+    name: str
+    kind: str
+    value: Any
+    files: Mapping[str, str]
+
+
+def _read(given: Any) -> _Result:
+    if not isinstance(given, Path | str):
+        return _result(f"{given!r}", f"{given!r}", given.to_dict())
+    file = _file(Path(given))
+    return _result(str(given), str(file), read_json(file, SOUGHT))
+
+
+def _file(path: Path) -> Path:
+    """The JSON of a result, or the only one in its folder."""
+    if not path.is_dir():
+        return path
+    found = [path / name for name in (CALIBRATION_NAME, DIAGNOSIS_NAME) if (path / name).is_file()]
+    found = found or sorted(one for one in path.glob("*.json") if not one.name.endswith(".truth.json"))
+    if len(found) != 1:
+        what = "holds no result" if not found else f"holds {len(found)} JSON files"
+        raise InputError(f"{path}: {what}; name the file of {SOUGHT}")
+    return found[0]
+
+
+def _result(name: str, where: str, values: dict[str, Any]) -> _Result:
+    kind, value = KINDS.get(str(values.get("format"))), values
+    if kind == "estimate":
+        try:
+            value: Any = PayloadEstimate.from_dict(values)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+    elif kind == "calibration":
+        value = calibration_from_dict(values, where)
+    elif kind == "diagnosis":
+        parse_diagnosis(values, Path(where))
+    else:
+        raise InputError(f"{where}: format is {values.get('format')!r:.40}; it must be {SOUGHT}")
+    made = values.get("provenance")
+    listed = made.get("files", []) if isinstance(made, dict) else []
+    files = {str(f.get("sha256")): str(f.get("name")) for f in listed if isinstance(f, dict)}
+    return _Result(name, kind, value, files)
+
+
+def _a(kind: str) -> str:
+    return f"{'an' if kind == 'estimate' else 'a'} {kind}"
+
+
+def _values(group: Group, changed: bool) -> dict[str, Any]:
+    columns = (group.a, group.a_se, group.b, group.b_se, group.difference, group.se, group.ratio)
+    keys = ("a", "a_se", "b", "b_se", "difference", "se", "ratio")
+    return {
+        "name": group.name,
+        "unit": group.unit,
+        "chi2": _finite(group.chi2),
+        "dof": group.dof,
+        "p": group.p,
+        "changed": changed,
+        "together": [{"entries": [i, j], "correlation": float(r)} for i, j, r in group.together],
+        "quantities": [
+            {"name": entry} | {key: _finite(column[k]) for key, column in zip(keys, columns, strict=True)}
+            for k, entry in enumerate(group.entries)
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _clearest(group: Group) -> str:
+    """The largest difference of a group."""
+    k = int(np.argmax(np.abs(group.ratio)))
+    entry = f"{group.entries[k]} by " if group.entries[k] else "by "
+    return f"{entry}{_with_error(group.difference[k], group.se[k])} {group.unit}".rstrip()
+
+
+def _rows(group: Group) -> list[str]:
+    columns = ((group.a, group.a_se), (group.b, group.b_se), (group.difference, group.se))
+    return [
+        "".join(f"{_with_error(values[k], se[k]):>24}" for values, se in columns) + f"{group.ratio[k]:16.1f}"
+        for k in range(len(group.entries))
+    ]
+
+
+def _with_error(value: float, se: float) -> str:
+    return " +- ".join(measured(value, se)) if se > 0 else f"{value:.6g}"
+
+
+def _label(group: Group, entry: str) -> str:
+    unit = f" [{group.unit}]" if group.unit else ""
+    return f"{group.name}{' ' * bool(entry)}{entry}{unit}"
+
+
+def _fill(text: str, mark: str = "") -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark))

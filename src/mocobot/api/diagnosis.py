@@ -1,21 +1,27 @@
-"""Find out what the simulation of a team gets wrong."""
+"""Find out what the simulation of a team, or of one robot, gets wrong."""
 
+from __future__ import annotations
+
+import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from discrepancy.evidence.findings import Word
-from discrepancy.evidence.settings import ODDS
 from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.result.read import name_of
-from discrepancy.team.causes import read_tolerances
-from discrepancy.team.diagnosis import When, against_truth, diagnose_team
+from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.told import TeamDiagnosed
-from estimator.files import holds, whole_folder
-from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
-from mocobot.files.targets import check_folder
+from discrepancy.team.tolerances import read_tolerances
+from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
+from mocobot.cluster import workers_of
+from mocobot.options import DiagnoseOptions, made
+from mocobot.results import Folder
 from mocobot_sim.trial.truth import GroundTruth
+
+if TYPE_CHECKING:
+    from mocobot.api.joints import GivenLogs, GivenModel
 
 
 @dataclass(frozen=True)
@@ -69,14 +75,17 @@ class Cause:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis:
+class Diagnosis(Folder):
     """A verdict with all that supports it: printable, a table in a notebook, and a folder of files.
+
+    The folder has JSON, report, residuals and pictures; ``simulate`` takes the ``extended`` in it as a model.
 
     Attributes:
         found: of a team, or of one robot of joints.
     """
 
     found: TeamDiagnosed | JointDiagnosed
+    result = "diagnosis"
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
@@ -111,70 +120,110 @@ class Diagnosis:
 
         return diagnosis_html(self.to_dict())
 
-    def write(self, folder: Path | str) -> None:
-        """Write JSON, report, residuals, pictures and the extended model; an earlier diagnosis is replaced.
+    def against_truth(self, truth: Mapping[str, Any]) -> Diagnosis:
+        """The same with the errors of its estimates, where the payload is known.
 
-        ``mocobot report`` makes a page of the folder; ``simulate`` takes its ``extended`` as a model.
+        Args:
+            truth: of the payload, as ``GroundTruth.to_dict`` has it; where it is of something else there are no errors.
+        """
+        if isinstance(self.found, JointDiagnosed):
+            return self
+        return replace(self, found=against_truth(self.found, truth))
+
+    @property
+    def used_truth(self) -> bool:
+        """Whether errors of the estimates are known."""
+        return isinstance(self.found, TeamDiagnosed) and self.found.errors is not None
+
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
+        """Write everything into an existing folder.
+
+        Args:
+            folder: it.
+            pictures: whether pictures are drawn, too.
+            more: further keys of the JSON.
 
         Raises:
-            InputError: the folder holds something else, or cannot be written.
+            InputError: something cannot be written.
         """
-        check_folder(Path(folder), [], holds("diagnosis"), "an earlier diagnosis", force=True)
-        with whole_folder(Path(folder), "diagnosis") as whole:
-            self.write_into(whole)
-
-    def write_into(self, folder: Path, **more: Any) -> None:
-        """The same into an existing folder, with further keys in the JSON."""
-        self.found.write_into(folder, **more)
+        self.found.write_into(folder, pictures=pictures, **more)
 
 
 def diagnose(
-    recordings: Given | Iterable[Given],
+    logs: Given | Iterable[Given] | GivenLogs,
+    model: GivenModel | None = None,
+    reference: GivenLogs | None = None,
+    options: DiagnoseOptions | None = None,
     *,
-    map: Path | str | None = None,
     truth: GroundTruth | None = None,
-    calibration: GivenCalibration | None = None,
-    tolerances: Path | str | None = None,
-    exclude: Iterable[str] = (),
-    closed_loop: bool = True,
-    laws: When = "auto",
-    odds: float = ODDS,
-    whole: bool = False,
-    jobs: int = 1,
-    say: Callable[[str], object] = lambda _: None,
+    say: Say = quiet,
     simulated: Callable[[int], object] | None = None,
+    note: Say = quiet,
+    **fields: Any,
 ) -> Diagnosis:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth.
 
     Args:
-        recordings: of one payload, or paths of their files, or of logs that ``convert`` reads as they are; several, so
-            that what is named can be validated.
-        map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
+        logs: recordings of one payload, or paths of their files, or of logs that ``convert`` reads as they are; with a
+            model logs of its joints. Several, so that what is named can be validated.
+        model: one robot whose joints were logged, or its file; None for a team.
+        reference: with a model, logs of the same robot while it was well: what is wrong there, too, is no news.
+        options: how; ``fields`` are fields of it. With a calibration, tolerances are of robots as it has them.
         truth: of the payload, for the errors of the estimates; it is not looked at before the verdict.
-        calibration: the robots as they are, or its file; None for what the recordings say of them. Tolerances are then
-            of robots as it has them.
-        tolerances: TOML file: how far a healthy robot may be off (docs/diagnosis/guide.md); None for the defaults.
-        exclude: causes not to consider.
-        closed_loop: whether to run the recorded commands again, without and with what is found.
-        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or
-            a cause is not sure, ``"always"``, or ``"never"``.
-        odds: of any cause being there before the data are seen, at all its places together.
-        whole: whether to search all of long recordings, not a choice of their parts.
-        jobs: parallel processes.
         say: takes the name of the stage that begins.
         simulated: called with 1 for every trial that was simulated.
+        note: takes how a log was read, as text.
 
     Raises:
-        InputError: recordings, tolerances, causes or odds that cannot be used, or a calibration of other robots.
+        InputError: logs, model, tolerances, causes or other options that cannot be used.
     """
-    known = read_tolerances(Path(tolerances) if tolerances is not None else None)
-    found = diagnose_team(
-        list(recordings_of(recordings, map, Robots(calibration))), known, tuple(exclude),
-        closed_loop=closed_loop, laws=laws, odds=odds, whole=whole, jobs=jobs, say=say, simulated=simulated,
+    chosen = made(DiagnoseOptions, options, fields)
+    chosen.check_for(model, reference)
+    if model is not None:
+        return Diagnosis(_diagnosed_joints(model, logs, reference or (), chosen, say))
+    known = read_tolerances(None if chosen.tolerances is None else Path(chosen.tolerances))
+    given: Any = logs
+    recordings = list(recordings_of(given, chosen.map, Robots(chosen.calibration), say=say, note=note))
+    with workers_of(chosen.scheduler):
+        found = diagnose_team(
+            recordings, known, tuple(chosen.exclude),
+            closed_loop=chosen.closed_loop, laws=chosen.laws, odds=chosen.odds, whole=chosen.whole,
+            seconds=chosen.seconds, jobs=chosen.jobs, say=say, simulated=simulated,
+        )  # fmt: skip
+    return Diagnosis(found) if truth is None else Diagnosis(found).against_truth(truth.to_dict())
+
+
+def _diagnosed_joints(
+    model: GivenModel, logs: Any, reference: Any, chosen: DiagnoseOptions, say: Say
+) -> JointDiagnosed:
+    """The verdict on one robot of joints, with rollouts on request."""
+    from discrepancy.joints.rolled.told import rolled_out
+    from discrepancy.joints.verdict import judged
+    from mocobot.api.joints import read_logs, read_model
+
+    robot, tolerances = read_model(model), _joint_tolerances(chosen.tolerances)
+    say("reading")
+    read = [read_logs(given, robot, map=chosen.map) for given in (logs, reference)]
+    verdict = judged(
+        robot, read[0], reference=read[1], excluded=tuple(chosen.exclude), tolerances=tolerances,
+        seconds=chosen.seconds, say=say,
     )  # fmt: skip
-    if truth is not None:
-        found = against_truth(found, truth.to_dict())
-    return Diagnosis(found)
+    return JointDiagnosed(verdict, rolled_out(verdict, say) if chosen.closed_loop else None)
+
+
+def _joint_tolerances(path: Path | str | None) -> dict[str, dict[str, float]] | None:
+    """Tolerances of the causes that a file names; the others keep their own."""
+    from discrepancy.joints.values import NAMES
+    from discrepancy.tolerances_file import read_tolerances as read
+
+    if path is None:
+        return None
+    none = {name: dict.fromkeys(names, math.nan) for name, names in NAMES.items()}
+    given = {
+        name: {key: x for key, x in values.items() if not math.isnan(x)}
+        for name, values in read(Path(path), none).items()
+    }
+    return {name: values for name, values in given.items() if values}
 
 
 def _cause(values: Mapping[str, Any]) -> Cause:

@@ -1,19 +1,21 @@
 """Estimate a payload."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from estimator.calibrate.calibrate import calibrate
-from estimator.errors import InputError
-from estimator.estimate import fit as one_fit
-from estimator.estimate.fit import estimate_calibrated, estimate_on, one_payload
-from estimator.estimate.result import PayloadEstimate, format_estimate
+from estimator.calibrate.outcome import one_fit
+from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on, one_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.text import format_estimate
 from estimator.files import write_json
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
-from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
-from mocobot.api.public import public
+from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
+from mocobot.options import EstimateOptions, made
+from mocobot.results import public
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,49 +50,41 @@ class Estimate(PayloadEstimate):
 
 
 def estimate(
-    recordings: Given | Iterable[Given],
+    logs: Given | Iterable[Given],
+    options: EstimateOptions | None = None,
     *,
-    map: Path | str | None = None,
-    calibration: GivenCalibration | None = None,
-    self_calibrate: bool = False,
-    method: one_fit.Asked = "auto",
-    cutoff_hz: float = 5.0,
-    say: Callable[[str], object] = lambda _: None,
+    say: Say = quiet,
+    note: Say = quiet,
+    **fields: Any,
 ) -> Estimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
+    ``why_not_fit`` of the estimate says why the method ``"auto"`` did not fit all at once. With a calibration, its
+    robots are held.
+
     Args:
-        recordings: one or several, or paths of their files, or of logs that ``convert`` reads as they are.
-        map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
-        calibration: the robots as they are, or its file; None for what the recordings say of them.
-        self_calibrate: calibrate the robots on these recordings, free trials among them perhaps, and take what they
-            carry from the same fit.
-        method: ``"fit"``, one least squares of closed loops and balance of wrenches; ``"staged"``, the paper's
-            sequence; ``"joint"``, its grasps and one least squares for the rest; ``"auto"``, the fit where the
-            recordings determine the centre of mass and noise is all that it leaves, else staged where static holds
-            determine it, else joint (``why_not_fit`` says why). With a calibration, its robots are held.
-        cutoff_hz: cut-off of the low-pass filter [Hz].
+        logs: one or several recordings, or paths of their files, or of logs that ``convert`` reads as they are.
+        options: how; ``fields`` are fields of it.
         say: takes the name of the stage that begins.
+        note: takes how a log was read, as text.
 
     Raises:
         InputError: a recording cannot be used, they contradict each other, nothing can be estimated, or the
             calibration is of other robots.
     """
-    if self_calibrate:
-        for name, given in (("calibration", calibration is not None), ("method", method != "auto")):
-            if given:
-                raise InputError(f"{name} and self_calibrate are both given; choose one")
-        return public(Estimate, _self_calibrated(list(recordings_of(recordings, map)), cutoff_hz, say))
-    robots = Robots(calibration)
-    given = recordings_of(recordings, map, robots)
-    if robots.calibration is None:
-        return public(Estimate, one_fit.estimate(given, method, cutoff_hz, say))
-    return public(Estimate, estimate_on(robots.calibration, list(given), method, cutoff_hz, say))
+    chosen = made(EstimateOptions, options, fields)
+    robots = Robots(chosen.calibration)
+    given = recordings_of(logs, chosen.map, robots, say=say, note=note)
+    if chosen.self_calibrate:
+        found = _self_calibrated(list(given), chosen.cutoff_hz, say)
+    elif robots.calibration is None:
+        found = one_fit.estimate(given, chosen.method, chosen.cutoff_hz, say)
+    else:
+        found = estimate_on(robots.calibration, list(given), chosen.method, chosen.cutoff_hz, say)
+    return public(Estimate, found)
 
 
-def _self_calibrated(
-    recordings: Sequence[Recording], cutoff_hz: float, say: Callable[[str], object]
-) -> PayloadEstimate:
+def _self_calibrated(recordings: Sequence[Recording], cutoff_hz: float, say: Say) -> PayloadEstimate:
     carried = [recording for recording in recordings if recording.metadata.trial != FREE]
     free = [recording for recording in recordings if recording.metadata.trial == FREE]
     one_payload(carried)

@@ -1,20 +1,78 @@
-"""Look at a log before anyone trusts a number of it."""
+"""Look at a log before anyone trusts a number of it: of a team, or of one robot's joints."""
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from estimator.arm.design import OmnidDesign, load_design
-from mocobot.api.given import GivenCalibration, Robots
-from mocobot.api.look import Look
-from mocobot.api.public import public
+from estimator.arm.design import load_design
+from estimator.files import write_json
+from mocobot.api.recordings import Robots, quiet
+from mocobot.options import InspectOptions, made
+from mocobot.results import public
 from mocobot_inspect import inspection
-from mocobot_inspect.findings import findings
+from mocobot_inspect.findings import Finding, findings
+from mocobot_inspect.joints import inspection as joint_inspection
+from mocobot_inspect.joints.findings import joint_findings
+from mocobot_inspect.joints.json import joint_inspection_dict
+from mocobot_inspect.joints.robot import Robot
+from mocobot_inspect.joints.text import format_joint_inspection, joint_ready_line
 from mocobot_inspect.json import inspection_dict
 from mocobot_inspect.text import format_inspection, ready_line
 from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
+
+if TYPE_CHECKING:
+    from mocobot.api.joints import GivenModel
+
+
+class Look:
+    """Printable, in a terminal and as JSON; a class of looks says by which functions, each of which gets the look."""
+
+    name: str
+    _findings: ClassVar[Callable[..., list[Finding]]]
+    _ready_line: ClassVar[Callable[..., str]]
+    _text: ClassVar[Callable[..., str]]
+    _dict: ClassVar[Callable[..., dict[str, Any]]]
+
+    @property
+    def findings(self) -> list[Finding]:
+        """All that is wrong: ``topic`` and ``sentence`` each."""
+        return type(self)._findings(self)
+
+    @property
+    def ready_for(self) -> str:
+        """What the log can be used for, one line."""
+        return type(self)._ready_line(self)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it can be used for anything."""
+        return not self.ready_for.startswith("ready for: nothing")
+
+    def __str__(self) -> str:
+        """The text report."""
+        return type(self)._text(self)
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<{type(self).__name__} of {self.name}: {self.ready_for}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON with units in the keys."""
+        return type(self)._dict(self)
+
+    def write(self, path: Path | str) -> None:
+        """Write it as JSON.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        write_json(Path(path), self.to_dict())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,38 +85,85 @@ class Inspection(Look, inspection.Inspection):
     _findings, _ready_line = findings, ready_line
     _text, _dict = format_inspection, inspection_dict
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether it can be used for anything, after what must be done first."""
+        return super().is_ready and " yes" in self.ready_for
+
     def _repr_html_(self) -> str:
         from mocobot.api.notebook import inspection_html
 
         return inspection_html(self.to_dict())
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class JointInspection(Look, joint_inspection.JointInspection):
+    """Stamps, columns, signs, order, units and delays of a joint log, judged by the robot's model: printable.
+
+    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``, the JSON's keys those of
+    ``mocobot_inspect.joints.json``.
+    """
+
+    _findings, _ready_line = joint_findings, joint_ready_line
+    _text, _dict = format_joint_inspection, joint_inspection_dict
+
+
 def inspect(
     log: Path | str,
+    model: GivenModel | None = None,
+    options: InspectOptions | None = None,
     *,
-    map: Path | str | None = None,
-    design: OmnidDesign | Path | str | None = None,
-    calibration: GivenCalibration | None = None,
-    episode: int | None = None,
-    advance: Callable[[int], object] = lambda _: None,
-) -> Inspection:
+    advance: Callable[[int], object] = quiet,
+    tried: Callable[[int], object] = quiet,
+    **fields: Any,
+) -> Inspection | JointInspection:
     """Look at a log; whatever is wrong with its samples is reported and not refused.
 
     Args:
         log: a recording, or a log of any format that ``convert`` reads.
-        map: map file, or name of a built-in map (docs/measured-data.md); found out if not given.
-        design: numbers of the robots, or a TOML file of them, where the log does not say; None for the Omnid's.
-        calibration: the robots as they are, or its file; None for what the log says of them.
-        episode: of a LeRobot dataset that holds several.
+        model: of one robot whose joints were logged, or its file; None for a team.
+        options: how; ``fields`` are fields of it.
         advance: takes the progress made in reading, in the log's units.
+        tried: takes the number of mistakes tried.
 
     Raises:
-        InputError: the log, map, design or calibration cannot be read, or that is of other robots.
+        InputError: the log, model, map, design or calibration cannot be read, or does not suit the log.
     """
-    robots = Robots(calibration)
-    log_map = read_map(str(map)) if map is not None else None
-    standard = load_design(Path(design)) if isinstance(design, Path | str) else design or omnid_design()
-    source = open_log(Path(log), log_map, episode)
-    units = robots.units(source, standard)
+    chosen = made(InspectOptions, options, fields)
+    chosen.check_for(model)
+    if model is not None:
+        return _inspect_joints(Path(log), model, chosen, advance, tried)
+    robots, given = Robots(chosen.calibration), chosen.design
+    log_map = read_map(str(chosen.map)) if chosen.map is not None else None
+    design = load_design(Path(given)) if isinstance(given, Path | str) else given or omnid_design()
+    source = open_log(Path(log), log_map, chosen.episode)
+    units = robots.units(source, design)
     trial = log_map.trial if log_map is not None else None
-    return public(Inspection, inspection.inspect_log(source, standard, advance, trial=trial, units=units))
+    return public(Inspection, inspection.inspect_log(source, design, advance, tried, trial, units))
+
+
+def _inspect_joints(
+    log: Path,
+    model: GivenModel,
+    chosen: InspectOptions,
+    advance: Callable[[int], object],
+    tried: Callable[[int], object],
+) -> JointInspection:
+    from discrepancy.joints.mechanics.motion import Motion
+    from discrepancy.joints.mechanics.nominal import inverse_torque
+    from discrepancy.joints.mechanics.regressor import body_regressor
+    from discrepancy.joints.mechanics.tree import Tree
+    from mocobot.api.joints import map_of, read_model
+    from mocobot_logs.joints.read import open_joint_log
+
+    robot = read_model(model)
+    log_map = map_of(robot, log, chosen.map)
+    source = open_joint_log(log, log_map, chosen.episode)
+    tree = Tree.of(robot.model)
+    known = Robot(
+        robot.joints, robot.slides, robot.lower, robot.upper, robot.torque_limit,
+        partial(inverse_torque, robot.model),
+        lambda *motion: body_regressor(Motion.of(tree, *motion), int(tree.joint_body[tree.last_link])),
+        float(tree.mass[tree.links].sum()),
+    )  # fmt: skip
+    return public(JointInspection, joint_inspection.inspect_joints(source, log_map, known, advance, tried))

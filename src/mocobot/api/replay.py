@@ -1,69 +1,144 @@
 """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
+from __future__ import annotations
+
 import os
-from collections.abc import Iterable
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from discrepancy.result.read import read_diagnosis
 from estimator.arm.unit import seen_by_encoders
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import check_target
-from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
+from estimator.recording.metadata import FREE
+from estimator.recording.model import Recording
+from mocobot.api.recordings import Given, Robots, Say, quiet, read
+from mocobot.options import ReplayOptions, made
 from mocobot_sim.scene.as_built import theta_x_zeros
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts
+from mocobot_view.facts.fact_files import read_estimate, read_truth
 from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.replay_trial import distinct_names, replay_trial
+from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
+
+if TYPE_CHECKING:
+    from mocobot.api.joints import GivenModel
+    from mocobot_view.joints.joint_replay import JointReplay
 
 INSTALL = "pip install 'mocobot[replay]'"
 SUFFIX = ".rrd"
 
 
 def replay(
-    recordings: Given | Iterable[Given],
-    path: Path | str,
+    logs: Given | Iterable[Given],
+    path: Path | str | None = None,
+    model: GivenModel | None = None,
+    options: ReplayOptions | None = None,
     *,
-    estimate: PayloadEstimate | None = None,
-    truth: GroundTruth | None = None,
-    diagnosis: Path | str | None = None,
-    payload: Path | str | None = None,
-    calibration: GivenCalibration | None = None,
+    note: Say = quiet,
+    advance: Callable[[int], object] = quiet,
+    **fields: Any,
 ) -> list[str]:
-    """Write a replay for the Rerun viewer: ``rerun NAME.rrd`` opens it.
+    """Write a replay for the Rerun viewer (``rerun NAME.rrd`` opens it), or show it.
 
     Args:
-        recordings: one or several, shown side by side, or paths of their files.
-        path: .rrd file to write.
-        estimate: of the payload; made from each recording if not given.
-        truth: of the payload, to be shown beside the estimate.
-        diagnosis: folder of a diagnosis, whose causes are marked.
-        payload: name or MJCF of the payload's geometry; what the recording's label names if not given.
-        calibration: the robots as they are, or its file; None for what the recordings or the estimate say of them.
+        logs: recordings, shown side by side, or paths of their files; with a model logs of its joints.
+        path: .rrd file to write; None to open the viewer, or with the option ``web`` to serve until interrupted.
+        model: one robot whose joints were logged, or its file; None for a team.
+        options: what is shown; ``fields`` are fields of it. The truth may be a ``GroundTruth``.
+        note: takes what a viewer should know as soon as it is known, a sentence at a time.
+        advance: called with 1 after every recording.
 
     Returns:
-        What a viewer should know, sentences.
+        The same sentences.
 
     Raises:
-        InputError: the Rerun SDK is missing, a recording, estimate or diagnosis does not fit, or the file cannot be
-            written.
+        InputError: the Rerun SDK is missing, a recording, estimate or diagnosis does not fit, there is no display, or
+            the file cannot be written.
     """
-    target = Path(path)
-    check_target(target, SUFFIX)
+    chosen = made(ReplayOptions, options, fields)
+    chosen.check_for(path, model)
+    if path is not None:
+        check_target(Path(path), SUFFIX)
     check_rerun()
-    from mocobot_view.replay.outputs import check_enabled, save_replay
+    from mocobot_view.replay import outputs
 
-    check_enabled()
-    found = read_diagnosis(Path(diagnosis)) if diagnosis is not None else None
-    each = list(recordings_of(recordings, robots=Robots(calibration)))
-    names = distinct_names([Path(recording.name) for recording in each])
-    facts = None if truth is None else facts_of_truth(truth, estimate)
-    trials = [
-        replay_trial(recording, name, estimate, facts, found, payload)
-        for recording, name in zip(each, names, strict=True)
-    ]
-    save_replay(trials, target)
-    return [f"{trial.name}: {note}" for trial in trials for note in trial.notes]
+    outputs.check_enabled()
+    if path is None and not chosen.web and not outputs.has_display():
+        raise InputError(
+            "there is no display to open the viewer on; write a file with --out replay.rrd, or serve it to a browser "
+            "with --web"
+        )
+    each = [logs] if isinstance(logs, Recording | Path | str) else list(logs)
+    names = distinct_names([Path(one.name if isinstance(one, Recording) else one) for one in each])
+    trials = _trials(each, names, chosen) if model is None else _joint_replays(each, names, model, chosen)
+    notes = [f"{trial.name}: {text}" for trial in trials for text in trial.notes]
+    for text in notes:
+        note(text)
+    content = partial(_log, trials, advance)
+    if path is not None:
+        outputs.save_content(content, Path(path))
+    elif not chosen.web:
+        outputs.show_content(content)
+    else:
+        stream, address = outputs.serve_content(content)
+        note(f"Open {address} in a browser; Ctrl+C ends it.")
+        try:
+            while True:
+                time.sleep(3600.0)
+        except KeyboardInterrupt:
+            stream.disconnect()
+    return notes
+
+
+def _trials(logs: list[Any], names: list[str], chosen: ReplayOptions) -> list[ReplayTrial]:
+    given, payload, trials = chosen.estimate, chosen.payload, []
+    estimate = given if given is None or isinstance(given, PayloadEstimate) else read_estimate(Path(given))
+    diagnosis = read_diagnosis(Path(chosen.diagnosis)) if chosen.diagnosis is not None else None
+    if isinstance(payload, str) and payload.endswith(".xml"):
+        payload = Path(payload)
+    robots = Robots(chosen.calibration)
+    for log, name in zip(logs, names, strict=True):
+        recording = robots.of(log if isinstance(log, Recording) else read(Path(log)))
+        path, truth = Path(recording.name if isinstance(log, Recording) else log), None
+        if isinstance(chosen.truth, GroundTruth):
+            truth = facts_of_truth(chosen.truth, estimate)
+        elif chosen.truth and recording.metadata.trial != FREE:
+            truth = read_truth(path, recording.metadata.robots, estimate)
+        trials.append(replay_trial(recording, name, estimate, truth, diagnosis, payload))
+    return trials
+
+
+def _joint_replays(
+    logs: list[Any], names: list[str], model: GivenModel, chosen: ReplayOptions
+) -> list[JointReplay]:
+    from mocobot.api.joints import read_logs, read_model
+    from mocobot_view.joints.joint_replay import joint_replay
+
+    robot, replays = read_model(model), []
+    for log, name in zip(logs, names, strict=True):
+        parts = read_logs(log, robot, map=chosen.map)
+        for number, part in enumerate(parts, 1):
+            replays.append(joint_replay(robot, part, f"{name}-part{number}" if len(parts) > 1 else name))
+    return replays
+
+
+def _log(
+    trials: list[ReplayTrial] | list[JointReplay], advance: Callable[[int], object], stream: Any
+) -> None:
+    from mocobot_view.joints.joint_replay import JointReplay
+    from mocobot_view.joints.log_joints import log_joint_replay
+    from mocobot_view.replay.stream import log_replay
+
+    joints = [trial for trial in trials if isinstance(trial, JointReplay)]
+    if joints:
+        log_joint_replay(stream, joints, advance)
+    else:
+        log_replay(stream, [trial for trial in trials if isinstance(trial, ReplayTrial)], advance)
 
 
 def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | None) -> BodyFacts:
@@ -81,9 +156,8 @@ def check_rerun() -> None:
     Raises:
         InputError: it is.
     """
-    os.environ.setdefault(
-        "RUST_LOG", "off"
-    )  # or the SDK repeats in its own words what we say in one sentence
+    # Without this the SDK repeats in its own words what we say in one sentence.
+    os.environ.setdefault("RUST_LOG", "off")
     try:
         import rerun
         from rerun.chunk import RrdReader  # noqa: F401

@@ -1,36 +1,240 @@
 """Run a campaign: every set simulated, diagnosed blind, and kept; what is there already is not done again.
 
-The file of a set: ``set`` (``CampaignSet.to_dict``), ``error`` (why there is no verdict, or null), ``unexpected``
-(whether that was a fault of the program), ``truth`` (``simulate_set``), ``verdict`` (of ``discrepancy.result.json``
-what a score needs) and, of a clean set, ``limits`` {places, pushes} (``campaign.limits``).
+The folder of a campaign:
+
+config.json        what its sets depend on, as text by name; a campaign with other values is not mixed with them
+sets/KEY.json      the result of a set, whole or not at all: ``set`` (``CampaignSet.to_dict``), ``error`` (why there is
+                   no verdict, or null), ``unexpected`` (whether that was a fault of the program), ``truth``
+                   (``simulate_set``), ``verdict`` (of ``discrepancy.result.json`` what a score needs) and, of a clean
+                   set, ``limits`` {places, pushes} (``push_limits``)
+campaign.json, sets.csv, report.txt, provenance.json
+                   what was found, in the end
 """
 
+import json
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from joblib import Parallel, delayed
 
+from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
+from discrepancy.team.tolerances import default_tolerances, read_tolerances
+from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
-from estimator.files import ends_with_this
+from estimator.extras import draws_plots
+from estimator.files import file_facts, make_folder, write_json, write_text
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
-from mocobot.api.given import Robots, recordings_of
+from estimator.strict import read_json
+from mocobot.api.recordings import Robots, calibration_of, quiet, recordings_of
 from mocobot.api.simulation import simulate_trials
-from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED, cheaper, draw_background
-from mocobot.campaign.draw import draw_at
-from mocobot.campaign.ground import Ground, gimbal_axes
-from mocobot.campaign.limits import MeasuredLimits, push_limits
-from mocobot.campaign.plan import CampaignPlan, CampaignSet
-from mocobot.campaign.store import CampaignStore
-from mocobot_sim.effects import Effect, effect_to_dict
+from mocobot.campaign.effects import (
+    SPREAD_IN_UNCALIBRATED,
+    Ground,
+    MeasuredLimits,
+    cheaper,
+    draw_at,
+    draw_background,
+    gimbal_axes,
+    push_limits,
+)
+from mocobot.campaign.summary import csv_table, format_campaign, summarise
+from mocobot.checks import CONFIG, CONFIG_FORMAT, inputs_of
+from mocobot.cluster import workers_of
+from mocobot.options import CampaignOptions
+from mocobot.results import NAME, folder_provenance, provenance, run_key
+from mocobot_sim.effects import EFFECTS, Effect, effect_to_dict
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.as_built_file import read_units
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, make_trajectory
 from mocobot_sim.trial.trajectories import Trajectory
+
+SETS, SUMMARY, REPORT, TABLE, VERSION = "sets", "campaign.json", "report.txt", "sets.csv", 1
+RESULT = "the result of a campaign's set"
+NO_MATTER = ("out", "json", "pictures", "force", "jobs", "scheduler", "sets")
+"""Options that a set's result does not depend on."""
+FILES = ("payload", "units", "calibration", "tolerances")
+"""Options that may name a file, of which the content counts."""
+Json = dict[str, Any]
+KEPT = ("verdict", "causes", "suspected", "scatter", "residual", "notes")
+"""What is kept of a diagnosis; the rest is large, and for one recording's reader."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignPlan(CampaignOptions):
+    """Everything that a campaign's outcomes depend on, its files read; equal plans give equal bits.
+
+    Besides what its background says, everything in a team is off by a draw of its tolerance.
+
+    Attributes:
+        units: the robots of the background ``units``.
+        calibration: the robots as the diagnosis knows them, or None for what recordings say.
+        tolerances: of a healthy robot, standard deviations by cause and parameter.
+    """
+
+    units: tuple[AsBuilt, ...] = ()
+    calibration: Calibration | None = None
+    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=default_tolerances)
+
+    @classmethod
+    def of(cls, options: CampaignOptions) -> "CampaignPlan":
+        """The plan that options ask for."""
+        if not sensor_preset(options.preset).calibrated:
+            raise InputError(
+                f"preset is {options.preset}, which draws robots of its own; use nominal, and --background uncalibrated"
+            )
+        units = () if options.units is None else read_units(options.units)
+        robots = build_team(options.payload).robots
+        if units and len(units) != robots:
+            raise InputError(
+                f"{options.units}: has {len(units)} robots; the payload {options.payload} is carried by {robots}"
+            )
+        values = {each.name: getattr(options, each.name) for each in fields(CampaignOptions)}
+        return cls(**values | {
+            "units": units, "tolerances": read_tolerances(options.tolerances),
+            "calibration": None if options.calibration is None else calibration_of(options.calibration),
+        })  # fmt: skip
+
+    @property
+    def backgrounds(self) -> tuple[str, ...]:
+        """The robots: ``calibrated`` (as designed), ``uncalibrated`` (drawn for every team) or ``units``."""
+        return ("units",) if self.units else self.background
+
+    def clean_sets(self) -> list["CampaignSet"]:
+        """One for every team."""
+        return [CampaignSet(b, team) for b in self.backgrounds for team in range(1, self.teams + 1)]
+
+    def hidden_sets(self) -> list["CampaignSet"]:
+        """Those with something hidden; more of them begin with the same."""
+        return [
+            CampaignSet(b, k % self.teams + 1, k + 1, cause, self.sizes[k % len(self.sizes)])
+            for b in self.backgrounds
+            for k, cause in enumerate(self._in_turn(self.candidates(b), b))
+        ]
+
+    def candidates(self, background: str) -> list[str]:
+        """Causes that can be hidden in a background: none that it has everywhere."""
+        has = () if background == "calibrated" or self.calibration is not None else SPREAD_IN_UNCALIBRATED
+        names = self.causes or tuple(CAUSES)
+        return [name for name in names if name in EFFECTS and name not in (*has, *self.exclude)]
+
+    def _in_turn(self, names: Sequence[str], background: str) -> list[str]:
+        """As many as there are sets: every one once, then again in another order."""
+        out: list[str] = []
+        while names and len(out) < self.sets:
+            rng = self.rng(background, "turn", len(out) // len(names))
+            out += [names[int(k)] for k in rng.permutation(len(names))]
+        return out[: self.sets]
+
+    def rng(self, *purpose: object) -> np.random.Generator:
+        """Independent stream for one purpose."""
+        return np.random.default_rng([self.seed, *" ".join(map(str, purpose)).encode()])
+
+
+@dataclass(frozen=True)
+class CampaignSet:
+    """One set of recordings of a team.
+
+    Attributes:
+        background: the robots.
+        team: which, from 1.
+        number: which of the background's sets with something hidden, from 1; None of a clean one.
+        cause: what is hidden, or None.
+        factor: its size over the detection limit, or None.
+    """
+
+    background: str
+    team: int
+    number: int | None = None
+    cause: str | None = None
+    factor: float | None = None
+
+    @property
+    def key(self) -> str:
+        """Its name."""
+        if self.number is None:
+            return f"{self.background}-team{self.team}-clean"
+        return f"{self.background}-{self.number:04}-team{self.team}-{self.cause}-x{self.factor:g}"
+
+    @property
+    def clean(self) -> "CampaignSet":
+        """The same team's clean set, which says how large effects must be."""
+        return CampaignSet(self.background, self.team)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, the key with them."""
+        return {"key": self.key, **vars(self)}
+
+
+class CampaignStore:
+    """Results of sets, kept as they end.
+
+    Attributes:
+        out: the folder.
+    """
+
+    def __init__(self, out: Path, config: Mapping[str, str], *, force: bool = False) -> None:
+        """Open a campaign's folder, or begin one."""
+        self.out = out
+        file = out / CONFIG
+        if file.is_file() and (what := _difference(_read(file), config)):
+            if not force:
+                raise InputError(
+                    f"{out}: holds a campaign with {what}; give --force to drop it, or name a new folder"
+                )
+            for result in (out / SETS).glob("*.json"):
+                if read_json(result, RESULT).get("set", {}).get("key") == result.stem:
+                    result.unlink()
+            file.unlink()
+        make_folder(out / SETS)
+        if not file.is_file():
+            write_json(file, {"format": CONFIG_FORMAT, "version": VERSION, "config": dict(config)})
+
+    def has(self, one: CampaignSet) -> bool:
+        """Whether a set is done."""
+        return self.file(one).is_file()
+
+    def get(self, one: CampaignSet) -> dict[str, Any]:
+        """The result of a set."""
+        found = read_json(self.file(one), RESULT)
+        if found.get("set") != json.loads(json.dumps(one.to_dict())):
+            raise InputError(f"{self.file(one)}: is not the result of that set; delete it")
+        return found
+
+    def put(self, result: Mapping[str, Any]) -> None:
+        """Keep a result."""
+        write_json(self.out / SETS / f"{result['set']['key']}.json", result)
+
+    def file(self, one: CampaignSet) -> Path:
+        """Where the result of a set is."""
+        return self.out / SETS / f"{one.key}.json"
+
+
+def _read(file: Path) -> dict[str, Any]:
+    values = read_json(file, "what a campaign is of")
+    config = values.get("config")
+    if values.get("format") != CONFIG_FORMAT or not isinstance(config, dict):
+        raise InputError(f"{file}: is not of a campaign; name a new folder")
+    return config
+
+
+def _difference(there: Mapping[str, Any], here: Mapping[str, str]) -> str:
+    """The first value that is not the same, in words; empty if there is none."""
+    for name in here:
+        if there.get(name) != here[name]:
+            if name == "code":
+                return "another version of mocobot or of its libraries"
+            return f"{name} {there.get(name)}, not {here[name]}"
+    return ""
 
 
 def simulate_set(
@@ -59,7 +263,7 @@ def simulate_set(
     # One cause acts once at a place: what is hidden takes the place of what is tolerated there.
     tolerated = [e for e in _tolerated(plan, one, nominal.robots) if _place(e) not in places]
     done = simulate_trials(
-        plan.payload, plan.trials,
+        plan.payload, plan.kinds,
         vias=plan.vias, duration_s=plan.duration_s, preset=plan.preset, seed=seed,
         effects=[*hidden, *tolerated], units=units,
     )  # fmt: skip
@@ -92,8 +296,8 @@ def _trajectories(plan: CampaignPlan, seed: int, team: TeamScene) -> list[Trajec
     given = {"vias": plan.vias, "duration_s": plan.duration_s}
     told: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     return [
-        make_trajectory(TrialRequest(plan.payload, kind, seed, plan.trials[:k].count(kind), **told), team)
-        for k, kind in enumerate(plan.trials)
+        make_trajectory(TrialRequest(plan.payload, kind, seed, plan.kinds[:k].count(kind), **told), team)
+        for k, kind in enumerate(plan.kinds)
     ]
 
 
@@ -119,16 +323,85 @@ def _told(effect: Effect) -> dict[str, Any]:
     return told | {"answer": answer}
 
 
-Json = dict[str, Any]
-KEPT = ("verdict", "causes", "suspected", "scatter", "residual", "notes")
-"""Of a diagnosis; the rest is large, and for one recording's reader."""
+@dataclass(frozen=True)
+class Campaign:
+    """What a campaign found, as ``mocobot.campaign.summary`` documents it.
+
+    Attributes:
+        values: the summary.
+        made_with: provenance.
+    """
+
+    values: Json
+    made_with: Json
+
+    def __str__(self) -> str:
+        """The text report."""
+        return format_campaign(self.values)
+
+    def write(self, folder: Path, *, pictures: bool = True) -> str:
+        """Write summary, table, report and provenance into the campaign's folder, and name them."""
+        written = [folder / name for name in (SUMMARY, TABLE, REPORT)]
+        write_json(written[0], self.values)
+        write_text(written[1], csv_table(self.values))
+        write_text(written[2], f"{self}\n")
+        if pictures and draws_plots():
+            from mocobot.plots import save_campaign  # matplotlib, which printing needs not
+
+            written += save_campaign(self.values, folder)
+        write_json(folder / NAME, folder_provenance(self.made_with, folder, written))
+        return f"{SUMMARY}, {TABLE}, {REPORT}, {NAME}, sets{' and plots' * pictures}"
+
+
+def campaign(
+    out: Path,
+    options: CampaignOptions,
+    *,
+    force: bool = False,
+    done: Callable[[int], object] = quiet,
+) -> Campaign:
+    """Hide effects in simulated teams, diagnose them blind, and count; a folder that holds some of it is gone on with.
+
+    Args:
+        out: the folder.
+        options: of the campaign.
+        force: drop what another campaign left there.
+        done: called with the number of sets that have ended.
+
+    Raises:
+        InputError: an option that cannot be met, a folder of another campaign, or an output that cannot be written.
+    """
+    plan = CampaignPlan.of(options)
+    made_with = provenance("campaign", options, inputs_of(options))
+    store = CampaignStore(out, config_of(options), force=force)
+    with workers_of(options.scheduler):
+        results = run_campaign(plan, store, options.jobs, done, remote=options.scheduler is not None)
+    return Campaign(summarise(results, plan.exclude), made_with)
+
+
+def config_of(options: CampaignOptions) -> dict[str, str]:
+    """What sets depend on, as text by name, the code last."""
+    values = {name: value for name, value in asdict(options).items() if name not in NO_MATTER}
+    files = inputs_of(options)
+    for name in FILES:
+        given = values[name]
+        of = [file for file in files if given is not None and Path(given) in (file, file.parent)]
+        if of:
+            values[name] = f"{of[0].name} (sha256 {file_facts(of[0])['sha256'][:12]})"
+    return {name: _words(value) for name, value in values.items()} | {"code": run_key({})}
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return " ".join(map(_words, value)) or "none"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def run_campaign(
     plan: CampaignPlan,
     store: CampaignStore,
     jobs: int = 1,
-    done: Callable[[int], object] = lambda _: None,
+    done: Callable[[int], object] = quiet,
     *,
     remote: bool = False,
     work: Callable[[tuple[CampaignPlan, CampaignSet, Json | None]], Json] | None = None,

@@ -12,13 +12,16 @@ found              list of {background, factor, right, cause, family, missed, ex
 causes             list of {cause, kind, right, missed, error, over_se}: the same by cause; median error of the
                    parameters over the truth, and rms of the error over its standard error, or null
 confusion          {hidden: [cause], named: [cause or "nothing"], counts}: rows hidden, columns named for it
-reliability        ``campaign.shares.reliability``
+reliability        ``reliability``
 records            list, one for each set that was diagnosed, of {key, background, team, cause, robot, joint, factor,
                    verdict, named, probability, right, extras, error}
 
 A share is {hits, of, interval}: exact 95 % interval.
 """
 
+import csv
+import io
+import textwrap
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,12 +31,13 @@ import numpy as np
 from scipy.stats import beta
 
 from discrepancy.team.causes import CAUSES
-from mocobot.campaign.ground import one_axis
-from mocobot_report import CAMPAIGN_FORMAT as FORMAT
+from mocobot.campaign.effects import one_axis
+from mocobot_report.campaign.words import FORMAT, sentences, tables
 from mocobot_sim.effects.catalogue import EFFECTS
 
+Json = dict[str, Any]
 BINS = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 0.99), (0.99, 1.0 + 1e-12))
-"""Of stated probabilities."""
+"""Bins of stated probabilities."""
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
@@ -218,7 +222,7 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
-    """Of a push, where along its line and how long it acts cannot be told; nor is what masses decide."""
+    """Errors of the parameters that data determine: not where along its line a push acts, nor how long."""
     known, named = effect["answer"]["known"], item["parameters"]
     cause = effect["answer"]["cause"]
     skipped = (
@@ -248,8 +252,6 @@ def _alike(names: Sequence[str]) -> bool:
 
 VERSION = 1
 NOTHING = "nothing"
-
-Json = dict[str, Any]
 
 
 def summarise(results: Sequence[Mapping[str, Any]], exclude: Sequence[str] = ()) -> Json:
@@ -422,3 +424,55 @@ def _record(result: Mapping[str, Any], one: Matched) -> Json:
         "extras": [item["cause"] for item in one.extras],
         "error": score.error if score else None,
     }
+
+
+WIDTH = 110
+COLUMNS = (
+    "key", "background", "team", "cause", "robot", "joint", "factor", "verdict", "named", "probability", "right",
+    "extras", "error",
+)  # fmt: skip
+
+
+def format_campaign(summary: Item) -> str:
+    """The text report."""
+    head, *more = sentences(summary)
+    parts = [
+        "\n".join([*_fill(head), *(line for sentence in more for line in _fill(sentence, "- "))]),
+        *(f"{title}\n\n{_aligned(heads, rows)}" for title, heads, rows in tables(summary)),
+        _failed(summary["sets"]["failed"]),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def csv_table(summary: Item) -> str:
+    """One line for each set that was diagnosed, with the columns of ``COLUMNS``; empty where there is nothing."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    for record in summary["records"]:
+        writer.writerow(record | {"extras": " ".join(record["extras"])})
+    return out.getvalue()
+
+
+def _failed(failed: Sequence[Item]) -> str:
+    lines = [
+        line
+        for entry in failed
+        for line in _fill(f"{entry['key']}: {entry['error'].strip().splitlines()[-1]}", "- ")
+    ]
+    return "\n".join([f"Not diagnosed: {len(failed)}", "", *lines]) if lines else ""
+
+
+def _fill(sentence: str, mark: str = "") -> list[str]:
+    held = sentence.replace(" %", "\0%")  # a number and its unit stay together
+    lines = textwrap.wrap(held, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark))
+    return [line.replace("\0", " ") for line in lines]
+
+
+def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads))]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in [heads, *rows]
+    ]
+    return "\n".join([lines[0], "-" * max(map(len, lines)), *lines[1:]])

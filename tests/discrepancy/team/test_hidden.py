@@ -17,7 +17,7 @@ from discrepancy.team.diagnosis import diagnose_team
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from hidden_team import recorded
-from mocobot.campaign.background import cheaper, draw_background
+from mocobot.campaign.effects import cheaper, draw_background
 from mocobot_sim.effects import Effect, make_effect
 from mocobot_sim.extended.extended import load_extended
 from mocobot_sim.scene.scene import build_team

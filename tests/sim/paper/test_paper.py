@@ -192,7 +192,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the command writes for one payload and one preset, with as little motion as above."""
     out = tmp_path_factory.mktemp("paper") / "new" / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mocobot.commands.paper.PaperPlan", partial(PaperPlan, **LESS))
+        patch.setattr("mocobot.api.paper.PaperPlan", partial(PaperPlan, **LESS))
         main(["paper", "--payload", "d", "--preset", "nominal", "--trials", "2", "--jobs", "1", "--recordings",
               "--out", str(out)])  # fmt: skip
     return out

@@ -1,17 +1,25 @@
-"""``mocobot diagnose`` as a user meets it: what it says and what it writes."""
+"""``mocobot diagnose`` as a user meets it: what it says and writes, and what it refuses."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from diagnose_run import BIAS_NM, Edit, refused, run
+from diagnose_run import (
+    BIAS_NM,
+    changed,
+    of_longer_links,
+    refused,
+    run,
+    unlabelled_and_heavier,
+    with_metadata,
+    without_robots,
+)
 from diagnosed import check_schema
 from discrepancy.result.traces import load_traces
 from estimator.files import holds
@@ -19,12 +27,10 @@ from mocobot_sim.extended.extended import load_extended
 
 
 @pytest.mark.slow
-def test_hidden_bias_is_named_extended_and_written(
-    biased_trials: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_hidden_bias_is_named_extended_and_written(biased_trials, tmp_path, capsys):
     out = tmp_path / "verdict"
     out.mkdir()  # an empty folder may be used
-    code, text, _ = run(capsys, *biased_trials, "--out", out, "--jobs", 1)
+    code, text, _ = run(capsys, *biased_trials, "--out", out, "--jobs", 1, "--pictures")
     values = json.loads((out / "diagnosis.json").read_text())
     check_schema(values)
     assert code == 0
@@ -77,9 +83,7 @@ def test_hidden_bias_is_named_extended_and_written(
 
 
 @pytest.mark.slow
-def test_one_trial_without_commands_says_what_stays_open(
-    edited: Callable[[str, Edit], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_trial_without_commands_says_what_stays_open(edited, tmp_path, capsys):
     bare = edited(
         "bare.parquet", lambda t: t.drop_columns([name for name in t.column_names if ".ref_" in name])
     )
@@ -97,7 +101,7 @@ def test_one_trial_without_commands_says_what_stays_open(
 
 
 @pytest.mark.slow
-def test_excluded_cause_is_not_named(biased_trials: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_excluded_cause_is_not_named(biased_trials, capsys):
     code, text, _ = run(
         capsys, biased_trials[0], "--no-closed-loop", "--jobs", 1, "--exclude", "sea_bias", "joint_friction"
     )
@@ -105,14 +109,8 @@ def test_excluded_cause_is_not_named(biased_trials: list[Path], capsys: pytest.C
     assert "torque zero" not in text
 
 
-def test_nothing_is_left_when_interrupted(
-    biased_trials: list[Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_nothing_is_left_when_interrupted(biased_trials, tmp_path, capsys, monkeypatch):
     def stop(*_: object, **__: object) -> None:
-        assert [path.name for path in tmp_path.iterdir()] != []
         raise KeyboardInterrupt
 
     monkeypatch.setattr("discrepancy.team.diagnosis.estimate_payload", stop)
@@ -120,3 +118,64 @@ def test_nothing_is_left_when_interrupted(
     assert (code, out) == (130, "")
     assert err.endswith("mocobot: interrupted")
     assert not list(tmp_path.iterdir())
+
+
+def still(v: np.ndarray) -> np.ndarray:
+    """A channel at its first value, with enough noise that no row repeats another."""
+    return v[0] + 1e-6 * np.cos(np.arange(len(v)))
+
+
+@pytest.mark.parametrize(
+    ("name", "edit", "words"),
+    [
+        ("two.parquet", without_robots(2), ["two.parquet", "is a robot missing"]),
+        ("one.parquet", without_robots(1), ["one.parquet has one robot"]),
+        ("still.parquet", changed("omnid", still), ["do not determine the grasps"]),
+        ("short.parquet", lambda t: t.slice(0, 100), ["short.parquet", "0.0 s are left"]),
+        ("brief.parquet", lambda t: t.slice(0, 600), ["brief.parquet", "2.0 s are left", "at least 5 s"]),
+    ],
+)
+def test_bad_recording_is_refused(edited, tmp_path, capsys, name, edit, words):
+    message = refused(capsys, edited(name, edit), "--out", tmp_path / "verdict", "--jobs", 1)
+    for word in words:
+        assert word in message
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "edit", "words"),
+    [
+        ("c.parquet", with_metadata(payload="c"), ["'c'", "'b'"]),
+        ("heavy.parquet", unlabelled_and_heavier, ["heavy.parquet says 1", "kg", "of one payload"]),
+        ("pair.parquet", without_robots(2), ["has 2 robots", "has 3"]),
+        ("links.parquet", of_longer_links, ["links.parquet", "different design"]),
+    ],
+)
+def test_recordings_that_do_not_belong_together(biased_trials, edited, capsys, name, edit, words):
+    message = refused(capsys, biased_trials[1], edited(name, edit))
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize("odds", ["0", "-1", "1e4"])
+def test_odds_that_are_none_are_refused(tmp_path, capsys, odds):
+    message = refused(capsys, tmp_path / "none.parquet", "--odds", odds)
+    assert f"odds is {float(odds):g}; it must be greater than 0 and at most 1000" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[sea_bias", ["not a readable file of tolerances"]),
+        ("[ghost]\na = 1\n", ["unknown table 'ghost'", "sea_bias"]),
+        ("[sea_bias]\nbias = 1\n", ["has no 'bias'", "bias_Nm"]),
+        ("[sea_bias]\nbias_Nm = -1\n", ["sea_bias.bias_Nm is -1"]),
+        ("[sea_bias]\nbias_Nm = 'much'\n", ["'much'"]),
+    ],
+)
+def test_bad_tolerances_are_refused(biased_trials, tmp_path, capsys, text, words):
+    path = tmp_path / "tolerances.toml"
+    path.write_text(text)
+    message = refused(capsys, *biased_trials, "--tolerances", path)
+    for word in ["tolerances.toml", *words]:
+        assert word in message

@@ -12,9 +12,10 @@ import pytest
 from rerun.chunk import RrdReader
 
 from command import refused, run
+from discrepancy.cause_names import JOINTS as CAUSES
 from estimator.errors import InputError
 from joint_logs import write_csv
-from made_arm import JOINTS, MAP, MODEL, made, write_log, write_map, write_model
+from made_arm import JOINTS, MAP, MODEL, made, write_chain_log, write_log, write_map, write_model
 from mocobot import serial
 
 
@@ -33,7 +34,7 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_inspect_says_and_writes_what_it_finds(tmp_path, capsys, log) -> None:
+def test_inspect_says_and_writes_what_it_finds(tmp_path, capsys, log):
     code, out, _ = run(
         capsys, "inspect", log, "--model", tmp_path / "arm.xml", "--json", tmp_path / "found.json", "--strict"
     )
@@ -43,7 +44,7 @@ def test_inspect_says_and_writes_what_it_finds(tmp_path, capsys, log) -> None:
     assert json.loads((tmp_path / "found.json").read_text())["ready"].startswith("ready for: a diagnosis")
 
 
-def test_inspect_strict_fails_where_something_is_reversed(tmp_path, capsys, values) -> None:
+def test_inspect_strict_fails_where_something_is_reversed(tmp_path, capsys, values):
     log = write_log(tmp_path, values | {"shoulder torque": -values["shoulder torque"]})
     code, out, err = run(capsys, "inspect", log, "--model", tmp_path / "arm.xml", "--strict")
     assert code == 1
@@ -51,7 +52,7 @@ def test_inspect_strict_fails_where_something_is_reversed(tmp_path, capsys, valu
     assert err.startswith("mocobot: ready for: nothing as it is; with the mistake above undone")
 
 
-def test_a_drafted_map_reads_the_log(tmp_path, capsys, values) -> None:
+def test_a_drafted_map_reads_the_log(tmp_path, capsys, values):
     write_model(tmp_path)
     log = write_csv(tmp_path / "log.csv", values)
     code, _, err = run(capsys, "map", log, "--model", tmp_path / "arm.xml", "--out", tmp_path / "log.toml")
@@ -64,7 +65,7 @@ def test_a_drafted_map_reads_the_log(tmp_path, capsys, values) -> None:
         np.testing.assert_array_equal(read.dq[:, j], values[f"{joint} dq"])
 
 
-def test_drafts_by_numbers_and_units_in_names(tmp_path, capsys, values) -> None:
+def test_drafts_by_numbers_and_units_in_names(tmp_path, capsys, values):
     write_model(tmp_path)
     named = {"t_ms": 1e3 * values["time"], "unrelated": values["time"]}
     for k, joint in enumerate(JOINTS):
@@ -85,7 +86,7 @@ def test_drafts_by_numbers_and_units_in_names(tmp_path, capsys, values) -> None:
     assert "# gear = [ ... ]" in out
 
 
-def test_replay_writes_bodies_and_series(tmp_path, capsys, log) -> None:
+def test_replay_writes_bodies_and_series(tmp_path, capsys, log):
     code, out, _ = run(capsys, "replay", log, "--model", tmp_path / "arm.xml", "--save", tmp_path / "log.rrd")
     assert code == 0
     assert "open it with: rerun" in out
@@ -103,7 +104,7 @@ REFUSED = {
     "log as its reference": (
         ["diagnose", "{log}", "--reference", "{log}", "--model", "{model}"], "is given twice", []
     ),
-    "reference without model": (["diagnose", "{log}", "--reference", "{log}"], "--reference goes with --model", []),
+    "reference without model": (["diagnose", "{log}", "--reference", "{log}"], "--reference goes with a model", []),
     "unknown cause": (
         ["diagnose", "{log}", "--model", "{model}", "--exclude", "sorcery"], "cause 'sorcery' does not exist", []
     ),
@@ -125,7 +126,7 @@ REFUSED = {
         ["replay", "{log}", "--model", "{model}", "--truth", "--save", "{folder}/x.rrd"], "--truth is of a team's", []
     ),
     "map of a replay": (
-        ["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with --model", []
+        ["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with a model", []
     ),
     "folder of the log": (
         ["diagnose", "{log}", "--model", "{model}", "--out", "{folder}"], "which would be lost; name another folder", []
@@ -134,7 +135,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", list(REFUSED))
-def test_refused_and_nothing_written(tmp_path, capsys, log, case) -> None:
+def test_refused_and_nothing_written(tmp_path, capsys, log, case):
     arguments, said, without = REFUSED[case]
     for name in without:
         (tmp_path / name).unlink()
@@ -144,12 +145,12 @@ def test_refused_and_nothing_written(tmp_path, capsys, log, case) -> None:
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_no_time_is_refused_in_python_as_on_the_command_line(tmp_path, log) -> None:
+def test_no_time_is_refused_in_python_as_on_the_command_line(tmp_path, log):
     with pytest.raises(InputError, match="seconds is 0; it must be above 0"):
         serial.diagnose(tmp_path / "arm.xml", log, seconds=0)
 
 
-def test_a_log_without_torques_or_a_model_with_other_joints(tmp_path, capsys, values) -> None:
+def test_a_log_without_torques_or_a_model_with_other_joints(tmp_path, capsys, values):
     log = write_log(tmp_path, values)
     write_map(tmp_path, MAP.replace('torque = { column = "{joint} torque", unit = "Nm" }\n', ""))
     assert "no joint has a torque, a current, a command or a duty" in refused(
@@ -163,7 +164,7 @@ def test_a_log_without_torques_or_a_model_with_other_joints(tmp_path, capsys, va
     assert files(tmp_path) == {"arm.xml", "log.toml", "log.csv"}
 
 
-def test_damaged_logs_maps_and_models_leave_nothing_behind(tmp_path, capsys, values) -> None:
+def test_damaged_logs_maps_and_models_leave_nothing_behind(tmp_path, capsys, values):
     """One of the three is damaged so that it cannot be read; see tests/logs/joints for hundreds of them."""
     log = write_log(tmp_path, values)
     originals = {path: path.read_bytes() for path in tmp_path.iterdir()}
@@ -190,11 +191,57 @@ def test_damaged_logs_maps_and_models_leave_nothing_behind(tmp_path, capsys, val
     assert count > 10
 
 
-def test_tolerances_of_the_causes_that_a_file_names(tmp_path) -> None:
+def test_tolerances_of_the_causes_that_a_file_names(tmp_path, log):
     path = tmp_path / "tolerances.toml"
     path.write_text("[torque_scale]\nscale_percent = 2.0\n", encoding="utf-8")
-    with pytest.raises(serial.InputError, match="torque_scale has no 'scale_percent'; its parameters are"):
-        serial.serial_tolerances(path)
-    path.write_text("[torque_scale]\nscale = 0.02\n", encoding="utf-8")
-    assert serial.serial_tolerances(path) == {"torque_scale": {"scale": 0.02}}
-    assert serial.serial_tolerances(None) is None
+    with pytest.raises(InputError, match="torque_scale has no 'scale_percent'; its parameters are"):
+        serial.diagnose(tmp_path / "arm.xml", log, tolerances=path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("joints", [1, 7])
+def test_every_command_takes_a_cause_at_the_last_joint(tmp_path, capsys, joints):
+    log, model, found = write_chain_log(tmp_path, joints, joints), tmp_path / "arm.xml", tmp_path / "found"
+    others = [name for name in CAUSES if name != "friction"]
+    code, _, _ = run(
+        capsys, "diagnose", log, "--model", model, "--out", found, "--no-closed-loop", "--exclude", *others,
+    )  # fmt: skip
+    assert code == 0
+    (cause,) = json.loads((found / "diagnosis.json").read_text())["causes"]
+    assert (cause["cause"], cause["robot"], cause["joint"]) == ("friction", None, joints)
+    code, _, _ = run(capsys, "report", found, "--out", tmp_path / "page.html")
+    assert code == 0
+    assert f"friction in joint {joints}" in (tmp_path / "page.html").read_text()
+    code, said, _ = run(capsys, "compare", found, found)
+    assert code == 0
+    assert f"friction in joint {joints}, coulomb_Nm" in said
+    code, _, _ = run(capsys, "replay", log, "--model", model, "--save", tmp_path / "log.rrd")
+    assert code == 0
+    entities = {str(path) for path in RrdReader(tmp_path / "log.rrd").store().schema().entity_paths()}
+    assert f"/log/series/joint{joints}/torque/model" in entities
+
+
+@pytest.mark.parametrize("joint", [0, 4, 1.5, "1"])
+def test_a_team_s_robots_have_three_joints(tmp_path, capsys, joint):
+    """In a file that somebody has changed; a robot of a team is numbered, any other is not."""
+    cause = {"cause": "friction", "robot": 1, "joint": joint, "sentence": "", "kind": "", "name": ""}
+    values = {
+        "format": "mocobot-diagnosis",
+        "version": 2,
+        "verdict": "explained",
+        "recordings": [],
+        "causes": [cause],
+    }
+    path = tmp_path / "diagnosis.json"
+    path.write_text(json.dumps(values))
+    assert f"diagnosis.json: not a complete diagnosis (ValueError: joint is {joint!r})" in refused(
+        capsys, "compare", path, path
+    )
+
+
+@pytest.mark.parametrize("command", [("watch",), ("inspect",), ("convert", "x.parquet")])
+def test_a_map_of_joints_where_a_team_is_meant(tmp_path, capsys, command):
+    log = write_chain_log(tmp_path, 1, 1, seconds=1.0)
+    said = refused(capsys, command[0], log, "--map", tmp_path / "log.toml", *command[1:])
+    assert "log.toml: is of one robot's joints, not of a team" in said
+    assert "read its log with --model" in said

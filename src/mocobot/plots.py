@@ -1,4 +1,4 @@
-"""Pictures of a campaign's summary."""
+"""Pictures of campaigns and of comparisons."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,16 +14,15 @@ from mocobot_report.campaign import background_words
 from mocobot_report.palette import LIGHT
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 
+Json = Mapping[str, Any]
 COLOURS = {"calibrated": LIGHT["after"], "uncalibrated": LIGHT["before"], "units": LIGHT["after"]}
 APART = 1.03
 """By how much a background's points are moved to the right, so that bars do not hide each other."""
 MARKERS = {"calibrated": "o", "uncalibrated": "s", "units": "o"}
 
-Json = Mapping[str, Any]
-
 
 @plain_words()
-def save_plots(summary: Json, folder: Path) -> list[Path]:
+def save_campaign(summary: Json, folder: Path) -> list[Path]:
     """Draw what there is something to draw of, and say where.
 
     Args:
@@ -142,3 +141,36 @@ def _reliable(axis: Axes, summary: Json) -> None:
     axis.set_title(
         f"Brier score {found['brier']:.3f} of {found['number']} causes named", loc="left", fontsize=9
     )
+
+
+FARTHEST = 30.0
+"""Standard errors at which the picture ends; what is farther off is drawn there as an arrow. Chosen."""
+
+
+@plain_words()
+def save_comparison(found: Any, path: Path) -> None:
+    """Draw a row for each number, with a band of two standard errors; changed groups are in another colour."""
+    rows = [(group, k) for group in found.groups for k in range(len(group.entries))]
+    figure = Figure(figsize=(9.0, 1.4 + 0.22 * len(rows)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    axis.axvspan(-2.0, 2.0, color=LIGHT["band"], lw=0)
+    axis.axvline(0.0, color=LIGHT["line"], lw=1.0)
+    changed, reach = found.changed_groups, 4.0
+    for y, (group, k) in enumerate(rows):
+        ratio = float(group.ratio[k])
+        at = float(np.clip(ratio, -FARTHEST, FARTHEST))
+        marker = "o" if at == ratio else ">" if ratio > 0 else "<"
+        axis.plot([at], [y], marker, ms=5, color=LIGHT["before" if group in changed else "after"])
+        reach = max(reach, abs(at))
+    labels = [f"{group.name} {group.entries[k]}".rstrip() for group, k in rows]
+    axis.set_yticks(range(len(rows)), labels, fontsize=8)
+    axis.set_ylim(len(rows) - 0.5, -0.5)
+    axis.set_xlim(-1.08 * reach, 1.08 * reach)
+    axis.set_xlabel(
+        "(B - A) over its standard error; band: two standard errors; orange: changed; arrow: farther off"
+    )
+    axis.set_title(f"A: {found.a}\nB: {found.b}", loc="left", fontsize=9)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+    figure.savefig(path, dpi=110)

@@ -1,4 +1,6 @@
-"""Where a result comes from: versions, options and the hashes of the files it was made from.
+"""Results: the same data as the packages below make, with text and files, and where each comes from.
+
+Provenance, in every result's file or in provenance.json of a folder:
 
 mocobot, python           versions
 commit                    of the checkout that the package runs from, "+changed" behind it where sources differ from the
@@ -12,47 +14,89 @@ files                     list of {name, path, bytes, sha256}: inputs, the path 
 Nothing in it depends on when, where or by whom the command was run, so the same inputs give the same bytes.
 """
 
+import hashlib
+import json
 import os
 import platform
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, fields
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
-from estimator.files import file_facts
+from estimator.files import file_facts, holds, whole_folder
+from mocobot.checks import check_folder
+from mocobot_sim.scene.model_files import models_dir
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
 """Libraries that a result's numbers pass through."""
-NO_MATTER = ("out", "force", "strict", "jobs", "scheduler", "rec")
+NO_MATTER = ("out", "json", "pictures", "force", "strict", "jobs", "scheduler", "rec")
 """Options that are not listed: results do not depend on where they go, on what they replace, on the exit code or on the
 number of processes, and recordings are listed as files."""
 FORMAT, VERSION, NAME = "mocobot-provenance", 1, "provenance.json"
 SOURCES = ("src", "models", "pyproject.toml")
+CODE = ("discrepancy", "estimator", "mocobot", "mocobot_logs", "mocobot_sim")
+"""Packages that outcomes come from."""
 GIT_S = 20.0
+Kind = TypeVar("Kind")
 
 
-def provenance(command: str, options: Mapping[str, Any], inputs: Sequence[Path] = ()) -> dict[str, Any]:
+def public(kind: type[Kind], below: Any, **more: Any) -> Kind:
+    """A result of a package below as a subclass of its dataclass."""
+    return kind(**{field.name: getattr(below, field.name) for field in fields(below)} | more)
+
+
+class Folder:
+    """A result that fills a folder: ``write_into`` of its class writes all into an existing one."""
+
+    result: ClassVar[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON with units in the keys."""
+        raise NotImplementedError
+
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> object:
+        """Write everything into an existing folder, with further keys in the JSON."""
+        raise NotImplementedError
+
+    def write(self, folder: Path | str, *, pictures: bool = True) -> None:
+        """Write a folder, which ``mocobot report`` makes a page of; an earlier result of the kind is replaced.
+
+        Args:
+            folder: to be created or replaced.
+            pictures: whether pictures are drawn, too.
+
+        Raises:
+            InputError: the folder holds something else, or cannot be written.
+        """
+        check_folder(Path(folder), [], holds(self.result), f"an earlier {self.result}", force=True)
+        with whole_folder(Path(folder), self.result) as whole:
+            self.write_into(whole, pictures=pictures)
+
+
+def provenance(command: str, options: Any, inputs: Sequence[Path] = ()) -> dict[str, Any]:
     """Say what a result was made with and from, as plain JSON values with the keys documented above.
 
     Args:
         command: name of the command.
-        options: by name; paths and tuples become strings and lists.
+        options: its dataclass, or values by name; paths and tuples become strings and lists.
         inputs: files the result was made from, or folders of such files.
 
     Raises:
         InputError: an input cannot be read.
     """
+    values = options if isinstance(options, Mapping) else asdict(options)
+    system = (platform.system(), platform.machine(), *platform.libc_ver())
     return {
         "mocobot": version_of("mocobot"),
-        "commit": _commit(Path(__file__).resolve().parents[3]),
+        "commit": commit_of(Path(__file__).resolve().parents[2]),
         "python": platform.python_version(),
-        "platform": " ".join(
-            part for part in (platform.system(), platform.machine(), *platform.libc_ver()) if part
-        ),
+        "platform": " ".join(part for part in system if part),
         "packages": {name: found for name in PACKAGES if (found := version_of(name)) is not None},
         "command": command,
-        "options": {name: _plain(value) for name, value in options.items() if name not in NO_MATTER},
+        "options": {name: _plain(value) for name, value in values.items() if name not in NO_MATTER},
         "files": [file_facts(file) for path in inputs for file in _files(path)],
     }
 
@@ -70,12 +114,8 @@ def folder_provenance(made_with: Mapping[str, Any], folder: Path, written: Itera
         InputError: a file cannot be read.
     """
     listed = [file_facts(path) | {"path": path.relative_to(folder).as_posix()} for path in written]
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        **made_with,
-        "written": sorted(listed, key=lambda f: f["path"]),
-    }
+    head = {"format": FORMAT, "version": VERSION, **made_with}
+    return head | {"written": sorted(listed, key=lambda f: f["path"])}
 
 
 def _files(path: Path) -> list[Path]:
@@ -91,9 +131,9 @@ def version_of(package: str) -> str | None:
         return None
 
 
-def _commit(root: Path) -> str | None:
+def commit_of(root: Path) -> str | None:
     """Commit of the checkout at ``root``, or None where that is not the top of one."""
-    if not (root / "src" / "mocobot" / "files" / Path(__file__).name).is_file():
+    if not (root / "src" / "mocobot" / Path(__file__).name).is_file():
         return None
     top, head = _git(root, "rev-parse", "--show-toplevel"), _git(root, "rev-parse", "HEAD")
     if not top or not head or Path(top).resolve() != root:
@@ -122,3 +162,22 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     return str(value) if isinstance(value, os.PathLike) else value
+
+
+@cache
+def code_digest() -> str:
+    """SHA-256 of the code and the models that outcomes come from."""
+    top, found = Path(__file__).resolve().parents[1], hashlib.sha256()
+    sources = [path for name in CODE for path in sorted((top / name).rglob("*.py"))]
+    models = sorted(path for path in models_dir().rglob("*") if path.suffix in (".xml", ".toml"))
+    for path in [*sources, *models]:
+        found.update(path.name.encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def run_key(options: Mapping[str, Any]) -> str:
+    """Sixteen digits that stand for options, code, models and versions: a run may go on with outcomes of the same."""
+    versions = {name: version_of(name) for name in PACKAGES}
+    words = json.dumps([dict(options), versions, code_digest()], sort_keys=True, default=str)
+    return hashlib.sha256(words.encode()).hexdigest()[:16]

@@ -1,0 +1,470 @@
+"""Groups of numbers that two results both give, and how far they are apart for their errors."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.special import gammaincc
+
+from discrepancy.result.read import VERDICTS, name_of
+from estimator import so3
+from estimator.arm.unit import AT, COUNT, GROUPS
+from estimator.arrays import Array
+from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.outcome.carried import carried
+from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.errors import InputError
+from estimator.estimate.frames import MIXED, in_encoder_frames
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.inertia import PARAMETERS
+from estimator.estimate.principal import inertia_parameters
+from estimator.estimate.result import PayloadEstimate
+
+LEVEL = 0.01
+"""Probability that two results of the same truth are said to differ anywhere. Chosen: one false alarm in a hundred; it
+is shared out evenly among the groups that are tested (Bonferroni)."""
+TOGETHER = 0.9
+"""Correlation from which on two errors are said to move together. Chosen: four fifths of the variance are then
+common."""
+RANK = 1e-10
+"""Least share of the largest eigenvalue of a correlation matrix that counts as known. Derived: eigenvalues of double
+precision are wrong by 1e-16 times the size, and files keep 16 digits; six orders above are left."""
+EQUAL = 1e-9
+"""Difference, relative to the values, that is none where errors are zero. Derived: numbers of degrees and matrices go
+through files with a dozen operations of 1e-16 each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Numbers of one kind, such as the three components of a centre of mass.
+
+    Attributes:
+        name: what they are.
+        unit: theirs, all of them.
+        entries: name of each, "" for one alone.
+        a, b: values, shape (K,).
+        a_covariance, b_covariance: of the errors of each, shape (K, K).
+        covariance: of the difference: the sum of these, less what both have in common, shape (K, K).
+    """
+
+    name: str
+    unit: str
+    entries: tuple[str, ...]
+    a: Array
+    b: Array
+    a_covariance: Array
+    b_covariance: Array
+    covariance: Array
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        unit: str,
+        entries: tuple[str, ...],
+        a: tuple[Array, Array],
+        b: tuple[Array, Array],
+        *,
+        common: tuple[Array, Array] | None = None,
+    ) -> "Group":
+        """From values with covariances.
+
+        Args:
+            name, unit, entries: see above.
+            a, b: values and the covariance of their errors, without a common error.
+            common: derivatives of a and of b by one error of unit variance that both have, shape (K,) each.
+        """
+        no = np.zeros(len(entries))
+        by_a, by_b = common or (no, no)
+        return cls(
+            name,
+            unit,
+            entries,
+            a[0],
+            b[0],
+            a[1] + np.outer(by_a, by_a),
+            b[1] + np.outer(by_b, by_b),
+            a[1] + b[1] + np.outer(by_b - by_a, by_b - by_a),
+        )
+
+    @property
+    def a_se(self) -> Array:
+        """Standard errors of a, shape (K,)."""
+        return _errors(self.a_covariance)
+
+    @property
+    def b_se(self) -> Array:
+        """Standard errors of b, shape (K,)."""
+        return _errors(self.b_covariance)
+
+    @property
+    def difference(self) -> Array:
+        """b - a, shape (K,)."""
+        return self.b - self.a
+
+    @property
+    def se(self) -> Array:
+        """Standard errors of the difference, shape (K,)."""
+        return _errors(self.covariance)
+
+    @property
+    def ratio(self) -> Array:
+        """Differences over their standard errors, shape (K,); infinite where there is a difference and no error."""
+        same = np.abs(self.difference) <= EQUAL * np.maximum(np.abs(self.a), np.abs(self.b))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(same, 0.0, self.difference / self.se)
+
+    @cached_property
+    def _correlation(self) -> tuple[Array, Array]:
+        """Eigenvalues and eigenvectors of the difference's correlation matrix."""
+        se = np.where(self.se > 0, self.se, 1.0)
+        return np.linalg.eigh(self.covariance / np.outer(se, se))
+
+    @cached_property
+    def _known(self) -> NDArray[np.bool_]:
+        """Which directions have an error that can be told from none, shape (K,)."""
+        values = self._correlation[0]
+        return values > RANK * max(values[-1], 0.0)
+
+    @property
+    def dof(self) -> int:
+        """Number of independent directions that are tested."""
+        return int(np.count_nonzero(self._known))
+
+    @property
+    def chi2(self) -> float:
+        """Square of the difference in terms of its covariance, correlations heeded; infinite as ``ratio``."""
+        if not np.isfinite(self.ratio).all():
+            return float("inf")
+        values, vectors = self._correlation
+        ratios = np.where(self.se > 0, self.ratio, 0.0)
+        along = vectors[:, self._known].T @ ratios
+        return float(np.sum(along**2 / values[self._known]))
+
+    @property
+    def p(self) -> float:
+        """Probability of so large a difference by chance."""
+        if not self.dof:
+            return 1.0 if self.chi2 == 0 else 0.0
+        return float(gammaincc(0.5 * self.dof, 0.5 * self.chi2))
+
+    @property
+    def together(self) -> list[tuple[str, str, float]]:
+        """Entries whose differences have errors that move together, with the correlation."""
+        se = self.se
+        return [
+            (self.entries[i], self.entries[j], r)
+            for i in range(len(se))
+            for j in range(i)
+            if se[i] > 0 and se[j] > 0 and abs(r := self.covariance[i, j] / (se[i] * se[j])) >= TOGETHER
+        ]
+
+
+def _errors(covariance: Array) -> Array:
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+XYZ = ("x", "y", "z")
+
+
+def estimate_groups(a: PayloadEstimate, b: PayloadEstimate) -> list[Group]:
+    """Mass, centre of mass, inertia and grasps, as far as both have them."""
+    if a.robots != b.robots:
+        raise InputError(
+            f"the estimates are of {a.robots} and {b.robots} robots; both must be of the same number"
+        )
+    groups = []
+    if a.mass and b.mass:
+        mass = [(np.array([one.mass]), np.array([[one.se**2]])) for one in (a.mass, b.mass)]
+        groups.append(Group.of("mass", "kg", ("",), *mass))
+    if in_encoder_frames(a.units) != in_encoder_frames(b.units):
+        return groups
+    if a.p_1c is not None and b.p_1c is not None:
+        assert a.p_1c_covariance is not None
+        assert b.p_1c_covariance is not None
+        com = (a.p_1c, a.p_1c_covariance), (b.p_1c, b.p_1c_covariance)
+        groups.append(Group.of("centre of mass", "m", XYZ, *com))
+    if a.inertia and b.inertia:
+        inertia = [(inertia_parameters(one.inertia), one.covariance) for one in (a.inertia, b.inertia)]
+        groups.append(Group.of("inertia", "kg m^2", PARAMETERS, *inertia))
+    if a.grasps and b.grasps:
+        groups += grasp_groups(a.grasps, b.grasps)
+    return groups
+
+
+def grasp_groups(
+    a: GraspEstimate, b: GraspEstimate, prefix: str = "", common: tuple[Array, Array] | None = None
+) -> list[Group]:
+    """Rotation and position of every grasp but the first, in {1}.
+
+    Args:
+        a, b: of the same number of robots.
+        prefix: of the groups' names.
+        common: as of ``Group.of``, for (d_2, e_2, ...) as in ``GraspEstimate``.
+    """
+    groups = []
+    by_a, by_b = common or (np.zeros(len(a.covariance)),) * 2
+    for i in range(1, a.robots):
+        turn, shift = slice(6 * i - 6, 6 * i - 3), slice(6 * i - 3, 6 * i)
+        name, x = f"{prefix}grasp of robot {i + 1}", Rotation.from_matrix(a.R_1i[i]).as_rotvec()
+        first = _turned(x, a.covariance[turn, turn], by_a[turn])
+        other = _turned(_near(x, b.R_1i[i]), b.covariance[turn, turn], by_b[turn])
+        groups.append(
+            Group.of(f"{name}, rotation", "deg", XYZ, first[:2], other[:2], common=(first[2], other[2]))
+        )
+        places = [(one.p_1i[i], one.covariance[shift, shift]) for one in (a, b)]
+        groups.append(Group.of(f"{name}, position", "m", XYZ, *places, common=(by_a[shift], by_b[shift])))
+    return groups
+
+
+def _near(x: Array, R: Array) -> Array:
+    """Rotation vector of R, of the two within 2 pi the one that is nearer to x [rad], shape (3,)."""
+    y = Rotation.from_matrix(R).as_rotvec()
+    angle = float(np.linalg.norm(y))
+    other = y * (1.0 - 2.0 * np.pi / angle) if angle > 0 else y
+    return min((y, other), key=lambda one: float(np.linalg.norm(one - x)))
+
+
+def _turned(x: Array, covariance: Array, by: Array) -> tuple[Array, Array, Array]:
+    """A rotation vector, its covariance and its derivative from those of an error rotation in {1}, all in degrees."""
+    J = np.rad2deg(np.linalg.inv(so3.left_jacobian(x)))
+    return np.rad2deg(x), J @ covariance @ J.T, J @ by
+
+
+def estimate_notes(a: PayloadEstimate, b: PayloadEstimate) -> list[str]:
+    """What a reader must know of both."""
+    notes = _one_sided(a, b)
+    if in_encoder_frames(a.units) != in_encoder_frames(b.units):
+        notes.append(MIXED)
+    if a.payload != b.payload:
+        notes.append(f"The payloads go by different names: {a.payload or 'none'} and {b.payload or 'none'}.")
+    doubtful = [name for name, one in (("A", a), ("B", b)) if one.contradicts]
+    if doubtful:
+        notes.append(
+            f"In {' and '.join(doubtful)} the robots contradict each other beyond noise: standard errors are too small "
+            "there, and differences look larger than they are; calibrate the robots first."
+        )
+    if a.units is not None and b.units is not None and np.array_equal(a.units.x, b.units.x):
+        notes.append(
+            "Both take the robots from the same calibration: its errors are in both, and differences are better known "
+            "than is said."
+        )
+    elif a.units is not None or b.units is not None:
+        notes.append("They take the robots to be different ones, as calibrated or as designed.")
+    return notes
+
+
+def _one_sided(a: PayloadEstimate, b: PayloadEstimate) -> list[str]:
+    kinds: Sequence[tuple[str, object, object]] = (
+        ("mass", a.mass, b.mass),
+        ("centre of mass", a.p_1c, b.p_1c),
+        ("inertia", a.inertia, b.inertia),
+        ("grasps", a.grasps, b.grasps),
+    )
+    return [
+        f"The {what} is determined by {'A' if there is not None else 'B'} alone."
+        for what, there, other in kinds
+        if (there is None) != (other is None)
+    ]
+
+
+def calibration_groups(a: Calibration, b: Calibration) -> list[Group]:
+    """Deviations of every robot that both know with an error, and payloads of the same name.
+
+    The spring scale that all robots share is one error of both where neither has a known weight, for it is of the same
+    springs: it leaves a difference as far as both depend on it alike.
+    """
+    if a.robots != b.robots:
+        raise InputError(
+            f"the calibrations are of {a.robots} and {b.robots} robots; both must be of the same number"
+        )
+    groups = [
+        group
+        for robot in range(a.robots)
+        for kind in shown_groups(a)
+        if (group := _deviations(a, b, robot, kind.name)) is not None
+    ]
+    for one, other in _pairs(a, b):
+        mixed = in_encoder_frames(a.units) != in_encoder_frames(b.units)
+        groups += _payload(one, other, a.scale_sd, b.scale_sd)[: 1 if mixed else None]
+    return groups
+
+
+def calibration_notes(a: Calibration, b: Calibration) -> list[str]:
+    """What a reader must know of both."""
+    notes = [
+        "Both start from an assumption of how far robots are off, and what the recordings say little of stays near it: "
+        "such numbers differ by less than their errors."
+    ]
+    if a.scale_sd and b.scale_sd:
+        notes.append(
+            "Neither knows a weight: the robots are taken to have the same springs, whose common scale is then one "
+            "error of both, and leaves the differences."
+        )
+    if in_encoder_frames(a.units) != in_encoder_frames(b.units):
+        notes.append(MIXED)
+    missing = [
+        f"payload {one.label or 'without a name'} is in {name} alone"
+        for name, here, there in (("A", a, b), ("B", b, a))
+        for one in here.payloads
+        if one.label not in {other.label for other in there.payloads}
+    ]
+    return notes + [f"{sentence[0].upper()}{sentence[1:]}." for sentence in missing]
+
+
+def _pairs(a: Calibration, b: Calibration) -> Iterator[tuple[CalibratedPayload, CalibratedPayload]]:
+    """Payloads by label."""
+    others = {payload.label: payload for payload in b.payloads}
+    for payload in a.payloads:
+        if payload.label in others:
+            yield payload, others[payload.label]
+
+
+def _deviations(a: Calibration, b: Calibration, robot: int, kind: str) -> Group | None:
+    """One kind of one robot's deviations, in the units that reports use."""
+    at = AT[kind]
+    known = (a.sd[robot, at] > 0) & (b.sd[robot, at] > 0)
+    if not known.any():
+        return None
+    shown = SHOWN[kind]
+    places = robot * COUNT + np.arange(at.start, at.stop)[known]
+    entries = next(group.entries for group in GROUPS if group.name == kind)
+
+    def part(one: Calibration) -> tuple[Array, Array]:
+        return (
+            shown.scale * one.units.x[robot, at][known],
+            shown.scale**2 * one.covariance[np.ix_(places, places)],
+        )
+
+    common = tuple(shown.scale * one.scale_sd * one.by_scale[robot, at][known] for one in (a, b))
+    return Group.of(
+        f"robot {robot + 1}, {shown.name}",
+        shown.unit,
+        tuple(entry for entry, there in zip(entries, known, strict=True) if there),
+        part(a),
+        part(b),
+        common=(common[0], common[1]),
+    )
+
+
+def _payload(a: CalibratedPayload, b: CalibratedPayload, a_scale_sd: float, b_scale_sd: float) -> list[Group]:
+    """Mass, first of all, centre of mass, inertia and grasps."""
+    name = f"payload {a.label}, " if a.label else ""
+    (x, x_covariance, by_x), (y, y_covariance, by_y) = _about_com(a), _about_com(b)
+    groups = []
+    for what, unit, entries, at in (
+        ("mass", "kg", ("",), slice(0, 1)),
+        ("centre of mass", "m", XYZ, slice(1, 4)),
+        ("inertia", "kg m^2", PARAMETERS, slice(4, 10)),
+    ):
+        common = a_scale_sd * by_x[at], b_scale_sd * by_y[at]
+        parts = (x[at], x_covariance[at, at]), (y[at], y_covariance[at, at])
+        groups.append(Group.of(f"{name}{what}", unit, entries, *parts, common=common))
+    by_scale = a_scale_sd * a.by_scale[:-10], b_scale_sd * b.by_scale[:-10]
+    return groups + grasp_groups(a.grasps, b.grasps, name, by_scale)
+
+
+def _about_com(payload: CalibratedPayload) -> tuple[Array, Array, Array]:
+    """Mass, centre of mass and inertia, their covariance with the spring scale held, and their derivative by it."""
+    found = carried(payload, 0.0)
+    values = np.concatenate([[found.mass_kg], found.p_1c, inertia_parameters(found.inertia)])
+    return values, found.covariance, found.by_scale
+
+
+Cause = Mapping[str, Any]
+Values = Mapping[str, Any]
+"""A diagnosis' JSON."""
+
+
+def diagnosis_groups(a: Values, b: Values) -> list[Group]:
+    """Parameters of the causes that both name at the same place; those that were chosen, not fitted, are left out."""
+    groups, others = [], {_place(place): place for one in b["causes"] for place in _places(one)}
+    for cause in (place for one in a["causes"] for place in _places(one)):
+        other = others.get(_place(cause))
+        if other is None:
+            continue
+        one, two = cause["parameters"], other["parameters"]
+        names = [n for n in one if n in two and one[n]["se"] is not None and two[n]["se"] is not None]
+        for name in names:
+            groups.append(
+                Group.of(f"{name_of(cause)}, {name}", "", ("",), _value(one[name]), _value(two[name]))
+            )
+    return groups
+
+
+def diagnosis_changes(a: Values, b: Values) -> list[str]:
+    """Verdicts that differ, and causes that one of them names alone, one sentence each."""
+    out = []
+    if a["verdict"] != b["verdict"]:
+        before, after = (VERDICTS[one["verdict"]].lower() for one in (a, b))
+        out.append(f"The verdict was {before} in A and is {after} in B.")
+    for name, here, other_name, there in (("A", a, "B", b), ("B", b, "A", a)):
+        named = {_place(place) for cause in there["causes"] for place in _places(cause)}
+        for cause in here["causes"]:
+            places = _places(cause)
+            alone = [place for place in places if _place(place) not in named]
+            # Of a kind that is nowhere else one sentence is enough.
+            for one in [cause] if len(alone) == len(places) else alone:
+                numbers = ", ".join([name_of(one), *_numbers(one)])
+                out.append(f"Named in {name} alone: {numbers}; {other_name} {_could(one, there)}.")
+    return out
+
+
+def diagnosis_notes(a: Values, b: Values) -> list[str]:
+    """What a reader must know of both."""
+    left = [(name, one["residual"]["chi2_per_n"]) for name, one in (("A", a), ("B", b))]
+    notes = [f"Misfit left (chi2/n): {', '.join(f'{value:.3g} in {name}' for name, value in left)}."]
+    if a["causes"] or b["causes"]:
+        notes.append(
+            "Errors of one cause's parameters are correlated among each other, which their files do not say."
+        )
+    return notes
+
+
+def _places(cause: Cause) -> list[Cause]:
+    """A cause at each of its places; a kind has several."""
+    members = cause.get("members", ())
+    return [{**cause, **member, "members": ()} for member in members] if len(members) > 1 else [cause]
+
+
+def _place(cause: Cause) -> tuple[str, int | None, int | None, str]:
+    return cause["cause"], cause["robot"], cause["joint"], cause["place"]
+
+
+def _value(parameter: Mapping[str, float]) -> tuple[Array, Array]:
+    return np.array([parameter["value"]]), np.array([[parameter["se"] ** 2]])
+
+
+def _numbers(cause: Cause) -> list[str]:
+    return [
+        f"{name} {one['value']:.3g}" + ("" if one["se"] is None else f" +- {one['se']:.2g}")
+        for name, one in cause["parameters"].items()
+    ]
+
+
+def _could(cause: Cause, other: Values) -> str:
+    """Whether the other recordings would have shown it."""
+    limits: Sequence[Values] = [
+        entry
+        for entry in other["detection_limits"]
+        if _place({"place": cause["place"]} | dict(entry)) == _place(cause)
+    ]
+    sizes = {
+        name: size
+        for entry in limits
+        for name, size in entry["parameters"].items()
+        if size is not None and name in cause["parameters"]
+    }
+    if not sizes:
+        return "does not say whether it could have seen that"
+    seen = any(abs(cause["parameters"][name]["value"]) >= size for name, size in sizes.items())
+    listed = ", ".join(f"{name} {size:.2g}" for name, size in sizes.items())
+    return (
+        f"would have noticed {listed}, so it was not there"
+        if seen
+        else f"would only have noticed {listed}, so it may be there as well"
+    )

@@ -1,0 +1,80 @@
+"""Any robot in MJCF or URDF: its model, and logs of its joints in the model's units and order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from discrepancy.joints.model import SerialModel, load_model
+from estimator.errors import InputError
+from mocobot.api.recordings import quiet
+from mocobot_logs.joints.joint_log import JointLog
+from mocobot_logs.joints.joint_map import JointMap
+from mocobot_logs.joints.parse import read_joint_map
+from mocobot_logs.joints.read import open_joint_log, read_joint_log
+
+MAP = "log.toml"
+"""Name of a map that is found where nobody names one: beside the log, or beside the model."""
+GivenModel = SerialModel | Path | str
+GivenLogs = Path | str | JointLog | Iterable[Path | str | JointLog]
+
+
+def read_model(given: GivenModel) -> SerialModel:
+    """A fixed-base tree of hinges and slides, MJCF or URDF.
+
+    Raises:
+        InputError: MuJoCo cannot read it, or it is of another kind.
+    """
+    return given if isinstance(given, SerialModel) else load_model(given)
+
+
+def read_logs(
+    logs: GivenLogs,
+    model: GivenModel,
+    *,
+    map: Path | str | None = None,
+    episode: int | None = None,
+    advance: Callable[[int], object] = quiet,
+) -> list[JointLog]:
+    """Logs in the units and the order of the model's joints; one with long gaps becomes several.
+
+    Args:
+        logs: files of any format that ``convert`` reads, or logs read before.
+        model: the robot, or its file.
+        map: map file (docs/serial/guide.md); ``log.toml`` beside the log or the model if not given.
+        episode: of a LeRobot dataset that holds several.
+        advance: called with 1 after every file.
+
+    Raises:
+        InputError: a file or the map cannot be read, or they do not suit the model.
+    """
+    robot = read_model(model)
+    found: list[JointLog] = []
+    for log in [logs] if isinstance(logs, Path | str | JointLog) else logs:
+        if isinstance(log, JointLog):
+            if log.joints != robot.joints:
+                raise InputError(f"{log.name}: its joints are not those of {robot.path}")
+            found.append(log)
+            continue
+        log_map = map_of(robot, Path(log), map)
+        found += read_joint_log(open_joint_log(log, log_map, episode), log_map)
+        advance(1)
+    return found
+
+
+def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
+    """The file of a log's map."""
+    if given is not None:
+        return Path(given)
+    for beside in (log.parent / MAP, model.path.parent / MAP):
+        if beside.is_file():
+            return beside
+    raise InputError(
+        f"{log}: no map was given (--map), and there is no {MAP} beside it or beside {model.path}; `mocobot map {log} "
+        f"--model {model.path}` drafts one"
+    )
+
+
+def map_of(model: SerialModel, log: Path, given: Path | str | None) -> JointMap:
+    """The map of a log."""
+    return read_joint_map(map_path(model, log, given), model.joints, [bool(s) for s in model.slides])

@@ -1,0 +1,250 @@
+"""Logs to a first verdict: inspect, convert, estimate, calibrate if need be, diagnose, and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from estimator.arm.unit import AT
+from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.errors import InputError
+from estimator.estimate.frames import frames_said
+from estimator.files import write_json, write_text
+from estimator.recording.metadata import FREE
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
+from estimator.statistics import measured
+from mocobot.api.calibration import Calibration, calibrate
+from mocobot.api.conversion import convert, convert_parts
+from mocobot.api.diagnosis import Diagnosis, diagnose
+from mocobot.api.estimation import Estimate, estimate
+from mocobot.api.inspection import inspect
+from mocobot.api.recordings import Say, quiet, read
+from mocobot.checks import CALIBRATION
+from mocobot.options import WatchOptions, made
+from mocobot.results import Folder
+from mocobot_logs.formats import log_kind
+from mocobot_logs.table.parquet import is_recording
+from mocobot_report.page import write_report
+from mocobot_report.sought import NAME
+
+BEYOND, MOST = 3.0, 3
+"""Standard deviations of the prior from which on a robot is said to be off, and how many places are named. Chosen: of
+the some sixty deviations of a healthy team of three, one is that far off in every sixth team."""
+VERDICT = "verdict.txt"
+
+
+@dataclass(repr=False)
+class Watched(Folder):
+    """What a first look found.
+
+    Attributes:
+        lines: the overall verdict.
+        recordings: those that can be used, by the name of their file.
+        converted: names of those that were logs, or whose clocks were corrected.
+        estimate, calibration, diagnosis: None where there is none, and ``lines`` say why.
+    """
+
+    lines: list[str] = field(default_factory=list)
+    recordings: dict[str, Recording] = field(default_factory=dict)
+    converted: list[str] = field(default_factory=list)
+    estimate: Estimate | None = None
+    calibration: Calibration | None = None
+    diagnosis: Diagnosis | None = None
+    result = "watch"
+
+    def of(self, *, free: bool) -> list[Recording]:
+        """Recordings of robots that hold nothing, or of all others."""
+        return [one for one in self.recordings.values() if (one.metadata.trial == FREE) is free]
+
+    @property
+    def good(self) -> bool:
+        """Whether the recordings can be believed, and what they show is understood."""
+        verdict = self.diagnosis and self.diagnosis.verdict
+        return self.estimate is not None and verdict in ("consistent", "explained")
+
+    def __str__(self) -> str:
+        """The overall verdict."""
+        return "\n".join(self.lines)
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Watched of {len(self.recordings)} recordings: {'' if self.good else 'not '}good>"
+
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
+        """Write everything into an existing folder: the diagnosis and the JSON of the others at its top, for the page.
+
+        Args:
+            folder: it.
+            pictures: whether pictures are drawn, too.
+            more: further keys of every JSON.
+
+        Raises:
+            InputError: something cannot be written.
+        """
+        if self.diagnosis is not None:
+            self.diagnosis.write_into(folder, pictures=pictures, **more)
+        if self.estimate is not None:
+            write_json(folder / "estimate.json", self.estimate.to_dict() | more)
+        if self.calibration is not None:
+            write_json(folder / CALIBRATION, self.calibration.to_dict() | more)
+            (folder / "calibration").mkdir()
+            self.calibration.write_into(folder / "calibration", pictures=pictures, **more)
+        for name in self.converted:
+            write_recording(self.recordings[name], folder / "recordings" / f"{name}.parquet")
+        write_text(folder / VERDICT, f"{self}\n")
+
+
+def report(folder: Path | str, out: Path | str | None = None, *, say: Say = quiet) -> Path:
+    """Make one HTML page of a result folder (of ``paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign``).
+
+    Args:
+        folder: of the result.
+        out: page to write; ``report.html`` in the folder if not given.
+        say: takes the name of the stage that begins.
+
+    Returns:
+        The page.
+
+    Raises:
+        InputError: the folder holds no result, or one that cannot be read, or the page cannot be written.
+    """
+    page = Path(folder) / NAME if out is None else Path(out)
+    write_report(Path(folder), page, say)
+    return page
+
+
+def watch(
+    logs: Path | str | Iterable[Path | str],
+    options: WatchOptions | None = None,
+    *,
+    say: Say = quiet,
+    simulated: Callable[[int], object] | None = None,
+    **fields: Any,
+) -> Watched:
+    """Look at recordings or logs once, and say what there is.
+
+    Args:
+        logs: files of recordings, or logs of any format that ``convert`` reads, all of one payload.
+        options: how; ``fields`` are fields of it.
+        say: takes the name of the stage that begins.
+        simulated: called with 1 for every trial that was simulated.
+
+    Raises:
+        InputError: a log that cannot be read.
+    """
+    chosen, seen = made(WatchOptions, options, fields), Watched()
+    for path in [logs] if isinstance(logs, Path | str) else logs:
+        _look(seen, Path(path), chosen.map, say)
+    _conclude(seen, chosen.jobs, say, simulated)
+    return seen
+
+
+def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> None:
+    """Inspect a file, and read what is of use."""
+    say(f"inspecting {path.name}")
+    found = inspect(path, map=log_map)
+    ready = found.ready_for
+    if ready.startswith("ready for: nothing"):
+        why = "; ".join(finding.sentence for finding in found.findings)
+        seen.lines.append(f"{path}: left out, {ready}{f': {why}' if why else ''}.")
+        return
+    is_log, skewed = log_kind(path) != "parquet" or not is_recording(path), getattr(found, "skewed", False)
+    if is_log or skewed:
+        say(f"converting {path.name}")
+    try:
+        recordings, done = _used(path, log_map if is_log else None, is_log=is_log, skewed=skewed)
+    except InputError as error:
+        seen.lines.append(f"{path}: left out, it cannot be used as it is: {error}.")
+        return
+    seen.recordings |= recordings
+    if done:
+        seen.converted += recordings
+        ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
+    seen.lines.append(f"{path}: {ready}.")
+
+
+def _used(
+    path: Path, log_map: Path | str | None, *, is_log: bool, skewed: bool
+) -> tuple[dict[str, Recording], str]:
+    """What can be used of a file, by names, and what was done for it, empty if nothing."""
+    clock, corrected = ("correct", ", clocks corrected") if skewed else ("keep", "")
+    try:
+        if not is_log and not skewed:
+            return {path.stem: read(path)}, ""
+        recording = convert(path, map=log_map, clock=clock).recording
+        return {path.stem: recording}, f"converted{corrected}"
+    except InputError as error:
+        try:
+            parts = convert_parts(path, map=log_map, clock=clock)
+        except InputError:
+            raise error from None
+        many = "the part of it" if len(parts) == 1 else f"the {len(parts)} parts of it"
+        named = {f"{path.stem}.part{k}": part.recording for k, part in enumerate(parts, 1)}
+        return named, f"{many} between gaps converted{corrected}"
+
+
+def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], object] | None) -> None:
+    """Estimate, calibrate if the robots contradict each other, and diagnose, as far as the recordings allow."""
+    carried = seen.of(free=False)
+    if not carried:
+        seen.lines.append("Nothing can be estimated: there is no recording of robots that carry something.")
+        return
+    try:
+        seen.estimate = estimate(carried, say=say)
+        if seen.estimate.contradicts:
+            say("calibrating")
+            seen.calibration = calibrate(carried, seen.of(free=True), say=say)
+            seen.estimate = estimate(carried, calibration=seen.calibration, say=say)
+    except InputError as error:
+        seen.lines.append(f"No estimate: {error}.")
+    if seen.estimate is not None:
+        seen.lines += [payload_line(seen.estimate), _robots(seen.calibration), *seen.estimate.flags]
+    try:
+        seen.diagnosis = diagnose(
+            carried, calibration=seen.calibration, jobs=jobs, say=say, simulated=simulated
+        )
+    except InputError as error:
+        seen.lines.append(f"No diagnosis: {error}.")
+        return
+    named = [cause.sentence for cause in seen.diagnosis.causes]
+    verdict = seen.diagnosis.verdict.replace("_", " ").upper()
+    rest = seen.diagnosis.to_dict()["remains"]
+    seen.lines.append(" ".join([f"Against the simulation: {verdict}.", *named, *rest]))
+
+
+def payload_line(found: Estimate) -> str:
+    """Mass and centre of mass, a sentence."""
+    mass, com = "mass not determined", "centre of mass not determined"
+    if found.mass is not None:
+        mass = "{} +- {} kg".format(*measured(found.mass.mass, found.mass.se))
+    if found.p_1c is not None and found.p_1c_se_m is not None:
+        each = (measured(float(x), float(se)) for x, se in zip(found.p_1c, found.p_1c_se_m, strict=True))
+        com = f"centre of mass ({', '.join(f'{x} +- {se}' for x, se in each)}) m in {{1}}"
+    frames = f", in {frames_said(found.zero_sd_rad)}" if found.zero_sd_rad else ""
+    return f"Payload: {mass}, {com}{frames}."
+
+
+def _robots(found: Calibration | None) -> str:
+    if found is None:
+        return "Robots: they agree with each other as designed."
+    said = "Robots: as designed they contradict each other; they were calibrated on these recordings."
+    return " ".join([said, *_farthest(found), *found.findings])
+
+
+def _farthest(found: Calibration) -> list[str]:
+    """The robots' clearest deviations, a sentence, if any is beyond what was assumed of healthy ones."""
+    far = []
+    for group in shown_groups(found):
+        shown, at = SHOWN[group.name], AT[group.name]
+        rows = zip(found.units.x[:, at], found.sd[:, at], found.prior_sd[:, at], strict=True)
+        for robot, (x, se, prior) in enumerate(rows, start=1):
+            for k in range(len(x)):
+                if prior[k] > 0 and abs(x[k]) > BEYOND * prior[k]:
+                    value = "{} +- {}".format(*measured(shown.scale * x[k], shown.scale * se[k]))
+                    place = f"robot {robot}, {shown.name} {group.entries[k]}: {value} {shown.unit}"
+                    far.append((abs(x[k]) / prior[k], place))
+    places = [place for _, place in sorted(far, reverse=True)[:MOST]]
+    return [f"Farther off than robots are: {'; '.join(places)}."] if places else []

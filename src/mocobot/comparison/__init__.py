@@ -1,1 +1,0 @@
-"""Two results side by side: what differs by more than its errors."""
