@@ -26,11 +26,11 @@ from independent.generate import ANSWERS, FORMS, Noise, generate
 from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
 from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.scene.scene import build_team
-from sealed import store
-from sealed.backgrounds import BACKGROUNDS, Background
+from sealed import sets
 from sealed.campaign import apart, costs, engine, verdict_on
-from sealed.draw import largest
+from sealed.limits import BACKGROUNDS, Background
 from sealed.score import family_of
+from sealed.sets import largest
 from sealed.tables import misses, tables
 
 Kind = Literal["clean", "single", "forms", "pairs"]
@@ -146,7 +146,7 @@ def diagnosed(request: IndependentSet, out: Path, noise: Noise) -> None:
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
     result |= costs() | {"cpu_s": costs()["cpu_s"] - begun}
-    store.append(out / "results.jsonl", result)
+    sets.append(out / "results.jsonl", result)
     print(f"{request.key}: {said}", flush=True)
 
 
@@ -207,7 +207,7 @@ class Options:
 
 def main(options: Options) -> None:
     """Run, or print what was run."""
-    results = store.read(options.out / "results.jsonl")
+    results = sets.read(options.out / "results.jsonl")
     if options.tables or options.misses:
         print(tables(results) if options.tables else misses(results))
         return

@@ -25,15 +25,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 import tyro
 
-from arm import machine
-from arm.sets import ArmSet, Kind
-from arm.sets import make as make_arm
 from discrepancy.evidence.odds import borne_out, odds_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.diagnose import diagnose, labels_of
 from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
+from joints import arm as machine
 from joints.foreign import make, thinned
+from joints.sets import ArmSet, Kind
+from joints.sets import make as make_arm
 from mocobot_logs.joints.joint_log import JointLog
 from scoring import SURE, changed_settings, log_score, median_and_most
 

@@ -20,8 +20,8 @@ import mocobot
 from discrepancy.team import diagnosis
 from mocobot_sim.errors import TrialError
 from scoring import AS_THEY_ARE, changed_settings
-from sealed import store
-from sealed.law_score import score_laws
+from sealed import sets
+from sealed.score import score_laws
 from sealed.sets import SealedSet
 
 T = TypeVar("T")
@@ -57,15 +57,15 @@ class How:
 
 def simulate_all(requests: Sequence[SealedSet], how: How) -> None:
     """Simulate what is not there yet; what cannot be simulated is listed in ``not_simulated.jsonl``."""
-    failed = {line["key"] for line in store.read(how.out / "not_simulated.jsonl")}
-    todo = [r for r in requests if r.key not in failed and not store.is_simulated(r, how.out)]
+    failed = {line["key"] for line in sets.read(how.out / "not_simulated.jsonl")}
+    todo = [r for r in requests if r.key not in failed and not sets.is_simulated(r, how.out)]
     apart(todo, lambda request: _simulate(request, how.out), how.jobs)
 
 
 def diagnose_all(requests: Sequence[SealedSet], how: How) -> None:
     """Diagnose what was simulated and has no result of this label yet."""
-    finished = {line["key"] for line in store.read(how.path)}
-    todo = [r for r in requests if r.key not in finished and store.is_simulated(r, how.out)]
+    finished = {line["key"] for line in sets.read(how.path)}
+    todo = [r for r in requests if r.key not in finished and sets.is_simulated(r, how.out)]
     apart(todo, lambda request: _diagnose(request, how), how.jobs)
 
 
@@ -82,7 +82,7 @@ def simulate_and_diagnose(requests: Sequence[SealedSet], how: How) -> None:
 
 def change_settings(requests: Sequence[SealedSet], how: How) -> None:
     """Every other set with ten settings of the engine halved, the others with them doubled, each by the rows alone."""
-    done = {line["key"] for line in store.read(how.path)}
+    done = {line["key"] for line in sets.read(how.path)}
     for request in requests:
         simulate_all([request], how)
         changes: Iterator[tuple[str, Any]] = changed_settings(
@@ -102,11 +102,11 @@ def _changed(request: SealedSet, how: How, key: str, words: str, settings: Any) 
 def _simulate(request: SealedSet, out: Path) -> None:
     start = time.process_time()
     try:
-        store.simulate(request, out)
+        sets.simulate(request, out)
         said = f"{time.process_time() - start:.1f} s of CPU"
     except Exception as error:  # one that cannot be simulated must not end the campaign
         cause = str(error) if isinstance(error, TrialError) else traceback.format_exc()
-        store.append(out / "not_simulated.jsonl", {"key": request.key, "error": cause})
+        sets.append(out / "not_simulated.jsonl", {"key": request.key, "error": cause})
         said = f"not simulated: {error}"
     print(f"{request.key}: {said}", flush=True)
 
@@ -119,19 +119,19 @@ def _diagnose(
     loop = how.closed_loop if closed_loop is None else closed_loop
     _stop_after(how.cpu_s)
     try:
-        result["verdict"] = verdict_on(store.recordings_of(request, how.out), excluded, closed_loop=loop)
+        result["verdict"] = verdict_on(sets.recordings_of(request, how.out), excluded, closed_loop=loop)
         said = result["verdict"]["verdict"]
     except Exception:
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
     result |= costs() | (more or {})
-    result["truth"] = store.truth_of(request, how.out)  # opened after the verdict
+    result["truth"] = sets.truth_of(request, how.out)  # opened after the verdict
     if not result["error"]:
-        scores = score_laws(result, store.recordings_of(request, how.out))
+        scores = score_laws(result, sets.recordings_of(request, how.out))
         result["law_scores"] = [asdict(one) for one in scores]
-    store.append(how.path, result)
+    sets.append(how.path, result)
     if not how.keep:
-        store.forget(request, how.out)
+        sets.forget(request, how.out)
     print(f"{result['key']}: {said}, {result['cpu_s']:.1f} s of CPU", flush=True)
 
 

@@ -31,9 +31,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import tyro
 
-from sealed import store
-from sealed.backgrounds import Background
+from sealed import sets
 from sealed.campaign import How, change_settings, diagnose_all, simulate_all, simulate_and_diagnose
+from sealed.limits import Background
 from sealed.sets import TIMESTEP_S, Kind, SealedSet, plan
 from sealed.tables import misses, tables
 
@@ -114,9 +114,9 @@ def main(options: Options) -> None:
     label = options.label or ("settings" if options.settings else "results")
     how = How(options.out, label, options.jobs, options.cpu_s, options.closed_loop, options.keep)
     if options.tables or options.misses:
-        print((tables if options.tables else misses)(store.read(how.path)))
+        print((tables if options.tables else misses)(sets.read(how.path)))
         return
-    requests = store.kept(options.out) if options.kept else planned(options)
+    requests = sets.kept(options.out) if options.kept else planned(options)
     if options.list:
         print("\n".join(request.key for request in requests))
     elif options.settings:

@@ -4,9 +4,7 @@ import pytest
 
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.tolerances import default_tolerances
-from hidden.generator import HiddenSet, generate
-from hidden.limits import LIMITS
-from hidden.schedule import Schedule
+from hidden import LIMITS, HiddenSet, Schedule, generate
 from mocobot.campaign.limits import FORCE, push_limits
 
 

@@ -7,18 +7,27 @@ import numpy as np
 import pytest
 
 from discrepancy.team.causes import CAUSES
-from hidden.schedule import Schedule
+from hidden import Schedule
 from mocobot.campaign.summary import interval
 from mocobot_sim.effects import EFFECTS
 from scoring import AS_THEY_ARE, log_score
-from sealed import campaign, store
-from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
-from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
-from sealed.forms.masses import MassDrift, MassOfTrials
-from sealed.limits import LIMITS
-from sealed.registry import FORMS, LISTED, UNLISTED
+from sealed import campaign, sets
+from sealed.limits import BACKGROUNDS, LIMITS, limit_over_nominal, tolerated
+from sealed.payload import MassDrift, MassOfTrials
 from sealed.score import score
-from sealed.sets import KINDS, generate, plan
+from sealed.sets import (
+    CATALOGUE,
+    FORMS,
+    KINDS,
+    LISTED,
+    NOWHERE,
+    OTHER,
+    UNLISTED,
+    family,
+    generate,
+    largest,
+    plan,
+)
 from sealed.tables import misses, tables
 
 TINY = Schedule(randoms=1, vias=1, periodic_s=None, hold_s=None)
@@ -124,13 +133,13 @@ def test_a_wider_background_has_the_same_draws():
 def test_same_seed_same_bits(tmp_path):
     """Recordings and truth, of a team with everything a little off and an effect of another form."""
     request = replace(plan("forms", 3, "x3", 4.0, "driven_lugre"), schedule=TINY)
-    truths = [store.simulate(request, tmp_path / name) for name in "ab"]
-    assert truths[0] == truths[1] == store.truth_of(request, tmp_path / "a")
-    files = [store.recordings_of(request, tmp_path / name) for name in "ab"]
+    truths = [sets.simulate(request, tmp_path / name) for name in "ab"]
+    assert truths[0] == truths[1] == sets.truth_of(request, tmp_path / "a")
+    files = [sets.recordings_of(request, tmp_path / name) for name in "ab"]
     assert len(files[0]) == 1
     assert [f.read_bytes() for f in files[0]] == [f.read_bytes() for f in files[1]]
-    assert store.kept(tmp_path / "a") == [request]
-    other = store.simulate(replace(request, seed=4), tmp_path / "c")
+    assert sets.kept(tmp_path / "a") == [request]
+    other = sets.simulate(replace(request, seed=4), tmp_path / "c")
     assert other["background"] != truths[0]["background"]
     (effect,) = truths[0]["effects"]
     assert effect["answer"]["cause"] == "joint_friction"
@@ -403,7 +412,7 @@ def test_a_diagnosis_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(campaign.store, "truth_of", lambda request, out: truth)
     how = campaign.How(tmp_path, cpu_s=1)
     campaign.diagnose_all([plan("clean", 0), plan("clean", 1)], how)
-    results = store.read(how.path)
+    results = sets.read(how.path)
     assert len(results) == 2
     assert all("TimeoutError" in result["error"] for result in results)
     assert all(result["cpu_s"] > 0.9 for result in results)

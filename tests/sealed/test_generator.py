@@ -10,11 +10,7 @@ import pytest
 import discrepancy.team.causes
 import mocobot_sim.effects
 from discrepancy.team.causes import CAUSES
-from hidden.draw import ground_of
-from hidden.generator import HiddenSet, generate
-from hidden.limits import LIMITS, pendulum_limit_kg
-from hidden.schedule import Schedule
-from hidden.sealed import Sealed
+from hidden import LIMITS, HiddenSet, Schedule, Sealed, generate, ground_of, pendulum_limit_kg
 from mocobot.campaign.draw import draw_effect
 from mocobot_sim.effects import EFFECTS
 

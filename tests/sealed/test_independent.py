@@ -5,13 +5,11 @@ import pytest
 
 from estimator.arm.design import load_design
 from estimator.recording.parquet import write_recording
-from independent.arm.delta import OUT, Legs, driven_angles, legs_of, link_directions, wrist_position
-from independent.arm.dynamics import arm_load
-from independent.as_built import draw_as_built
-from independent.effects.on_payload import Pendulum, Push
-from independent.effects.registry import FORMS, NAMES, PLAIN
-from independent.generate import generate
-from independent.motion import random_motion
+from independent.arm import OUT, Legs, arm_load, driven_angles, legs_of, link_directions, wrist_position
+from independent.bodies import MODELS, draw_as_built, load_payload
+from independent.draw import FORMS, NAMES, PLAIN
+from independent.effects import Pendulum, Push
+from independent.generate import generate, spring_readings
 from independent.numerics import (
     FINE_HZ,
     bristles,
@@ -22,9 +20,7 @@ from independent.numerics import (
     play,
     second_derivative,
 )
-from independent.payload import MODELS, load_payload
-from independent.sensors import spring_readings
-from independent.team import Truth, carry, place_bases, scene_of
+from independent.team import Truth, carry, place_bases, random_motion, scene_of
 
 DESIGN = load_design(MODELS / "omnid" / "design.toml")
 LEGS = Legs(

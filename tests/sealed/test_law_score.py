@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from discrepancy.team.laws.places import places_of
-from sealed.law_score import FORMULAS, PLACES, VARIABLES, score_laws
-from sealed.law_truth import SHAPES
-from sealed.registry import OUTSIDE, UNLISTED
+from sealed.score import FORMULAS, PLACES, SHAPES, VARIABLES, score_laws
+from sealed.sets import OUTSIDE, UNLISTED
 from team_case import exact
 
 NAMES = {form.cause for form in (*UNLISTED, *OUTSIDE)}
@@ -50,7 +49,7 @@ def law(recording, function="square", of="tau_2_1", factor=1.0, offset=0.0):
 
 
 def scored(monkeypatch, *causes):
-    monkeypatch.setattr("sealed.law_score.read_recording", lambda path: exact().carried.recording)
+    monkeypatch.setattr("sealed.score.read_recording", lambda path: exact().carried.recording)
     truth = {"effects": [EFFECT], "gimbal_axes_1": np.tile(np.eye(3), (3, 1, 1)).tolist()}
     (one,) = score_laws({"truth": truth, "verdict": {"causes": list(causes)}}, ["one"])
     return one
@@ -72,7 +71,7 @@ def test_the_nearest_of_several_counts(monkeypatch):
 def test_a_force_is_one_law_for_each_axis(monkeypatch):
     """Each is held against its own component."""
     recording = exact().carried.recording
-    monkeypatch.setattr("sealed.law_score.read_recording", lambda path: recording)
+    monkeypatch.setattr("sealed.score.read_recording", lambda path: recording)
     along = {"along_x_m": 0.6, "along_y_m": 0.0, "along_z_m": -0.8}
     effect = {
         "cause": "growing_push", "parameters": {"rate_Nps": 0.05} | along,

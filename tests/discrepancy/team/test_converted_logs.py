@@ -16,7 +16,7 @@ from estimator.estimate.payload import estimate_payload
 from estimator.estimate.principal import inertia_parameters
 from estimator.recording.sampling import Sampling
 from estimator.rigid_team.residual import Shared
-from hidden.logger import Logger
+from hidden import Logger
 from team_case import exact, residual_of
 
 LOGGERS = {

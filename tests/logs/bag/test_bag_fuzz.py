@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 import bags
 from bags import NO_SUMMARY, UNCHUNKED, Team, raw_mcap, rosbags_bag
 from estimator.errors import InputError
-from fuzzing.damage import damaged
+from fuzzing import damaged
 from mocobot_logs.bag.read import open_bag
 from mocobot_logs.log import collect
 
