@@ -3,7 +3,6 @@
     python benchmarks/joints/campaign.py --part panda|bare|shapes|clean-shapes --first SEED --draws N --out DIR
     python benchmarks/joints/campaign.py --part panda --kind unlisted|left-out: laws of no table, causes taken out of it
     python benchmarks/joints/campaign.py --part panda --noise 2e-4 0.3: coarse sensors
-    python benchmarks/joints/campaign.py --first SEED --settings: ten numbers of the engine, halved and doubled
     python benchmarks/joints/campaign.py --out DIR --tables
 
 It goes on where it was stopped. Seconds are of CPU.
@@ -15,7 +14,7 @@ import json
 import sys
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -26,7 +25,7 @@ import numpy as np
 import tyro
 
 from discrepancy.evidence.odds import borne_out, odds_of
-from discrepancy.evidence.settings import SETTINGS, Settings
+from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.diagnose import diagnose, labels_of
 from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
@@ -35,7 +34,7 @@ from joints.foreign import make, thinned
 from joints.sets import ArmSet, Kind
 from joints.sets import make as make_arm
 from mocobot_logs.joints.joint_log import JointLog
-from scoring import SURE, changed_settings, log_score, median_and_most
+from scoring import SURE, log_score, median_and_most
 
 RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
@@ -58,7 +57,6 @@ class Options:
         draws: how many sets.
         out: where results go.
         tables: print the tables of the results instead.
-        settings: diagnose one set with ten settings halved, the next with them doubled, and print what changes.
     """
 
     part: Literal["panda", "bare", "shapes", "clean-shapes"] = "panda"
@@ -69,7 +67,6 @@ class Options:
     draws: int = 10
     out: Path = Path("out/joints")
     tables: bool = False
-    settings: bool = False
 
 
 def main(options: Options) -> None:
@@ -80,9 +77,6 @@ def main(options: Options) -> None:
         print(tables(results))
         return
     options.out.mkdir(parents=True, exist_ok=True)
-    if options.settings:
-        print(f"{sum(_changes(options))} verdicts change")
-        return
     done = {(r["part"], r["seed"], r["rate_hz"]) for r in results}
     for seed in range(options.first, options.first + options.draws):
         left = [r for r in RATES_HZ.get(options.part, (250.0,)) if (options.part, seed, r) not in done]
@@ -102,22 +96,6 @@ def main(options: Options) -> None:
             print("\n".join(told_of(result)), flush=True)
 
 
-def _changes(options: Options) -> Iterator[bool]:
-    """Whether each verdict changes with a setting."""
-    for seed, factor in ((options.first, 0.5), (options.first + 1, 2.0)):
-        made = _arm(options, seed)
-        usual = _said(_found(*made))
-        print(f"set {seed}: {sorted(usual)}", flush=True)
-        for words, settings in changed_settings(options.first, factor):
-            said = _said(_found(*made, settings))
-            print(f"  {words}: {sorted(said) if said != usual else 'same'}", flush=True)
-            yield said != usual
-
-
-def _said(found: Item) -> set[tuple[str, ...]]:
-    return {tuple(c["every"][0][0]) for c in found["causes"] if c["every"][0][0][1]}
-
-
 def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
     request = replace(ArmSet.of(seed, options.kind, options.factor), noise=options.noise)
     made, model = make_arm(request, options.out), machine.nominal(options.out)
@@ -129,11 +107,11 @@ def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item
     return model, [made.log], truth
 
 
-def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Settings = SETTINGS) -> Item:
+def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
     """Causes with all that is told of them, values, the search's steps, and what further causes would gain."""
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
-    outcome = diagnose(model, logs, settings, say=lambda line: steps.append(str(line)), given=given)
+    outcome = diagnose(model, logs, SETTINGS, say=lambda line: steps.append(str(line)), given=given)
     state, causes = borne_out(outcome.search, outcome.state), []
     for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]

@@ -9,17 +9,14 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
-from unittest.mock import patch
 
 import discrepancy
 import mocobot
-from discrepancy.team import diagnosis
 from mocobot_sim.errors import TrialError
-from scoring import AS_THEY_ARE, changed_settings
 from sealed import sets
 from sealed.score import score_laws
 from sealed.sets import SealedSet
@@ -80,25 +77,6 @@ def simulate_and_diagnose(requests: Sequence[SealedSet], how: How) -> None:
     apart(requests, work, how.jobs)
 
 
-def change_settings(requests: Sequence[SealedSet], how: How) -> None:
-    """Every other set with ten settings of the engine halved, the others with them doubled, each by the rows alone."""
-    done = {line["key"] for line in sets.read(how.path)}
-    for request in requests:
-        simulate_all([request], how)
-        changes: Iterator[tuple[str, Any]] = changed_settings(
-            requests[0].seed, 2.0 if request.seed % 2 else 0.5
-        )
-        for words, settings in [(AS_THEY_ARE, None), *changes]:
-            key = f"{request.key}, {words}"
-            if key not in done:
-                apart([request], lambda one: _changed(one, how, key, words, settings), 1)  # noqa: B023
-
-
-def _changed(request: SealedSet, how: How, key: str, words: str, settings: Any) -> None:
-    with patch.object(diagnosis, "SETTINGS", settings or diagnosis.SETTINGS):
-        _diagnose(request, how, {"key": key, "change": words}, closed_loop=False)
-
-
 def _simulate(request: SealedSet, out: Path) -> None:
     start = time.process_time()
     try:
@@ -111,20 +89,19 @@ def _simulate(request: SealedSet, out: Path) -> None:
     print(f"{request.key}: {said}", flush=True)
 
 
-def _diagnose(
-    request: SealedSet, how: How, more: dict[str, Any] | None = None, *, closed_loop: bool | None = None
-) -> None:
+def _diagnose(request: SealedSet, how: How) -> None:
     result: dict[str, Any] = {"key": request.key, "set": request.to_dict(), "engine": engine(), "error": None}
     excluded = request.names if request.kind == "left-out" else ()
-    loop = how.closed_loop if closed_loop is None else closed_loop
     _stop_after(how.cpu_s)
     try:
-        result["verdict"] = verdict_on(sets.recordings_of(request, how.out), excluded, closed_loop=loop)
+        result["verdict"] = verdict_on(
+            sets.recordings_of(request, how.out), excluded, closed_loop=how.closed_loop
+        )
         said = result["verdict"]["verdict"]
     except Exception:
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
-    result |= costs() | (more or {})
+    result |= costs()
     result["truth"] = sets.truth_of(request, how.out)  # opened after the verdict
     if not result["error"]:
         scores = score_laws(result, sets.recordings_of(request, how.out))

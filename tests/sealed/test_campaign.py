@@ -10,7 +10,7 @@ from discrepancy.team.causes import CAUSES
 from hidden import Schedule
 from mocobot.campaign.summary import interval
 from mocobot_sim.effects import EFFECTS
-from scoring import AS_THEY_ARE, log_score
+from scoring import log_score
 from sealed import campaign, sets
 from sealed.limits import BACKGROUNDS, LIMITS, limit_over_nominal, tolerated
 from sealed.payload import MassDrift, MassOfTrials
@@ -362,19 +362,6 @@ def test_tables_and_misses_of_a_small_campaign():
     assert len(misses(results).splitlines()) == 3
 
 
-def test_verdicts_that_a_setting_changes_are_counted():
-    named = [_named() | {"place": "robot 2, joint 1"}]
-    results = [
-        _result([_effect()], causes) | {"key": f"{key}, {words}", "change": words}
-        for key, words, causes in (
-            ("1", AS_THEY_ARE, named), ("1", "apart 3 -> 6", []), ("2", AS_THEY_ARE, []), ("2", "apart 3 -> 6", [])
-        )
-    ]  # fmt: skip
-    text = tables(results)
-    assert "apart 3 -> 6: 1 of 2 verdicts change" in text
-    assert "| apart 3 -> 6 | 2 | 0 of 2 |" in text
-
-
 def test_what_is_wrong_with_certainty_costs_no_more_than_a_thousandth():
     assert log_score([(1.0, False)]) == pytest.approx(np.log(1e-3))
     assert log_score([(0.8, True), (0.3, False)]) == pytest.approx(np.mean(np.log([0.8, 0.7])))
@@ -390,7 +377,7 @@ def test_simulation_and_diagnosis_are_apart(tmp_path, monkeypatch):
     """The peak memory of a diagnosis is that of its process: a simulation must not count."""
     done = tmp_path / "done"
     note = lambda what: done.open("a").write(f"{what} {os.getpid()}\n")  # noqa: E731
-    monkeypatch.setattr(campaign.store, "is_simulated", lambda request, out: done.exists())
+    monkeypatch.setattr(campaign.sets, "is_simulated", lambda request, out: done.exists())
     monkeypatch.setattr(campaign, "_simulate", lambda request, out: note("simulate"))
     monkeypatch.setattr(campaign, "_diagnose", lambda *rest, **how: note("diagnose"))
     campaign.simulate_and_diagnose([plan("clean", 0)], campaign.How(tmp_path))
@@ -408,31 +395,11 @@ def test_a_diagnosis_that_takes_too_long_is_given_up(tmp_path, monkeypatch):
 
     truth = _result([], [])["truth"]
     monkeypatch.setattr(campaign, "verdict_on", verdict_on)
-    monkeypatch.setattr(campaign.store, "is_simulated", lambda request, out: True)
-    monkeypatch.setattr(campaign.store, "truth_of", lambda request, out: truth)
+    monkeypatch.setattr(campaign.sets, "is_simulated", lambda request, out: True)
+    monkeypatch.setattr(campaign.sets, "truth_of", lambda request, out: truth)
     how = campaign.How(tmp_path, cpu_s=1)
     campaign.diagnose_all([plan("clean", 0), plan("clean", 1)], how)
     results = sets.read(how.path)
     assert len(results) == 2
     assert all("TimeoutError" in result["error"] for result in results)
     assert all(result["cpu_s"] > 0.9 for result in results)
-
-
-def test_settings_are_halved_and_doubled_one_by_one(tmp_path, monkeypatch):
-    seen = tmp_path / "seen"
-    own = campaign.diagnosis.SETTINGS
-    monkeypatch.setattr(campaign, "simulate_all", lambda requests, how: None)
-
-    def diagnosed(request, how, more, *, closed_loop):
-        now = campaign.diagnosis.SETTINGS
-        changed = [n for n, x in vars(now).items() if x != getattr(own, n)]
-        seen.open("a").write(f"{request.seed} {more['change']} {changed}\n")
-
-    monkeypatch.setattr(campaign, "_diagnose", diagnosed)
-    campaign.change_settings([plan("clean", 0), plan("clean", 1)], campaign.How(tmp_path))
-    lines = seen.read_text().splitlines()
-    assert len(lines) == 22
-    assert [line.endswith("[]") for line in lines].count(True) >= 2
-    first, other = (line.split() for line in (lines[1], lines[12]))
-    assert first[1] == other[1]
-    assert float(first[4]) < float(first[2]) < float(other[4])
