@@ -58,12 +58,18 @@ class Form(Effect):
         size: the parameter that makes it larger; its trace is proportional to it as long as it is small.
         either_sign: whether it is drawn with either sign.
         size_is_known: whether the answer has this parameter, too, by the same name and of the same value.
+        draws: parameters besides place and size that are drawn evenly, and between what.
+        of: of a law that nobody has listed, what is wrong there.
+        formula: of such a law its variables, its formula with the parameters in braces, and its unit.
     """
 
     answer: ClassVar[str | None] = None
     size: ClassVar[str]
     either_sign: ClassVar[bool] = False
     size_is_known: ClassVar[bool] = False
+    draws: ClassVar[dict[str, tuple[float, float]]] = {}
+    of: ClassVar[str] = ""
+    formula: ClassVar[tuple[list[str], str, str] | None] = None
 
     @classmethod
     def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
@@ -74,7 +80,7 @@ class Form(Effect):
     @classmethod
     def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         """Parameters besides place and size, drawn."""
-        return {}
+        return {name: float(rng.uniform(*between)) for name, between in cls.draws.items()}
 
     def known(self) -> dict[str, float]:
         """Parameters of the answer whose true value the form has, by the catalogue's names."""
@@ -83,16 +89,18 @@ class Form(Effect):
     def law(self) -> dict[str, Any] | None:
         """What nobody has listed: ``place``, ``of`` (what is wrong there), ``variables``, ``formula``, ``amplitude``,
         ``unit``, and ``along`` where there is a direction; None for a form of a listed cause."""
-        return None
-
-    def told(
-        self, of: str, variables: list[str], formula: str, unit: str, along: list[float] | None = None
-    ) -> dict[str, Any]:
-        """Such a law, ``size`` being its amplitude."""
+        if self.formula is None:
+            return None
+        variables, formula, unit = self.formula
         place = {name: getattr(self, name) for name in self.place_names()}
-        direction = {} if along is None else {"along": along}
-        return {"place": place, "of": of, **direction, "variables": variables, "formula": formula,
-                "amplitude": getattr(self, self.size), "unit": unit}  # fmt: skip
+        along = self.along()
+        law = {"place": place, "of": self.of} | ({} if along is None else {"along": along})
+        law |= {"variables": variables, "formula": formula.format(**vars(self))}
+        return law | {"amplitude": getattr(self, self.size), "unit": unit}
+
+    def along(self) -> list[float] | None:
+        """Direction of an unlisted law that has one."""
+        return None
 
     def xyz(self, name: str) -> np.ndarray:
         """Three parameters that are a vector [m], shape (3,)."""

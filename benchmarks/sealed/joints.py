@@ -139,20 +139,13 @@ class BoucWenSpring(Form):
     ranges: ClassVar = {
         "force_Nm": (0.0, 20.0), "yield_rad": (1e-5, 0.1), "beta": (0.5, 1.0), "exponent": (1.0, 5.0),
     }  # fmt: skip
+    draws: ClassVar = {"yield_rad": (3e-4, 3e-3), "beta": (0.5, 0.8), "exponent": (1.0, 2.0)}
     robot: int
     joint: int
     force_Nm: float
     yield_rad: float
     beta: float
     exponent: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {
-            "yield_rad": float(rng.uniform(3e-4, 3e-3)),
-            "beta": float(rng.uniform(0.5, 0.8)),
-            "exponent": float(rng.uniform(1.0, 2.0)),
-        }
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         law = BoucWen(self.force_Nm, self.yield_rad, self.beta, self.exponent)
@@ -181,13 +174,10 @@ class SecondOrderTorqueLag(Form):
     answer = "torque_lag"
     size, size_is_known = "time_constant_s", True
     ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 5.0)}
+    draws: ClassVar = {"damping_ratio": (0.6, 1.2)}
     robot: int
     time_constant_s: float
     damping_ratio: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"damping_ratio": float(rng.uniform(0.6, 1.2))}
 
     def readers(self, trial_number: int | None) -> Sequence[Reader]:
         return [_late(self.robot, (1, 2, 3), self.time_constant_s, self.damping_ratio)]
@@ -227,13 +217,10 @@ class SlowBaseCompliance(Form):
     answer = "base_compliance"
     size, size_is_known = "compliance_m_per_N", True
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.02, 10.0)}
+    draws: ClassVar = {"relaxation_s": (0.03, 0.15)}
     robot: int
     compliance_m_per_N: float
     relaxation_s: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"relaxation_s": float(rng.uniform(0.03, 0.15))}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
@@ -249,13 +236,10 @@ class SlowGrasp(Form):
     size, size_is_known = "compliance_m_per_N", True
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "relaxation_s": (0.02, 10.0)}
     on_payload = True
+    draws: ClassVar = {"relaxation_s": (0.03, 0.15)}
     robot: int
     compliance_m_per_N: float
     relaxation_s: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"relaxation_s": float(rng.uniform(0.03, 0.15))}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
@@ -376,14 +360,11 @@ class LateCreep(Form):
     answer = "base_creep"
     size = "speed_mps"
     ranges: ClassVar = {"speed_mps": (0.0, 1e-2), "start_s": (0.0, 1e6)}
+    draws: ClassVar = {"heading_rad": (-np.pi, np.pi), "start_s": (10.0, 25.0)}
     robot: int
     speed_mps: float
     heading_rad: float
     start_s: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"heading_rad": float(rng.uniform(-np.pi, np.pi)), "start_s": float(rng.uniform(10.0, 25.0))}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene, TOLERANCE)

@@ -130,12 +130,9 @@ class TurningDrag(Form):
     size, size_is_known = "coefficient_Ns_per_m", True
     on_payload = True
     ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3), "reach_m": (0.0, 10.0)}
+    draws: ClassVar = {"reach_m": (0.2, 0.6)}
     coefficient_Ns_per_m: float
     reach_m: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"reach_m": float(rng.uniform(0.2, 0.6))}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         c, turn = self.coefficient_Ns_per_m, self.coefficient_Ns_per_m * self.reach_m**2
@@ -150,12 +147,9 @@ class QuadraticDrag(Form):
     size = "coefficient_Ns2_per_m2"
     on_payload = True
     ranges: ClassVar = {"coefficient_Ns2_per_m2": (0.0, 1e4), "reach_m": (0.0, 10.0)}
+    draws: ClassVar = {"reach_m": (0.1, 0.4)}
     coefficient_Ns2_per_m2: float
     reach_m: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"reach_m": float(rng.uniform(0.1, 0.4))}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         c, turn = self.coefficient_Ns2_per_m2, self.coefficient_Ns2_per_m2 * self.reach_m**3
@@ -174,13 +168,10 @@ class PowerDrag(Form):
     size = "coefficient"
     on_payload = True
     ranges: ClassVar = {"coefficient": (0.0, 1e4), "exponent": (1.0, 2.0), "reach_m": (0.0, 10.0)}
+    draws: ClassVar = {"exponent": (1.3, 1.7), "reach_m": (0.1, 0.4)}
     coefficient: float
     exponent: float
     reach_m: float
-
-    @classmethod
-    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
-        return {"exponent": float(rng.uniform(1.3, 1.7)), "reach_m": float(rng.uniform(0.1, 0.4))}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         c, turn = self.coefficient, self.coefficient * self.reach_m ** (self.exponent + 1.0)

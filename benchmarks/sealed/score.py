@@ -20,8 +20,9 @@ from mocobot.campaign.summary import Score, match
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.scene.models import omnid_design
 from scoring import SURE
-from sealed.forces import SCRATCH_RAD, SLACK_RAD, SOFT_NM, YIELD_NM
+from sealed.forces import SLACK_RAD
 from sealed.form import BoucWen, Play
+from sealed.readings import SCRATCH_RAD, SOFT_NM, YIELD_NM
 
 Item = Mapping[str, Any]
 LARGE = 4.0

@@ -30,133 +30,43 @@ from mocobot_sim.scene.soft import row_mass_kg, row_relaxation_s
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
-from sealed.forces import (
-    CableSpring,
-    Cogging,
-    CubicSpring,
-    DoorCloser,
-    FineInterpolation,
-    GrowingPush,
-    Gyroscope,
-    LooseBridge,
-    ScratchedDisc,
-    Shaker,
-    ShiftingLoad,
-    SinkingBase,
-    SlackHose,
-    SoftSaturation,
-)
+from sealed import forces, readings
+from sealed import joints as at_joints
+from sealed import payload as at_payload
 from sealed.form import Form, Ground
-from sealed.joints import (
-    BoucWenSpring,
-    DrivenDahl,
-    DrivenLugre,
-    GimbalDahl,
-    GimbalLugre,
-    LateCreep,
-    SecondOrderTorqueLag,
-    SingleTorqueLag,
-    SlowBaseCompliance,
-    SlowGrasp,
-    SoftPlay,
-    TurningGrasp,
-)
 from sealed.limits import BACKGROUNDS, LIMITS, Background, limit_over_nominal, tolerated, units_of
-from sealed.payload import (
-    DoublePendulum,
-    HalfSinePush,
-    MassDrift,
-    MassOfTrials,
-    PayloadCable,
-    PowerDrag,
-    QuadraticDrag,
-    RampPush,
-    RobotCable,
-    RubberCord,
-    StiffeningStrap,
-    TurningDrag,
-    UnequalPendulum,
-    in_every_trial,
-)
-from sealed.readings import (
-    AngleInTorque,
-    CrossTalk,
-    CyclicPhi,
-    DeadBand,
-    DropoutsPhi,
-    DropoutsTheta,
-    EccentricPhi,
-    EccentricTheta,
-    EncoderBacklash,
-    QuadraticReading,
-    Saturation,
-    SlippingZero,
-    SoftEncoderMount,
-    TorqueBacklash,
-    TorqueHum,
-    TorqueRamp,
-    TorqueWalk,
-    WarmingScale,
-    WarmingZero,
-)
 
 LISTED: tuple[type[Form], ...] = (
-    DrivenLugre,
-    DrivenDahl,
-    GimbalLugre,
-    GimbalDahl,
-    BoucWenSpring,
-    SoftPlay,
-    SlowGrasp,
-    TurningGrasp,
-    SlowBaseCompliance,
-    LateCreep,
-    RampPush,
-    HalfSinePush,
-    DoublePendulum,
-    UnequalPendulum,
-    SecondOrderTorqueLag,
-    SingleTorqueLag,
-    PayloadCable,
-    RobotCable,
-    StiffeningStrap,
-    RubberCord,
-    TurningDrag,
-    PowerDrag,
-    MassDrift,
-    MassOfTrials,
-)
+    at_joints.DrivenLugre, at_joints.DrivenDahl, at_joints.GimbalLugre, at_joints.GimbalDahl,
+    at_joints.BoucWenSpring, at_joints.SoftPlay, at_joints.SlowGrasp, at_joints.TurningGrasp,
+    at_joints.SlowBaseCompliance, at_joints.LateCreep, at_payload.RampPush, at_payload.HalfSinePush,
+    at_payload.DoublePendulum, at_payload.UnequalPendulum, at_joints.SecondOrderTorqueLag,
+    at_joints.SingleTorqueLag, at_payload.PayloadCable, at_payload.RobotCable, at_payload.StiffeningStrap,
+    at_payload.RubberCord, at_payload.TurningDrag, at_payload.PowerDrag, at_payload.MassDrift,
+    at_payload.MassOfTrials,
+)  # fmt: skip
 UNLISTED: tuple[type[Form], ...] = (
-    CrossTalk,
-    WarmingScale,
-    WarmingZero,
-    Saturation,
-    QuadraticReading,
-    AngleInTorque,
-    TorqueHum,
-    EccentricPhi,
-    EccentricTheta,
-    CyclicPhi,
-    EncoderBacklash,
-    SoftEncoderMount,
-    SlippingZero,
-    Cogging,
-    CubicSpring,
-    CableSpring,
-    DoorCloser,
-    GrowingPush,
-    Shaker,
-    Gyroscope,
-    ShiftingLoad,
-    SinkingBase,
-)
-OUTSIDE: tuple[type[Form], ...] = (ScratchedDisc, SoftSaturation, LooseBridge, FineInterpolation, SlackHose)
+    readings.CrossTalk, readings.WarmingScale, readings.WarmingZero, readings.Saturation,
+    readings.QuadraticReading, readings.AngleInTorque, readings.TorqueHum, readings.EccentricPhi,
+    readings.EccentricTheta, readings.CyclicPhi, readings.EncoderBacklash, readings.SoftEncoderMount,
+    readings.SlippingZero, forces.Cogging, forces.CubicSpring, forces.CableSpring, forces.DoorCloser,
+    forces.GrowingPush, forces.Shaker, forces.Gyroscope, forces.ShiftingLoad, forces.SinkingBase,
+)  # fmt: skip
+OUTSIDE: tuple[type[Form], ...] = (
+    readings.ScratchedDisc, readings.SoftSaturation, readings.LooseBridge, readings.FineInterpolation,
+    forces.SlackHose,
+)  # fmt: skip
 """Unlisted ones whose formula the dictionary of laws does not have either."""
-FAULTY: tuple[type[Form], ...] = (DropoutsPhi, DropoutsTheta, TorqueRamp, TorqueWalk, DeadBand)
+FAULTY: tuple[type[Form], ...] = (
+    readings.DropoutsPhi, readings.DropoutsTheta, readings.TorqueRamp, readings.TorqueWalk, readings.DeadBand,
+)  # fmt: skip
 """Unlisted ones of which sensors wear out."""
-FAULTS = (*FAULTY, CrossTalk, EccentricPhi, EccentricTheta, MassDrift, HalfSinePush)
+FAULTS = (
+    *FAULTY, readings.CrossTalk, readings.EccentricPhi, readings.EccentricTheta, at_payload.MassDrift,
+    at_payload.HalfSinePush,
+)  # fmt: skip
 """These, and others that come with use: drawn by themselves."""
-KNOWN: tuple[type[Form], ...] = (QuadraticDrag, TorqueBacklash)
+KNOWN: tuple[type[Form], ...] = (at_payload.QuadraticDrag, readings.TorqueBacklash)
 """Listed ones whose law the catalogue has by now: hidden by name only."""
 FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE, *FAULTY)}
 
@@ -207,8 +117,8 @@ def draw(
 ) -> list[Effect]:
     """One effect of ``factor`` times the limit of its background; ``pushes`` are one in every trial that moves."""
     if name == "pushes":
-        kind = RampPush if rng.uniform() < 0.5 else HalfSinePush
-        return list(in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
+        kind = at_payload.RampPush if rng.uniform() < 0.5 else at_payload.HalfSinePush
+        return list(at_payload.in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
     if name in EFFECTS:
         factor *= limit_over_nominal(name, background)
         return [draw_effect(name, factor, ground_of(ground.robots, ground.p_1c, ground.moving), rng)]
