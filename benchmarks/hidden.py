@@ -174,6 +174,10 @@ class Logger:
             tau_step_Nm=float(rng.choice([0.0, 0.001, 0.01, 0.02])),
         )
 
+    def logged(self, trial: TrialLog, rng: np.random.Generator, name: str = "logged") -> MadeLog:
+        """A trial as the lab's recorder has it; arguments as of ``recorded``."""
+        return MadeLog(name, tuple(self._stream(trial, robot, rng) for robot in range(trial.robots)))
+
     def recorded(self, trial: TrialLog, rng: np.random.Generator, name: str = "logged") -> Recording:
         """A trial, logged and brought onto one grid as ``mocobot convert`` does it.
 
@@ -182,7 +186,7 @@ class Logger:
             rng: source of jitter, losses, noise and of where rounding grids lie.
             name: how messages call the log.
         """
-        log = MadeLog(name, tuple(self._stream(trial, robot, rng) for robot in range(trial.robots)))
+        log = self.logged(trial, rng, name)
         labels = Labels(trial=trial.trial)
         correct = bool(self.offset_s or self.drift)
         converted = convert(log, labels, omnid_design(), rate_hz=self.converted_hz, correct=correct)
