@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -75,15 +76,7 @@ class Drawn:
     parameters: dict[str, Any] = field(default_factory=dict)
 
 
-def phi_zero(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A driven encoder's zero."""
-    return _number(rng, size * setting.limit("phi_zero", "phi_zero"), "phi_zero", "zero_rad", signed=True)
-
-
-def theta_zero(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A gimbal encoder's zero; that of the last axis cannot be told from the grasp."""
-    value = size * setting.limit("theta_zero", "theta_zero")
-    return _number(rng, value, "theta_zero", "zero_rad", signed=True, joints=2)
+Draw = Callable[[Rng, float, Setting], Drawn]
 
 
 def link_length(rng: Rng, size: float, setting: Setting) -> Drawn:
@@ -93,56 +86,10 @@ def link_length(rng: Rng, size: float, setting: Setting) -> Drawn:
     return _number(rng, value, quantity, f"{quantity}_m", signed=True)
 
 
-def base_tilt(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A base that leans in any direction."""
-    names = ("roll_rad", "pitch_rad")
-    return _heading(rng, size * setting.limit("base_tilt", "base_tilt"), "base_tilt", names)
-
-
-def base_creep(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A base that slides slowly in any direction, in every trial from its start."""
-    names = ("x_mps", "y_mps")
-    return _heading(rng, size * setting.limit("base_creep", "base_creep"), "base_creep", names)
-
-
-def base_compliance(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A base that gives way to the arm's horizontal reaction."""
-    value = size * setting.limit("base_compliance", "base_compliance")
-    return _number(rng, value, "base_compliance", "compliance_m_per_N", joints=0)
-
-
-def grasp_flex(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A grasp that gives way to its force."""
-    value = size * setting.limit("grasp_flex", "grasp_flex")
-    return _number(rng, value, "grasp_flex", "compliance_m_per_N", joints=0)
-
-
-def grasp_play(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A loose grasp."""
-    return _number(rng, size * setting.limit("grasp_play", "grasp_play"), "grasp_play", "play_m", joints=0)
-
-
 def sea_scale(rng: Rng, size: float, setting: Setting) -> Drawn:
     """A spring of another stiffness; only stiffer where a softer one would hardly be a spring."""
     value = size * setting.limit("sea_scale", "sea_scale")
     return _number(rng, value, "sea_scale", "scale", signed=value < 0.3)
-
-
-def sea_bias(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A torque zero."""
-    return _number(rng, size * setting.limit("sea_bias", "sea_bias"), "sea_bias", "bias_Nm", signed=True)
-
-
-def sea_hardening(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A spring with a cubic part."""
-    value = size * setting.limit("sea_hardening", "sea_hardening")
-    return _number(rng, value, "sea_hardening", "cubic_Nm_per_rad3")
-
-
-def sea_hysteresis(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A dry slider beside a spring."""
-    value = size * setting.limit("sea_hysteresis", "sea_hysteresis")
-    return _number(rng, value, "sea_hysteresis", "friction_Nm")
 
 
 def joint_friction(rng: Rng, size: float, setting: Setting) -> Drawn:
@@ -153,29 +100,6 @@ def joint_friction(rng: Rng, size: float, setting: Setting) -> Drawn:
 def gimbal_friction(rng: Rng, size: float, setting: Setting) -> Drawn:
     """The same about a gimbal axis."""
     return _friction(rng, size * setting.limit("gimbal_friction", "gimbal_coulomb"), "gimbal")
-
-
-def torque_skew(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """Torques that are older than the angles."""
-    value = size * setting.limit("torque_skew", "torque_skew")
-    return _number(rng, value, "torque_skew", "delay_s", joints=0)
-
-
-def torque_lag(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """Torque sensors behind a first-order lag."""
-    value = size * setting.limit("torque_lag", "torque_lag")
-    return _number(rng, value, "torque_lag", "time_constant_s", joints=0)
-
-
-def sensor_lag(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """One such sensor."""
-    return _number(rng, size * setting.limit("sensor_lag"), "sensor_lag", "time_constant_s")
-
-
-def clock_delay(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A robot whose log is late."""
-    value = size * setting.limit("clock_delay", "clock_delay")
-    return _number(rng, value, "clock_delay", "delay_s", joints=0)
 
 
 def grasp_relaxing(rng: Rng, size: float, setting: Setting) -> Drawn:
@@ -261,6 +185,23 @@ def _number(
     return Drawn(effect, robot, joint if joints else None, {parameter: value})
 
 
+def number(cause: str, parameter: str, *, signed: bool = False, joints: int = 3) -> Draw:
+    """One number of ``AsBuilt`` that is called like its cause; other arguments as of ``_number``."""
+
+    def draw(rng: Rng, size: float, setting: Setting) -> Drawn:
+        quantity = None if cause == "sensor_lag" else cause  # a single sensor lags nowhere else
+        return _number(
+            rng, size * setting.limit(cause, quantity), cause, parameter, signed=signed, joints=joints
+        )
+
+    return draw
+
+
+def heading(cause: str, parameters: tuple[str, str]) -> Draw:
+    """Two numbers of a base that are a direction."""
+    return lambda rng, size, setting: _heading(rng, size * setting.limit(cause, cause), cause, parameters)
+
+
 def _heading(rng: Rng, value: float, quantity: str, parameters: tuple[str, str]) -> Drawn:
     robot, heading = int(rng.integers(ROBOTS)), rng.uniform(0, 2 * np.pi)
     x, y = float(value * np.cos(heading)), float(value * np.sin(heading))
@@ -285,41 +226,6 @@ def _other_friction(
 
 _SPEED_MPS, _ARM2 = 0.08, 0.25
 """Usual speed of the payload, and the square of how far from its centre something that drags is [m^2]."""
-
-
-def tether(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A spring from a grasp to a point fixed to its base."""
-    return _tether(rng, size, setting, of_payload=False, slack=False)
-
-
-def tether_slack(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """The same as a cable that hangs slack wherever the grasp comes near its anchor."""
-    return _tether(rng, size, setting, of_payload=False, slack=True)
-
-
-def payload_tether(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A spring from any point of the payload to one fixed to robot 1's base."""
-    return _tether(rng, size, setting, of_payload=True, slack=False)
-
-
-def payload_tether_slack(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """The same as a cable."""
-    return _tether(rng, size, setting, of_payload=True, slack=True)
-
-
-def push(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A push that starts and ends at once."""
-    return _push(rng, size, setting, "square")
-
-
-def push_half_sine(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A push that swells and fades."""
-    return _push(rng, size, setting, "half_sine")
-
-
-def push_trapezoid(rng: Rng, size: float, setting: Setting) -> Drawn:
-    """A push with ramps, which the catalogue's ``ramp_s`` tells too."""
-    return _push(rng, size, setting, "trapezoid")
 
 
 def drag(rng: Rng, size: float, setting: Setting) -> Drawn:
@@ -371,8 +277,13 @@ def mass_settling(rng: Rng, size: float, setting: Setting) -> Drawn:
     return Drawn(effect, known={}, parameters=told)
 
 
-def _tether(rng: Rng, size: float, setting: Setting, *, of_payload: bool, slack: bool) -> Drawn:
-    """At home it pulls with the limit's force times ``size``, in any direction."""
+def tether(
+    rng: Rng, size: float, setting: Setting, *, of_payload: bool = False, slack: bool = False
+) -> Drawn:
+    """A spring from a grasp, or any point of the payload, to a point fixed to a base.
+
+    At home it pulls with the limit's force times ``size``, in any direction. A cable hangs slack near its anchor.
+    """
     base = 0 if of_payload else int(rng.integers(ROBOTS))
     stiffness = rng.uniform(0.5, 5.0)
     stretch, length = setting.limit("tether") / stiffness, rng.uniform(0.15, 0.5) if slack else 0.0
@@ -391,7 +302,7 @@ def _tether(rng: Rng, size: float, setting: Setting, *, of_payload: bool, slack:
     return Drawn(replace(effect, point=_triple(point)), known=known)
 
 
-def _push(rng: Rng, size: float, setting: Setting, shape: str) -> Drawn:
+def push(rng: Rng, size: float, setting: Setting, shape: str = "square") -> Drawn:
     """The longer, the weaker: what shows is the force times the square root of the time."""
     trial, duration = int(rng.integers(1, 1 + len(setting.durations_s))), rng.uniform(1.0, 10.0)
     start = rng.uniform(3.0, setting.durations_s[trial - 1] - duration - 3.0)
@@ -420,9 +331,6 @@ def _triple(values: Array) -> tuple[float, float, float]:
     return x, y, z
 
 
-Draw = Callable[[np.random.Generator, float, Setting], Drawn]
-
-
 @dataclass(frozen=True)
 class Form:
     """Something that can be hidden.
@@ -441,26 +349,28 @@ class Form:
 PLAIN: Mapping[str, Form] = {
     cause: Form(cause, False, draw)
     for cause, draw in {
-        "phi_zero": phi_zero,
-        "theta_zero": theta_zero,
+        "phi_zero": number("phi_zero", "zero_rad", signed=True),
+        "theta_zero": number(
+            "theta_zero", "zero_rad", signed=True, joints=2
+        ),  # the last turns the grasp alone
         "link_length": link_length,
-        "base_tilt": base_tilt,
-        "base_creep": base_creep,
-        "base_compliance": base_compliance,
-        "grasp_flex": grasp_flex,
-        "grasp_play": grasp_play,
+        "base_tilt": heading("base_tilt", ("roll_rad", "pitch_rad")),
+        "base_creep": heading("base_creep", ("x_mps", "y_mps")),
+        "base_compliance": number("base_compliance", "compliance_m_per_N", joints=0),
+        "grasp_flex": number("grasp_flex", "compliance_m_per_N", joints=0),
+        "grasp_play": number("grasp_play", "play_m", joints=0),
         "sea_scale": sea_scale,
-        "sea_bias": sea_bias,
-        "sea_hardening": sea_hardening,
-        "sea_hysteresis": sea_hysteresis,
+        "sea_bias": number("sea_bias", "bias_Nm", signed=True),
+        "sea_hardening": number("sea_hardening", "cubic_Nm_per_rad3"),
+        "sea_hysteresis": number("sea_hysteresis", "friction_Nm"),
         "joint_friction": joint_friction,
         "gimbal_friction": gimbal_friction,
-        "torque_skew": torque_skew,
-        "torque_lag": torque_lag,
-        "sensor_lag": sensor_lag,
-        "clock_delay": clock_delay,
+        "torque_skew": number("torque_skew", "delay_s", joints=0),
+        "torque_lag": number("torque_lag", "time_constant_s", joints=0),
+        "sensor_lag": number("sensor_lag", "time_constant_s"),
+        "clock_delay": number("clock_delay", "delay_s", joints=0),
         "tether": tether,
-        "payload_tether": payload_tether,
+        "payload_tether": partial(tether, of_payload=True),
         "push": push,
         "drag": drag,
         "slosh": slosh,
@@ -479,10 +389,10 @@ FORMS: Mapping[str, Form] = {
     "driven_stribeck": Form("joint_friction", True, driven_stribeck),
     "gimbal_dahl": Form("gimbal_friction", True, gimbal_dahl),
     "torque_second_order": Form("torque_lag", True, torque_second_order),
-    "tether_slack": Form("tether", True, tether_slack),
-    "payload_tether_slack": Form("payload_tether", True, payload_tether_slack),
-    "push_half_sine": Form("push", True, push_half_sine),
-    "push_trapezoid": Form("push", True, push_trapezoid),
+    "tether_slack": Form("tether", True, partial(tether, slack=True)),
+    "payload_tether_slack": Form("payload_tether", True, partial(tether, of_payload=True, slack=True)),
+    "push_half_sine": Form("push", True, partial(push, shape="half_sine")),
+    "push_trapezoid": Form("push", True, partial(push, shape="trapezoid")),
     "drag_turning": Form("drag", True, drag_turning),
     "drag_quadratic": Form("drag", True, drag_quadratic),
     "mass_settling": Form("payload_mass", True, mass_settling),
