@@ -35,7 +35,7 @@ from sealed import sets
 SPACING_M = 1.0
 MASS_PER_ROBOT_KG = 3.5
 LARGEST_RADIUS_M = 0.95
-"""Of the circle: turned about its middle by 3.4 deg a payload moves the grasps of a larger one out of reach."""
+"""Largest radius of the circle: turned about its middle by 3.4 deg a payload moves the grasps of a larger one out of reach."""
 
 
 def write_plate(robots: int, path: Path) -> Path:
@@ -137,7 +137,7 @@ class Team:
 
 @dataclass(frozen=True)
 class Truth:
-    """Of one team and payload; {i} here is {i} as built, turned about its x axis by the zero of theta_x.
+    """The truth of one team and payload; {i} here is {i} as built, turned about its x axis by the zero of theta_x.
 
     Attributes:
         R_1i, p_1i: grasps, shapes (N, 3, 3), (N, 3).
@@ -286,7 +286,7 @@ def grasp_errors(grasps: GraspEstimate, truth: Truth) -> tuple[Array, Array]:
 
 
 def claims(error: Array, covariance: Array) -> dict[str, Any]:
-    """Of mass, centre of mass and inertia apart."""
+    """Claims on mass, centre of mass and inertia apart."""
     return {name: claim(error[at], covariance[at, at]) for name, at in CENTRED.items()}
 
 

@@ -7,6 +7,7 @@ Each robot's clock has an offset and a drift against that of the robot before. L
 from __future__ import annotations
 
 import numpy as np
+import tyro
 
 from hidden import Logger
 from mocobot_logs.convert import Labels, convert
@@ -55,4 +56,4 @@ def _rms(x: np.ndarray) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

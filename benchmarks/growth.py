@@ -27,7 +27,7 @@ import mocobot
 from discrepancy.team.causes import CAUSES
 
 MASS_KG, APART_M, VIA_S = 4.0, 1.1, 1.31
-"""Of the ring for each robot, along its rim from one to the next, and of one random via and the way there."""
+"""Mass of the ring for each robot, distance along its rim to the next, and time of one random via and the way there."""
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
 ALL = len(CAUSES)
 MINUTES, ROBOTS, KINDS = (1, 5, 15, 60), (2, 3, 6, 10), (1, 6, 12, ALL)

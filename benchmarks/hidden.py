@@ -229,7 +229,7 @@ class Logger:
 
 
 LENGTHS_M = (0.08, 0.5)
-"""Of pendulums."""
+"""Lengths of pendulums."""
 
 
 class Tabled:
@@ -238,7 +238,7 @@ class Tabled:
     def at(
         self, cause: str, robot: int | None = None, joint: int | None = None, trial: int | None = None
     ) -> Mapping[str, float]:
-        """Of a cause, the same at all its places."""
+        """Limits of a cause, the same at all its places."""
         return LIMITS[cause]
 
     def pendulum(self, rng: np.random.Generator) -> tuple[float, float]:

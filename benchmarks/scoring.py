@@ -23,6 +23,6 @@ def log_score(stated: Sequence[tuple[float, bool]]) -> float:
 
 
 def median_and_most(values: Iterable[float], digits: int = 1) -> str:
-    """Of seconds or gigabytes, as a cell of a table."""
+    """Median and largest of seconds or gigabytes, as a cell of a table."""
     each = list(values)
     return f"{np.median(each):.{digits}f}, {max(each):.{digits}f}" if each else "-"

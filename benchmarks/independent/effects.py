@@ -159,11 +159,11 @@ class Friction(Effect):
     gimbal: bool = False
 
     def driven_torque(self, phi: Array) -> tuple[int, int, Array] | None:
-        """Of the driven joint."""
+        """Friction of the driven joint."""
         return None if self.gimbal else (self.robot, self.joint, self.of(phi[:, self.robot, self.joint]))
 
     def gimbal_torque(self, theta: Array) -> tuple[int, int, Array] | None:
-        """Of the gimbal axis."""
+        """Friction of the gimbal axis."""
         return (self.robot, self.joint, self.of(theta[:, self.robot, self.joint])) if self.gimbal else None
 
     def of(self, angle: Array) -> Array:

@@ -114,7 +114,7 @@ def _windowed(kind: str, rng: np.random.Generator, time: Array, waves: Array) ->
 
 
 STIFFNESS_N_PER_M = 120.0
-"""Of the springs that robots seem to hold their wrists with; what it does beyond the balance is internal."""
+"""Stiffness of the springs that robots seem to hold their wrists with; what it does beyond the balance is internal."""
 
 
 def shared_forces(arm: Array, wanted: Array, force: Array, moment: Array) -> Array:
@@ -160,7 +160,7 @@ def wanted_forces(rng: np.random.Generator, time: Array, weight: Array, shift: A
 
 
 AXES_HEIGHT_M = 0.46
-"""Of the driven axes over the floor; nothing depends on it."""
+"""Height of the driven axes over the floor; nothing depends on it."""
 PRESLIDING_RAD = 1e-5
 _PLAY_N, _PLAY_N_PER_M = 0.05, 200.0
 """Force at which a loose grasp is nearly at the end of its gap, and how much more it takes in a wider one, which shifts

@@ -19,7 +19,7 @@ MODEL = Path(__file__).resolve().parents[2] / "models" / "panda" / "panda.xml"
 DRY_NM = np.array([0.9, 1.1, 0.8, 0.9, 0.35, 0.3, 0.3])
 VISCOUS = np.array([0.8, 0.9, 0.6, 0.7, 0.25, 0.2, 0.2])
 ROTOR_KGM2 = np.array([0.6, 0.6, 0.45, 0.45, 0.2, 0.2, 0.15])
-"""Of the model: a lab that has identified its arm knows them. Plausible for such gears, of no certain arm."""
+"""Dry and viscous friction and rotors of the model: a lab that has identified its arm knows them. Plausible for such gears."""
 CENTRE = np.array([0.0, -0.3, 0.0, -1.7, 0.0, 1.8, 0.4])
 HALF_WAY = np.array([1.1, 0.8, 1.0, 0.8, 1.2, 1.0, 1.2])
 """Middle and half of the motion [rad]; inside the ranges by 0.3 rad."""
@@ -27,7 +27,7 @@ TORQUE_NOISE_NM = np.array([0.04, 0.05, 0.03, 0.03, 0.012, 0.01, 0.01])
 STEP_RAD = 2.0 * np.pi / 2**17
 RATE_HZ, TIMESTEP_S, SECONDS = 500.0, 5e-4, 60.0
 BANDWIDTH_PER_S = 15.0
-"""Of the controller, critically damped."""
+"""Bandwidth of the controller, critically damped."""
 BEND = "bend"
 """How names of joints begin that no motor moves."""
 
@@ -412,7 +412,7 @@ def _timed(form: Form, step_s: float, share: Callable[[float], float]) -> Torque
 
 
 def _drag(form: Form, step_s: float) -> Torques:
-    """Of no cause: a resistance with the square of the speed."""
+    """No cause has it: a resistance with the square of the speed."""
     return _at(form, lambda q, v, t: -form.size * v * abs(v))
 
 
@@ -477,12 +477,12 @@ def _zero(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> No
 
 
 def _weighing(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
-    """Of no cause: a torque sensor that reads some of its neighbour's."""
+    """No cause has it: a torque sensor that reads some of its neighbour's."""
     torque[:, form.at] += form.size * torque[:, form.at - 1]
 
 
 def _disc(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
-    """Of no cause: an encoder's disc off its axis."""
+    """No cause has it: an encoder's disc off its axis."""
     q[:, form.at] += form.size * np.sin(q[:, form.at] + form.rng.uniform(0.0, 2.0 * np.pi))
 
 

@@ -36,7 +36,7 @@ def read(
 def _with(form: Form, arm: machine.Healthy, motion: machine.Motion, rng: np.random.Generator) -> JointLog:
     """The log of the same motion, if the form were there: drives give what it takes.
 
-    Of the same reference, where a joint bends.
+    From the same reference, where a joint bends.
     """
     if form.name == "yielding":
         spec = arm.spec.copy()
@@ -130,7 +130,7 @@ class Shown:
 
 
 KINDS = ("clean", "single", "single", "pairs", "single", "clean", "single", "unlisted", "triples", "left-out")
-"""Of successive seeds."""
+"""Kinds of successive seeds."""
 SIZES = (2.0, 4.0, 4.0, 8.0)
 """Over the limit, of successive effects in turn by seed."""
 Kind = Literal["clean", "single", "pairs", "triples", "unlisted", "left-out"]

@@ -39,7 +39,7 @@ class Ground:
 
     @classmethod
     def of(cls, scene: TeamScene, trajectories: Sequence[Trajectory]) -> Ground:
-        """Of a team and the commands of its trials."""
+        """From a team and the commands of its trials."""
         model = scene.compile()
         torque = assemble_at_home(scene, model, mujoco.MjData(model), TeamIndex.of(model))
         moving = moving_intervals(trajectories)

@@ -68,7 +68,7 @@ class _Lugre(Form):
 
 @dataclass(frozen=True)
 class DrivenLugre(_Lugre):
-    """Of a driven link against the chassis."""
+    """In a driven link against the chassis."""
 
     answer = "joint_friction"
     kind = "driven"
@@ -76,7 +76,7 @@ class DrivenLugre(_Lugre):
 
 @dataclass(frozen=True)
 class GimbalLugre(_Lugre):
-    """Of a gimbal axis."""
+    """In a gimbal axis."""
 
     answer = "gimbal_friction"
     kind = "gimbal"
@@ -116,7 +116,7 @@ class _Dahl(Form):
 
 @dataclass(frozen=True)
 class DrivenDahl(_Dahl):
-    """Of a driven link against the chassis."""
+    """In a driven link against the chassis."""
 
     answer = "joint_friction"
     kind = "driven"
@@ -124,7 +124,7 @@ class DrivenDahl(_Dahl):
 
 @dataclass(frozen=True)
 class GimbalDahl(_Dahl):
-    """Of a gimbal axis."""
+    """In a gimbal axis."""
 
     answer = "gimbal_friction"
     kind = "gimbal"

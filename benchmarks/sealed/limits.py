@@ -102,7 +102,7 @@ _LISTED = {
     "mass_of_trials": (9.0e-4, 9.2e-4, 9.3e-4, 9.1e-4),
 }
 _SHARES = {name: (0.01,) * 4 for name in ("dropouts_phi", "dropouts_theta")}
-"""Of an angle's samples. Chosen: less than what is drawn."""
+"""Share of an angle's samples. Chosen: less than what is drawn."""
 _AT_38 = {
     "cross_talk": (5.5e-4, 5.6e-4, 5.7e-4, 5.6e-4),
     "warming_scale": (1.55e-3, 1.62e-3, 1.66e-3, 1.58e-3),

@@ -275,7 +275,7 @@ class DoublePendulum(Form):
     def known(self) -> dict[str, float]:
         upper, lower = self.length_m, self.lower_length_m
         hanging = self.lower_share * self.mass_kg
-        # Of small angles about the upright, and per acceleration of the pivot.
+        # For small angles about the upright, and per acceleration of the pivot.
         inertia = np.array([[self.mass_kg * upper**2, hanging * upper * lower], [0.0, hanging * lower**2]])
         inertia[1, 0] = inertia[0, 1]
         driven = np.array([self.mass_kg * upper, hanging * lower])

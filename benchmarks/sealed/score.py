@@ -294,7 +294,7 @@ def _variable(cause: Item, effect: Item) -> bool:
 
 
 def signal_of(cause: Item) -> str:
-    """Of what something located without a formula is a function, as its kind says: ``... by its SIGNAL``."""
+    """Signal of something located without a formula, as its kind says: ``... by its SIGNAL``."""
     return cause["kind"].partition(" by its ")[2]
 
 

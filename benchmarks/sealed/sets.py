@@ -169,7 +169,7 @@ SLIDING = (
 HOUR = Schedule(randoms=2, vias=1375, periodic_s=None, hold_s=None)
 """Two trials of half an hour: 1.31 s a via."""
 SHARES = (0.4, 0.25, 0.2, 0.15)
-"""Of the backgrounds where they are drawn."""
+"""Shares of the backgrounds where they are drawn."""
 
 SPRINGS = {"base_compliance": "base{robot}_compliance_x", "grasp_flex": "grasp{robot}_flex_x"}
 """Rows of a scene that hold what gives way."""
