@@ -35,7 +35,7 @@ from sealed import sets
 SPACING_M = 1.0
 MASS_PER_ROBOT_KG = 3.5
 LARGEST_RADIUS_M = 0.95
-"""Largest radius of the circle: turned about its middle by 3.4 deg a payload moves the grasps of a larger one out of reach."""
+"""Largest radius of the circle: a payload that turns by 3.4 deg moves the grasps of a larger one out of reach."""
 
 
 def write_plate(robots: int, path: Path) -> Path:

@@ -27,8 +27,8 @@ from mocobot_sim.serial.mjcf import SOLIMP, SOLREF
 from tx40 import TOP, pair, parts, read, shares, shown
 
 RATE_HZ, SERVO_HZ, SMOOTH_HZ = 2500.0, 40.0, 60.0
-"""Rates of the simulation, its servo, and the low-pass of the log. An explicit integrator is stable here; an implicit one
-applies the servo's damping at the step's end, so that its torque is told as if rotors were larger by damping times
+"""Rates of the simulation, its servo, and the low-pass of the log. An explicit integrator is stable here; an implicit
+one applies the servo's damping at the step's end, so that its torque is told as if rotors were larger by damping times
 step (half of ``INERTIA`` at 1 kHz)."""
 INERTIA = np.array([1.5, 1.5, 0.6, 0.15, 0.08, 0.03])
 """As the joints feel it, about: for the servo's gains [kg m^2]."""

@@ -19,7 +19,7 @@ MODEL = Path(__file__).resolve().parents[2] / "models" / "panda" / "panda.xml"
 DRY_NM = np.array([0.9, 1.1, 0.8, 0.9, 0.35, 0.3, 0.3])
 VISCOUS = np.array([0.8, 0.9, 0.6, 0.7, 0.25, 0.2, 0.2])
 ROTOR_KGM2 = np.array([0.6, 0.6, 0.45, 0.45, 0.2, 0.2, 0.15])
-"""Dry and viscous friction and rotors of the model: a lab that has identified its arm knows them. Plausible for such gears."""
+"""Dry and viscous friction and rotors of the model, which an identified arm's lab knows. Plausible for such gears."""
 CENTRE = np.array([0.0, -0.3, 0.0, -1.7, 0.0, 1.8, 0.4])
 HALF_WAY = np.array([1.1, 0.8, 1.0, 0.8, 1.2, 1.0, 1.2])
 """Middle and half of the motion [rad]; inside the ranges by 0.3 rad."""
