@@ -28,9 +28,7 @@ import tyro
 from scipy.sparse import csr_array
 from tqdm import tqdm
 
-from calibration.campaign import HELD
-from calibration.score import Found, found_of, grasp_errors, of_estimate
-from calibration.truth import Truth, centred
+from calibration import HELD, Found, Truth, centred, found_of, grasp_errors, of_estimate
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules

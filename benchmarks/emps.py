@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import tyro
 
 from discrepancy.evidence.odds import odds_of
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
@@ -79,4 +80,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

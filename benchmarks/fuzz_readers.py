@@ -17,9 +17,7 @@ from pathlib import Path
 
 import tyro
 
-from fuzzing.of_commands import KINDS
-from fuzzing.originals import FORMATS, write_original
-from fuzzing.trial import LONGEST_S, Outcome, check_original, try_damaged
+from fuzzing import FORMATS, KINDS, LONGEST_S, Outcome, check_original, try_damaged, write_original
 from mocobot.progress import bar
 
 AT_A_TIME = 500

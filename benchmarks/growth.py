@@ -3,7 +3,6 @@
     python benchmarks/growth.py                       everything that has not been measured yet; may be interrupted
     python benchmarks/growth.py --most-minutes 15     without the long recordings
     python benchmarks/growth.py --tables              what there is
-    python benchmarks/growth.py --picture growth.png  the same, drawn
 
 Rings of 4 kg a robot are carried at random with friction in one joint; every measurement is a command in a process of
 its own, which may use one core: seconds of CPU, seconds of the clock, and the largest memory it ever had.
@@ -28,7 +27,7 @@ import mocobot
 from discrepancy.team.causes import CAUSES
 
 MASS_KG, APART_M, VIA_S = 4.0, 1.1, 1.31
-"""Of the ring for each robot, along its rim from one to the next, and of one random via and the way there."""
+"""Mass of the ring for each robot, distance along its rim to the next, and time of one random via and the way there."""
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
 ALL = len(CAUSES)
 MINUTES, ROBOTS, KINDS = (1, 5, 15, 60), (2, 3, 6, 10), (1, 6, 12, ALL)
@@ -62,7 +61,6 @@ class Options:
         most_s: seconds of the clock after which a command is given up, and counted as such.
         again: measure what was measured, too.
         tables: print what there is instead.
-        picture: draw it instead.
     """
 
     out: Path = Path("out/growth")
@@ -70,7 +68,6 @@ class Options:
     most_s: float = 3600.0
     again: bool = False
     tables: bool = False
-    picture: Path | None = None
 
 
 def points() -> Iterator[Point]:
@@ -198,53 +195,11 @@ def table(results: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def picture(results: Sequence[dict[str, Any]], path: Path) -> None:
-    """Time above memory, against samples, robots and causes; logarithmic."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    good = {key_of(r): r for r in results if r["code"] == 0}
-    across = {
-        "minutes at 100 Hz (3 robots)": ("minutes", {"robots": 3, "kinds": ALL}),
-        "robots (1 minute)": ("robots", {"minutes": 1, "kinds": ALL}),
-        "kinds of causes (3 robots, 1 minute)": ("kinds", {"robots": 3, "minutes": 1}),
-    }
-    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(2, len(across), sharex="col", sharey="row")
-    for column, (title, (name, fixed)) in enumerate(across.items()):
-        for command, colour in (("estimate", "#2a9d8f"), ("diagnose", "#2f6fd0"), ("simulated", "#e07b39")):
-            chosen = [
-                r for point, r in good.items()
-                if point.command == command and all(getattr(point, k) == v for k, v in fixed.items())
-            ]  # fmt: skip
-            chosen.sort(key=lambda r: r[name])
-            if len(chosen) < 2:
-                continue
-            for row, value in enumerate(("cpu_s", "memory_MB")):
-                label = {"diagnose": "diagnose, rows alone", "simulated": "diagnose"}.get(command, command)
-                x, y = [r[name] for r in chosen], [r[value] for r in chosen]
-                axes[row, column].loglog(x, y, "o-", ms=4, lw=1.2, color=colour, label=label)
-        axes[1, column].set_xlabel(title)
-        at = {"minutes": MINUTES, "robots": ROBOTS, "kinds": KINDS}[name]
-        axes[1, column].set_xticks(at, [str(value) for value in at])
-        axes[1, column].minorticks_off()
-    for row, (bar, name) in enumerate(((180.0, "CPU [s]"), (2000.0, "largest memory [MB]"))):
-        axes[row, 0].set_ylabel(name)
-        for axis in axes[row]:
-            axis.axhline(bar, color="#6b7280", lw=0.8, ls="--")
-            axis.grid(alpha=0.25, which="both")
-    axes[0, 0].legend(frameon=False, fontsize=9)
-    figure.savefig(path, dpi=110)
-
-
 def main(options: Options) -> None:
     """Measure, or show what was measured."""
     file = options.out / "results.jsonl"
-    if options.tables or options.picture:
+    if options.tables:
         print(table(read(file)))
-        if options.picture:
-            picture(read(file), options.picture)
         return
     options.out.mkdir(parents=True, exist_ok=True)
     done = set() if options.again else {key_of(result) for result in read(file)}

@@ -16,8 +16,7 @@ import numpy as np
 import tyro
 
 import mocobot
-from calibration.score import of_estimate, score
-from calibration.truth import Truth
+from calibration import Truth, of_estimate, score
 from mocobot_sim.scene.as_built import AsBuilt
 
 SHARES = (0.0, 0.003, 0.01, 0.1, 1.0)

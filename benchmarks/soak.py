@@ -127,7 +127,7 @@ def left(where: Path) -> tuple[dict[str, str], int]:
 def whole(found: dict[str, str], reference: dict[str, str], case: Case) -> bool:
     """Whether nothing is there but what belongs there: single files each whole, a folder with all that is in it.
 
-    Of a command that resumes some files will do.
+    Where a command resumes, some files will do.
     """
     if case.resumes:
         return found.items() <= reference.items()

@@ -1,4 +1,4 @@
-"""A real six-axis arm, from its maker's model alone: what is named, and how well it foretells.
+"""A real six-axis arm, from its maker's model alone: what is named, and how well it predicts.
 
     python benchmarks/tx40.py
 
@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import tyro
 
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.settings import SETTINGS
@@ -136,7 +137,7 @@ class Elsewhere(problem._Builder):
 def left(outcome: Outcome, model: SerialModel, last: Signals) -> np.ndarray:
     """What causes and tolerances leave of the last third, with values of the first two.
 
-    Values are those without the errors of laws, which nobody foretells.
+    Values are those without the errors of laws, which nobody predicts.
     """
     solved, state = outcome.problem, outcome.state
     prior = state.posterior.prior.copy()
@@ -173,7 +174,7 @@ def main() -> None:
                 f"    {m.place}: "
                 + ", ".join(f"{n} {v:.4g} +- {m.errors[n]:.2g}" for n, v in m.values.items())
             )
-    print("\nTorque left unforetold in the last third, rms over that of the torque [%]")
+    print("\nTorque left unpredicted in the last third, rms over that of the torque [%]")
     first, last = parts(model, log)
     print(f"  {'':<44}" + "".join(f"{name:>8}" for name in model.joints))
     print(f"  {'the bare model':<44}{shown(shares(last.torque - last.inverse, last))}")
@@ -192,4 +193,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
+import tyro
 from mujoco import sysid
 
 from discrepancy.joints.model import SerialModel, load_spec
@@ -26,7 +27,7 @@ from mocobot_sim.serial.mjcf import SOLIMP, SOLREF
 from tx40 import TOP, pair, parts, read, shares, shown
 
 RATE_HZ, SERVO_HZ, SMOOTH_HZ = 2500.0, 40.0, 60.0
-"""Of the simulation, its servo, and the low-pass of the log. An explicit integrator is stable at this rate; an implicit
+"""Rates of the simulation, its servo, and the low-pass of the log. An explicit integrator is stable here; an implicit
 one applies the servo's damping at the step's end, so that its torque is told as if rotors were larger by damping times
 step (half of ``INERTIA`` at 1 kHz)."""
 INERTIA = np.array([1.5, 1.5, 0.6, 0.15, 0.08, 0.03])
@@ -165,7 +166,7 @@ def left(model: SerialModel, log: JointLog, value: dict[str, float]) -> tuple[np
 def main() -> None:
     """Print errors per joint, and times."""
     model, log = read()
-    print("Torque left unforetold in the last third, rms over that of the torque [%]")
+    print("Torque left unpredicted in the last third, rms over that of the torque [%]")
     for masses in (False, True):
         value, spent, calls = fitted(log, masses=masses)
         named = f"mujoco.sysid, {len(value)} numbers"
@@ -175,4 +176,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

@@ -1,10 +1,10 @@
-"""A real position servo: its motor, its friction and its loop from the logs, and one gain foretold from the others.
+"""A real position servo: its motor, its friction and its loop from the logs, and one gain predicted from the others.
 
     python benchmarks/xl330.py
 
 Needs the published runs (``models/xl330/README.md`` says where they are from): put them into
 ``data/xl330`` or set MOCOBOT_XL330_DATA to their folder.
-For every gain the runs of the other two are diagnosed; what is named there, and the loop's law, foretell the held-out
+For every gain the runs of the other two are diagnosed; what is named there, and the loop's law, predict the held-out
 runs from their commands alone. Beside it a motor with the same torque constant and loop, whose Coulomb and viscous
 friction are fitted to the same runs by least squares. Both are simulated by MuJoCo as the diagnosis does it.
 """
@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import tyro
 
 from discrepancy.evidence.findings import Finding, Member
 from discrepancy.joints.model import load_model
@@ -83,7 +84,7 @@ def main() -> None:
     verdict = judged(model, logs)
     told(verdict, time.process_time() - begun)
     print(
-        "\nPosition foretold from the commands, rms error over the motion's rms [%]: named, Coulomb and viscous alone"
+        "\nPosition predicted from the commands, rms error over the motion's rms [%]: named, Coulomb and viscous alone"
     )
     every = []
     for gain in GAINS:
@@ -101,4 +102,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

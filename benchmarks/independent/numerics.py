@@ -1,4 +1,4 @@
-"""Derivatives on a fine grid, and the operators with a memory that friction and sensors need."""
+"""Derivatives, rotations, and operators with a memory, on a fine grid."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -138,3 +139,38 @@ def parallel_dahl(torque: Array, level: float, width: float) -> Array:
             slider += change * stiffness / (1 + stiffness)
         out[k] = torque[k] - slider
     return out
+
+
+def from_rotvec(vector: Array) -> Array:
+    """Rotation matrices of rotation vectors [rad], (..., 3) to (..., 3, 3)."""
+    flat = Rotation.from_rotvec(np.reshape(vector, (-1, 3))).as_matrix()
+    return flat.reshape(*np.shape(vector), 3)
+
+
+def about(axis: int, angle: Array) -> Array:
+    """Rotation matrices about axis 0, 1 or 2 by angles [rad], (...,) to (..., 3, 3)."""
+    vector = np.zeros((*np.shape(angle), 3))
+    vector[..., axis] = angle
+    return from_rotvec(vector)
+
+
+def spin(R: Array) -> tuple[Array, Array]:
+    """Angular velocity and acceleration [rad/s, rad/s^2] in the fixed frame, of R (Q, 3, 3), shape (Q, 3) each."""
+    back = np.swapaxes(R, -1, -2)
+    # R'' R^T is the acceleration's cross product plus a symmetric part, which drops out of the difference.
+    return _axial(derivative(R) @ back), _axial(second_derivative(R) @ back)
+
+
+def turned(R: Array, vector: Array) -> Array:
+    """R @ vector for stacks that broadcast, shapes (..., 3, 3) and (..., 3)."""
+    return np.einsum("...ij,...j->...i", R, vector)
+
+
+def back_turned(R: Array, vector: Array) -> Array:
+    """R^T @ vector, as ``turned``."""
+    return np.einsum("...ji,...j->...i", R, vector)
+
+
+def _axial(S: Array) -> Array:
+    pairs = ((2, 1), (0, 2), (1, 0))
+    return np.stack([(S[..., a, b] - S[..., b, a]) / 2 for a, b in pairs], axis=-1)

@@ -1,26 +1,166 @@
-"""One trial: a payload that moves as prescribed, and what the robots under it must then read and give."""
+"""Motion, forces and loads of a team whose payload moves as prescribed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from estimator.arm.design import OmnidDesign
-from independent.arm.delta import legs_of
-from independent.arm.dynamics import arm_load
-from independent.arm.gimbal import gimbal_angles, gimbal_moment
-from independent.as_built import ROBOTS, AsBuilt
-from independent.effects.effect import Effect, Scene
-from independent.motion import Motion
-from independent.numerics import Array, coulomb, derivative, second_derivative, settled
-from independent.payload import Payload, needed_wrench
-from independent.rotations import back_turned, from_rotvec, spin, turned
-from independent.sharing import shared_forces, wanted_forces
+from independent.arm import arm_load, gimbal_angles, gimbal_moment, legs_of
+from independent.bodies import ROBOTS, AsBuilt, Payload, needed_wrench
+from independent.effects import Effect, Scene
+from independent.numerics import (
+    FINE_HZ,
+    Array,
+    back_turned,
+    coulomb,
+    derivative,
+    from_rotvec,
+    second_derivative,
+    settled,
+    smooth_step,
+    spin,
+    turned,
+)
+
+PAD_S = 0.5
+"""Rest before and after what is recorded, for delays and derivatives [s]."""
+REST_S = 2.0
+_RAMP_S = 3.0
+_HOLD_S, _MOVE_S = 3.0, 1.3
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Displacement of the payload from home over time.
+
+    Attributes:
+        kind: of trial, as a recording calls it.
+        time: on the fine grid, 0 where the recording starts [s], shape (Q,).
+        shift: of the point about which it turns, W axes [m], shape (Q, 3).
+        turn: rotation vector from home, W axes [rad], shape (Q, 3).
+    """
+
+    kind: str
+    time: Array
+    shift: Array
+    turn: Array
+
+    def scaled(self, factor: float) -> Motion:
+        """The same motion, smaller."""
+        return Motion(self.kind, self.time, self.shift * factor, self.turn * factor)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of what is recorded [s]."""
+        return float(self.time[-1]) - PAD_S
+
+
+def random_motion(rng: np.random.Generator, duration_s: float = 35.0) -> Motion:
+    """Sums of sines of 0.1 to 0.6 Hz at no common period, at rest for 2 s at either end."""
+    time = _grid(duration_s)
+    waves = np.zeros((len(time), 6))
+    for axis in range(6):
+        rate = rng.uniform(0.1, 0.6, 9)
+        size = rng.uniform(0.4, 1.0, 9) / np.sqrt(rate)
+        waves[:, axis] = np.sin(2 * np.pi * np.outer(time, rate) + rng.uniform(0, 2 * np.pi, 9)) @ size
+    return _windowed("random", rng, time, waves)
+
+
+def periodic_motion(rng: np.random.Generator, duration_s: float = 30.0) -> Motion:
+    """Five harmonics of 0.1 Hz on every axis, at rest for 2 s at either end."""
+    time = _grid(duration_s)
+    rate = 0.1 * np.arange(1, 6)
+    waves = np.zeros((len(time), 6))
+    for axis in range(6):
+        size = rng.uniform(0.2, 1.0, 5) / np.sqrt(rate)
+        waves[:, axis] = np.sin(2 * np.pi * np.outer(time, rate) + rng.uniform(0, 2 * np.pi, 5)) @ size
+    return _windowed("periodic", rng, time, waves)
+
+
+def static_motion(rng: np.random.Generator, poses: int = 10) -> Motion:
+    """Poses that are held for 3 s each, with smooth moves between them; home comes first."""
+    time = _grid(poses * _HOLD_S + (poses - 1) * _MOVE_S)
+    spread = np.array([0.045] * 3 + [0.12] * 3)
+    goals = rng.uniform(-1, 1, (poses, 6)) * spread
+    goals[0] = 0.0
+    path: Array = np.zeros((len(time), 6))
+    for k in range(1, poses):
+        start = k * _HOLD_S + (k - 1) * _MOVE_S
+        path = path + smooth_step((time - start) / _MOVE_S)[:, None] * (goals[k] - goals[k - 1])
+    return Motion("static", time, path[:, :3], path[:, 3:])
+
+
+MOTIONS: Mapping[str, Callable[[np.random.Generator], Motion]] = {
+    "random": random_motion, "periodic": periodic_motion, "static": static_motion,
+}  # fmt: skip
+"""By kind of trial."""
+
+
+def _grid(duration_s: float) -> Array:
+    pad = round(PAD_S * FINE_HZ)
+    return np.arange(-pad, round(duration_s * FINE_HZ) + pad + 1) / FINE_HZ
+
+
+def _windowed(kind: str, rng: np.random.Generator, time: Array, waves: Array) -> Motion:
+    end = time[-1] - PAD_S
+    window = smooth_step((time - REST_S) / _RAMP_S) * smooth_step((end - REST_S - time) / _RAMP_S)
+    path = waves * window[:, None]
+    largest = np.concatenate([rng.uniform(0.040, 0.050, 3), rng.uniform(0.105, 0.140, 3)])
+    path = np.asarray(path * (largest / np.abs(path).max(axis=0)), dtype=float)
+    return Motion(kind, time, path[:, :3], path[:, 3:])
+
+
+STIFFNESS_N_PER_M = 120.0
+"""Stiffness of the springs that robots seem to hold their wrists with; what it does beyond the balance is internal."""
+
+
+def shared_forces(arm: Array, wanted: Array, force: Array, moment: Array) -> Array:
+    """Forces on the payload that balance it and are as near to wanted ones as they can be.
+
+    Args:
+        arm: from the centre of mass to the wrists, W axes [m], shape (Q, N, 3).
+        wanted: forces that a team might want, W axes [N], shape (Q, N, 3).
+        force: that the forces have to sum to [N], shape (Q, 3).
+        moment: that they have to give about the centre of mass [N m], shape (Q, 3).
+
+    Returns:
+        Forces on the payload in W [N], shape (Q, N, 3).
+    """
+    samples, robots = arm.shape[:2]
+    G = np.zeros((samples, 6, robots, 3))
+    G[:, :3] = np.eye(3)[None, :, None, :]
+    x, y, z = arm[..., 0], arm[..., 1], arm[..., 2]
+    for row, column, value in ((0, 1, -z), (0, 2, y), (1, 0, z), (1, 2, -x), (2, 0, -y), (2, 1, x)):
+        G[:, 3 + row, :, column] = value
+    G = G.reshape(samples, 6, 3 * robots)
+    missing = np.concatenate([force, moment], axis=1) - (G @ wanted.reshape(samples, -1, 1))[..., 0]
+    back = np.swapaxes(G, 1, 2)
+    extra = back @ np.linalg.solve(G @ back, missing[..., None])
+    return wanted + extra.reshape(samples, robots, 3)
+
+
+def wanted_forces(rng: np.random.Generator, time: Array, weight: Array, shift: Array) -> Array:
+    """Equal shares of the weight, slow squeezes of a few newtons, and springs that pull wrists home.
+
+    Args:
+        rng: source of the squeezes.
+        time: fine grid [s], shape (Q,).
+        weight: force that holds the payload [N], shape (3,).
+        shift: of the wrists from home in W [m], shape (Q, N, 3).
+    """
+    robots = shift.shape[1]
+    rate, phase = rng.uniform(0.03, 0.4, (4, robots, 3)), rng.uniform(0, 2 * np.pi, (4, robots, 3))
+    size = rng.normal(0.0, 1.2, (4, robots, 3))
+    waves = (size * np.sin(2 * np.pi * time[:, None, None, None] * rate + phase)).sum(axis=1)
+    constant = rng.normal(0.0, 2.0, (robots, 3))
+    return weight / robots + constant + waves - STIFFNESS_N_PER_M * shift
+
 
 AXES_HEIGHT_M = 0.46
-"""Of the driven axes over the floor; nothing depends on it."""
+"""Height of the driven axes over the floor; nothing depends on it."""
 PRESLIDING_RAD = 1e-5
 _PLAY_N, _PLAY_N_PER_M = 0.05, 200.0
 """Force at which a loose grasp is nearly at the end of its gap, and how much more it takes in a wider one, which shifts

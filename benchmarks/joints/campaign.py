@@ -1,9 +1,8 @@
 """Hide causes in robots, diagnose their logs with the engine of evidence, score.
 
-    python benchmarks/joints/campaign.py --part panda|bare|shapes|clean-shapes --first SEED --draws N --out DIR
+    python benchmarks/joints/campaign.py --part panda|shapes|clean-shapes --first SEED --draws N --out DIR
     python benchmarks/joints/campaign.py --part panda --kind unlisted|left-out: laws of no table, causes taken out of it
     python benchmarks/joints/campaign.py --part panda --noise 2e-4 0.3: coarse sensors
-    python benchmarks/joints/campaign.py --first SEED --settings: ten numbers of the engine, halved and doubled
     python benchmarks/joints/campaign.py --out DIR --tables
 
 It goes on where it was stopped. Seconds are of CPU.
@@ -15,29 +14,27 @@ import json
 import sys
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-import numpy as np
 import tyro
 
-from arm import machine
-from arm.sets import ArmSet, Kind
-from arm.sets import make as make_arm
-from discrepancy.evidence.odds import odds_of, without_unfounded
-from discrepancy.evidence.settings import SETTINGS, Settings
-from discrepancy.joints.diagnose import diagnose, labels_of
+from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.settings import SETTINGS
+from discrepancy.joints.diagnose import diagnose
+from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import Given
-from joints.foreign import make, thinned
+from joints import arm as machine
+from joints.foreign import make
+from joints.sets import ArmSet, Kind
+from joints.sets import make as make_arm
 from mocobot_logs.joints.joint_log import JointLog
-from scoring import SURE, changed_settings, log_score, median_and_most
+from scoring import SURE, log_score, median_and_most
 
-RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
         "load_friction", "quadratic_drag")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
@@ -58,10 +55,9 @@ class Options:
         draws: how many sets.
         out: where results go.
         tables: print the tables of the results instead.
-        settings: diagnose one set with ten settings halved, the next with them doubled, and print what changes.
     """
 
-    part: Literal["panda", "bare", "shapes", "clean-shapes"] = "panda"
+    part: Literal["panda", "shapes", "clean-shapes"] = "panda"
     kind: Kind | None = None
     factor: float = 4.0
     noise: tuple[float, float] | None = None
@@ -69,7 +65,6 @@ class Options:
     draws: int = 10
     out: Path = Path("out/joints")
     tables: bool = False
-    settings: bool = False
 
 
 def main(options: Options) -> None:
@@ -80,42 +75,21 @@ def main(options: Options) -> None:
         print(tables(results))
         return
     options.out.mkdir(parents=True, exist_ok=True)
-    if options.settings:
-        print(f"{sum(_changes(options))} verdicts change")
-        return
-    done = {(r["part"], r["seed"], r["rate_hz"]) for r in results}
+    done = {(r["part"], r["seed"]) for r in results}
     for seed in range(options.first, options.first + options.draws):
-        left = [r for r in RATES_HZ.get(options.part, (250.0,)) if (options.part, seed, r) not in done]
-        if not left:
+        if (options.part, seed) in done:
             continue
         made = _arm(options, seed) if options.part == "panda" else make(options.part, seed, options.out)
-        for rate in left:
-            result = {"part": options.part, "seed": seed, "rate_hz": rate, "truth": made[2], "error": None}
-            begun = time.process_time()
-            try:
-                result |= _found(made[0], [thinned(g, rate) for g in made[1]], made[2])
-            except Exception:  # one that fails must not end the campaign
-                result["error"] = traceback.format_exc()
-            result["cpu_s"] = time.process_time() - begun
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(result) + "\n")
-            print("\n".join(told_of(result)), flush=True)
-
-
-def _changes(options: Options) -> Iterator[bool]:
-    """Whether each verdict changes with a setting."""
-    for seed, factor in ((options.first, 0.5), (options.first + 1, 2.0)):
-        made = _arm(options, seed)
-        usual = _said(_found(*made))
-        print(f"set {seed}: {sorted(usual)}", flush=True)
-        for words, settings in changed_settings(options.first, factor):
-            said = _said(_found(*made, settings))
-            print(f"  {words}: {sorted(said) if said != usual else 'same'}", flush=True)
-            yield said != usual
-
-
-def _said(found: Item) -> set[tuple[str, ...]]:
-    return {tuple(c["every"][0][0]) for c in found["causes"] if c["every"][0][0][1]}
+        result = {"part": options.part, "seed": seed, "truth": made[2], "error": None}
+        begun = time.process_time()
+        try:
+            result |= _found(*made)
+        except Exception:  # one that fails must not end the campaign
+            result["error"] = traceback.format_exc()
+        result["cpu_s"] = time.process_time() - begun
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(result) + "\n")
+        print("\n".join(told_of(result)), flush=True)
 
 
 def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
@@ -125,26 +99,26 @@ def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item
     faults = [e | {"place": places.get(e["cause"], f"joint{e['joint']}")} for e in made.truth["effects"]]
     if request.kind in ("unlisted", "left-out"):
         faults = [f | {"law": f["cause"] or f["name"], "cause": "unlisted"} for f in faults]
-    truth = {"kind": request.kind, "faults": faults, "values": {}, "excluded": list(request.excluded)}
+    truth = {"kind": request.kind, "faults": faults, "excluded": list(request.excluded)}
     return model, [made.log], truth
 
 
-def _found(model: SerialModel, logs: list[JointLog], truth: Item, settings: Settings = SETTINGS) -> Item:
-    """Causes with all that is told of them, values, the search's steps, and what further causes would gain."""
+def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
+    """Causes with all that is told of them, the search's steps, and what further causes would gain."""
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
-    outcome = diagnose(model, logs, settings, say=lambda line: steps.append(str(line)), given=given)
-    state, causes = without_unfounded(outcome.search, outcome.state), []
+    outcome = diagnose(model, logs, SETTINGS, say=lambda line: steps.append(str(line)), given=given)
+    state, causes = borne_out(outcome.search, outcome.state), []
     for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
         told = [None if g is None else g.key for g in o.told()]
         causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})
     outcome = replace(outcome, state=state)
-    numbers, hidden = labels_of(outcome), {f["cause"] for f in truth["faults"]}
+    hidden = {f["cause"] for f in truth["faults"]}
     offers = enumerate(outcome.search.offers(outcome.state))
     listed = [[round(g, 1), c.group.name] for k, (g, c) in offers if k < 3 or c.group.cause in hidden]
-    return {"causes": causes, "steps": steps, "offers": listed[:12], "values": numbers}
+    return {"causes": causes, "steps": steps, "offers": listed[:12]}
 
 
 def _same(fault: Item, key: Sequence[str]) -> bool:
@@ -180,10 +154,10 @@ def score(result: Item) -> Item:
 def told_of(result: Item) -> list[str]:
     """A set in words."""
     truth = result["truth"]
-    said = {k: v for k, v in truth.items() if k not in ("faults", "values")}
+    said = {k: v for k, v in truth.items() if k != "faults"}
     words = ("cause", "place", "name", "size")
     hidden = [" ".join(str(f[k]) for k in words if k in f) for f in truth["faults"]]
-    begin = f"{result['part']} {result['seed']} {result['rate_hz']:.0f} Hz {said}: {'; '.join(hidden)}"
+    begin = f"{result['part']} {result['seed']} {said}: {'; '.join(hidden)}"
     if result["error"]:
         return [begin, "    " + result["error"].splitlines()[-1]]
     s = score(result)
@@ -198,17 +172,8 @@ def told_of(result: Item) -> list[str]:
 def tables(results: Sequence[Item]) -> str:
     """All tables there are results for, as Markdown, and every set that is not right."""
     rows: dict[str, list[Item]] = {}
-    bare: dict[tuple[str, float], list[Sequence[float]]] = {}
-    verdicts: dict[int, list[list[str]]] = {}
     for r in results:
-        more = r["truth"].get("kind", f"{r['rate_hz']:.0f} Hz" if r["part"] == "bare" else "")
-        rows.setdefault(f"{r['part']} {more}", []).append(r)
-        if r["part"] == "bare" and not r["error"]:
-            verdicts.setdefault(r["seed"], []).append(sorted(c["name"] for c in r["causes"]))
-            true = r["truth"]["values"]
-            for label in true.keys() & r["values"].keys():
-                key = label.split()[-1], r["rate_hz"]
-                bare.setdefault(key, []).append((*r["values"][label], true[label]))
+        rows.setdefault(f"{r['part']} {r['truth'].get('kind', '')}", []).append(r)
     head = "| sets | falsely certain | false below 0.9 | faults named | wholly right | log score | errors | CPU s |"
     out = [head, "|---|---|---|---|---|---|---|---|"]
     for name, own in sorted(rows.items()):
@@ -225,15 +190,8 @@ def tables(results: Sequence[Item]) -> str:
         )
         row = f"{certain} | {false} | {named} of {hits} | {right} | {told:.3f} | {bad} | {seconds}"
         out.append(f"| {name} ({len(own)}) | {row} |")
-    out += ["", "| value | Hz | n | rms of error over se | median of se over size |", "|---|---|---|---|---|"]
-    for (word, rate), numbers in sorted(bare.items()):
-        value, se, true = np.array(numbers).T
-        z, share = np.sqrt(np.mean(((value - true) / se) ** 2)), np.median(se / np.abs(true))
-        out.append(f"| {word} | {rate:.0f} | {len(numbers)} | {z:.2f} | {share:.3f} |")
-    whole = [v for v in verdicts.values() if len(v) == len(RATES_HZ["bare"])]
-    same = sum(all(x == v[0] for x in v) for v in whole)
     wrong = [line for r in results if r["error"] or not score(r)["right"] for line in told_of(r)]
-    return "\n".join([*out, "", f"One verdict at all rates: {same} of {len(whole)}.", "", *wrong])
+    return "\n".join([*out, "", *wrong])
 
 
 if __name__ == "__main__":

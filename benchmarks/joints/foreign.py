@@ -99,11 +99,12 @@ def sizes(spec: mujoco.MjSpec, path: Series) -> Series:
     return rms, np.sqrt(np.mean(x1**2, axis=0)), np.max(changed / rms, axis=1), inertia
 
 
-def run(spec: mujoco.MjSpec, path: Series, law: np.ndarray | None, computed: bool) -> np.ndarray:
+def run(spec: mujoco.MjSpec, path: Series, law: np.ndarray, computed: bool) -> np.ndarray:
     """Positions and drive torques at every step; ``law``: foreign friction (dry, edge, excess, viscous, power)."""
     model = spec.compile()
     data, J = mujoco.MjData(model), model.nv
     t, x, x1, x2 = path
+    dry, edge, excess, viscous, power = law
     data.qpos[:], data.qvel[:] = x[0], x1[0]
     mujoco.mj_forward(model, data)
     M, out = np.zeros((J, J)), np.empty((2, len(t), J))
@@ -117,11 +118,9 @@ def run(spec: mujoco.MjSpec, path: Series, law: np.ndarray | None, computed: boo
         wanted = 2.0 * w * (x1[k] - v) + w**2 * (x[k] - q)
         torque = (M @ (wanted + x2[k]) if computed else own @ wanted) + data.qfrc_bias
         out[0, k], out[1, k] = q, torque
-        if law is not None:
-            dry, edge, excess, viscous, power = law
-            speed = np.abs(v)
-            torque = torque - dry * np.tanh(v / edge) * (1.0 + excess * np.exp(-((speed / (6 * edge)) ** 2)))
-            torque = torque - viscous * np.sign(v) * speed**power
+        speed = np.abs(v)
+        torque = torque - dry * np.tanh(v / edge) * (1.0 + excess * np.exp(-((speed / (6 * edge)) ** 2)))
+        torque = torque - viscous * np.sign(v) * speed**power
         data.qfrc_applied[:] = torque
         mujoco.mj_step2(model, data)
     if not np.isfinite(out).all() or np.abs(out[0] - x).max() > 1.0:
@@ -145,56 +144,40 @@ def logged(name: str, t: np.ndarray, motion: np.ndarray, reads: np.ndarray, step
     return JointLog(name, t, RATE_HZ, q, read, None, None, names, drive, step, usable, RATE_HZ)
 
 
-def thinned(log: JointLog, rate_hz: float) -> JointLog:
-    """Every n-th sample."""
-    n = round(log.rate_hz / rate_hz)
-    return replace(log, time=log.time[::n], q=log.q[::n], torque=log.torque[::n], usable=log.usable[::n],
-                   rate_hz=rate_hz, native_hz=rate_hz)  # fmt: skip
+def thinned(log: JointLog) -> JointLog:
+    """A log of a quarter of the samples."""
+    return replace(log, time=log.time[::4], q=log.q[::4], torque=log.torque[::4], usable=log.usable[::4],
+                   rate_hz=RATE_HZ / 4, native_hz=RATE_HZ / 4)  # fmt: skip
 
 
 def make(part: str, seed: int, folder: Path) -> tuple[SerialModel, list[JointLog], Item]:
     """A robot of a part of the campaign: its maker's model, logs of the true one, and what is hidden."""
     rng = np.random.default_rng([seed, *part.encode()])
-    bare = part == "bare"
-    shape = str(rng.choice(("ur", "industrial"))) if bare else SHAPES[seed % len(SHAPES)]
+    shape = SHAPES[seed % len(SHAPES)]
     chain = links(shape, rng)
     J, slides = len(chain), np.array([bool(c[4]) for c in chain])
     paths = [reference(chain, rng) for _ in range(LOGS)]
     rotor = rng.uniform(0.2, 0.8, J) * np.clip(sizes(spec_of(chain, np.zeros(J)), paths[0])[3], 0.02, 2.0)
-    maker = spec_of(chain, np.zeros(J) if bare else rotor)
+    maker = spec_of(chain, rotor)
     maker.compile()
     (folder / f"{part}{seed}.xml").write_text(maker.to_xml(), encoding="utf-8")
     asks, speed, slope, inertia = sizes(maker, paths[0])
-    true, off, faults, values = maker.copy(), rng.uniform(0.05, 0.1), [], {}
+    true, off, faults = maker.copy(), rng.uniform(0.05, 0.1), []
     for body in true.bodies[1:]:
         body.mass *= 1.0 + off * rng.uniform(-1.0, 1.0)
         body.fullinertia = np.asarray(body.fullinertia) * (1.0 + off * rng.uniform(-1.0, 1.0))
         body.ipos = np.asarray(body.ipos) * (1.0 + off * rng.uniform(-1.0, 1.0, 3))
     dry, viscous = rng.uniform(0.08, 0.35, J) * asks, rng.uniform(0.05, 0.25, J) * asks / speed
-    reads, law = np.array([np.zeros(J), np.ones(J), np.zeros(J), np.zeros(J)]), None
-    if bare:
-        for j, joint in enumerate(true.joints):
-            joint.frictionloss, joint.damping, joint.armature = dry[j], [viscous[j], 0.0, 0.0], rotor[j]
-            joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
-            numbers = {"coulomb_Nm": dry[j], "viscous_Nms_per_rad": viscous[j], "armature_kgm2": rotor[j]}
-            values |= {f"{joint.name} {k}": float(v) for k, v in numbers.items()}
-        faults += [{"cause": c, "place": "all joints"} for c in ("friction", "armature")]
-        if rng.random() < 0.5:
-            _load(true, rng.uniform(0.5, 3.0), rng, faults, values)
-        if rng.random() < 1.0 / 3.0:
-            reads[3] = rng.uniform(0.008, 0.02)
-            faults.append({"cause": "torque_delay", "place": "all joints", "size": float(reads[3, 0])})
-            values |= {f"joint{j + 1} delay_s": float(reads[3, 0]) for j in range(J)}
-    else:
-        reads[0] = 1e-3 * rng.standard_normal(J) * np.where(slides, 0.1, 1.0)
-        reads[1] += 0.01 * rng.standard_normal(J)
-        edge, power = rng.uniform(0.01, 0.03, J) * np.where(slides, 0.2, 1.0), rng.uniform(0.5, 0.8, J)
-        dry = np.minimum(dry, 0.4 * edge * inertia / TIMESTEP_S)
-        law = np.array([dry, edge, rng.uniform(0.0, 0.4, J), viscous * speed ** (1.0 - power), power])
+    reads = np.array([np.zeros(J), np.ones(J), np.zeros(J), np.zeros(J)])
+    reads[0] = 1e-3 * rng.standard_normal(J) * np.where(slides, 0.1, 1.0)
+    reads[1] += 0.01 * rng.standard_normal(J)
+    edge, power = rng.uniform(0.01, 0.03, J) * np.where(slides, 0.2, 1.0), rng.uniform(0.5, 0.8, J)
+    dry = np.minimum(dry, 0.4 * edge * inertia / TIMESTEP_S)
+    law = np.array([dry, edge, rng.uniform(0.0, 0.4, J), viscous * speed ** (1.0 - power), power])
     for cause in rng.choice(FAULTS, int(rng.integers(1, 4)), replace=False) if part == "shapes" else ():
         if cause == "payload":
             kg = float(np.clip(rng.uniform(0.05, 0.12) * sum(c[2] for c in chain), 0.5, 3.0))
-            _load(true, kg, rng, faults, values)
+            faults.append(_load(true, kg, rng))
         else:
             # A zero where it shows most; a scale not at the first joint, where it is the link's inertia; one each.
             shows = {
@@ -206,23 +189,21 @@ def make(part: str, seed: int, folder: Path) -> tuple[SerialModel, list[JointLog
             faults.append(_fault(str(cause), j, (true, reads), (chain[j], asks[j], inertia[j]), rng))
     computed, noise = bool(rng.random() < 0.5), float(rng.uniform(0.003, 0.02))
     step = np.where(slides, 5e-6, 2.0 * np.pi / 2.0 ** rng.integers(16, 20))
-    truth = {"shape": shape, "joints": J, "computed_torque": computed, "noise": round(noise, 4), "foreign": not bare,
-             "faults": faults, "values": values}  # fmt: skip
-    logs = [logged(f"log {k + 1}", p[0], run(true.copy(), p, law, computed), reads, step, noise, rng)
+    truth = {"shape": shape, "joints": J, "computed_torque": computed, "noise": round(noise, 4), "foreign": True,
+             "faults": faults}  # fmt: skip
+    logs = [thinned(logged(f"log {k + 1}", p[0], run(true.copy(), p, law, computed), reads, step, noise, rng))
             for k, p in enumerate(paths)]  # fmt: skip
     return load_model(folder / f"{part}{seed}.xml"), logs, truth
 
 
-def _load(spec: mujoco.MjSpec, kg: float, rng: np.random.Generator, faults: list[Item], values: Item) -> None:
+def _load(spec: mujoco.MjSpec, kg: float, rng: np.random.Generator) -> Item:
     """A box on the last link, axes along the link's."""
     link = spec.bodies[-1]
     box, (a, b, c) = link.add_body(name="load"), rng.uniform(0.03, 0.07, 3) ** 2
     box.ipos = [0.0, 0.0, 0.0]  # else MuJoCo puts the centre of mass at twice the box's position
     box.mass, box.explicitinertial, box.inertia = kg, True, kg / 3.0 * np.array([b + c, a + c, a + b])
     box.pos = rng.uniform(-1.0, 1.0, 3) * [0.08, 0.08, 0.04] + np.asarray(link.ipos)
-    faults.append({"cause": "payload", "place": link.name, "size": kg})
-    numbers = zip(("m", "mx", "my", "mz"), (kg, *(kg * np.asarray(box.pos))), strict=True)
-    values.update({f"payload {link.name} {label}": float(value) for label, value in numbers})
+    return {"cause": "payload", "place": link.name, "size": kg}
 
 
 def _fault(

@@ -9,19 +9,16 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
-from unittest.mock import patch
 
 import discrepancy
 import mocobot
-from discrepancy.team import diagnosis
 from mocobot_sim.errors import TrialError
-from scoring import AS_THEY_ARE, changed_settings
-from sealed import store
-from sealed.law_score import score_laws
+from sealed import sets
+from sealed.score import score_laws
 from sealed.sets import SealedSet
 
 T = TypeVar("T")
@@ -57,15 +54,15 @@ class How:
 
 def simulate_all(requests: Sequence[SealedSet], how: How) -> None:
     """Simulate what is not there yet; what cannot be simulated is listed in ``not_simulated.jsonl``."""
-    failed = {line["key"] for line in store.read(how.out / "not_simulated.jsonl")}
-    todo = [r for r in requests if r.key not in failed and not store.is_simulated(r, how.out)]
+    failed = {line["key"] for line in sets.read(how.out / "not_simulated.jsonl")}
+    todo = [r for r in requests if r.key not in failed and not sets.is_simulated(r, how.out)]
     apart(todo, lambda request: _simulate(request, how.out), how.jobs)
 
 
 def diagnose_all(requests: Sequence[SealedSet], how: How) -> None:
     """Diagnose what was simulated and has no result of this label yet."""
-    finished = {line["key"] for line in store.read(how.path)}
-    todo = [r for r in requests if r.key not in finished and store.is_simulated(r, how.out)]
+    finished = {line["key"] for line in sets.read(how.path)}
+    todo = [r for r in requests if r.key not in finished and sets.is_simulated(r, how.out)]
     apart(todo, lambda request: _diagnose(request, how), how.jobs)
 
 
@@ -80,58 +77,38 @@ def simulate_and_diagnose(requests: Sequence[SealedSet], how: How) -> None:
     apart(requests, work, how.jobs)
 
 
-def change_settings(requests: Sequence[SealedSet], how: How) -> None:
-    """Every other set with ten settings of the engine halved, the others with them doubled, each by the rows alone."""
-    done = {line["key"] for line in store.read(how.path)}
-    for request in requests:
-        simulate_all([request], how)
-        changes: Iterator[tuple[str, Any]] = changed_settings(
-            requests[0].seed, 2.0 if request.seed % 2 else 0.5
-        )
-        for words, settings in [(AS_THEY_ARE, None), *changes]:
-            key = f"{request.key}, {words}"
-            if key not in done:
-                apart([request], lambda one: _changed(one, how, key, words, settings), 1)  # noqa: B023
-
-
-def _changed(request: SealedSet, how: How, key: str, words: str, settings: Any) -> None:
-    with patch.object(diagnosis, "SETTINGS", settings or diagnosis.SETTINGS):
-        _diagnose(request, how, {"key": key, "change": words}, closed_loop=False)
-
-
 def _simulate(request: SealedSet, out: Path) -> None:
     start = time.process_time()
     try:
-        store.simulate(request, out)
+        sets.simulate(request, out)
         said = f"{time.process_time() - start:.1f} s of CPU"
     except Exception as error:  # one that cannot be simulated must not end the campaign
         cause = str(error) if isinstance(error, TrialError) else traceback.format_exc()
-        store.append(out / "not_simulated.jsonl", {"key": request.key, "error": cause})
+        sets.append(out / "not_simulated.jsonl", {"key": request.key, "error": cause})
         said = f"not simulated: {error}"
     print(f"{request.key}: {said}", flush=True)
 
 
-def _diagnose(
-    request: SealedSet, how: How, more: dict[str, Any] | None = None, *, closed_loop: bool | None = None
-) -> None:
+def _diagnose(request: SealedSet, how: How) -> None:
     result: dict[str, Any] = {"key": request.key, "set": request.to_dict(), "engine": engine(), "error": None}
     excluded = request.names if request.kind == "left-out" else ()
-    loop = how.closed_loop if closed_loop is None else closed_loop
     _stop_after(how.cpu_s)
     try:
-        result["verdict"] = verdict_on(store.recordings_of(request, how.out), excluded, closed_loop=loop)
+        result["verdict"] = verdict_on(
+            sets.recordings_of(request, how.out), excluded, closed_loop=how.closed_loop
+        )
         said = result["verdict"]["verdict"]
     except Exception:
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
-    result |= costs() | (more or {})
-    result["truth"] = store.truth_of(request, how.out)  # opened after the verdict
+    result |= costs()
+    result["truth"] = sets.truth_of(request, how.out)  # opened after the verdict
     if not result["error"]:
-        scores = score_laws(result, store.recordings_of(request, how.out))
+        scores = score_laws(result, sets.recordings_of(request, how.out))
         result["law_scores"] = [asdict(one) for one in scores]
-    store.append(how.path, result)
+    sets.append(how.path, result)
     if not how.keep:
-        store.forget(request, how.out)
+        sets.forget(request, how.out)
     print(f"{result['key']}: {said}, {result['cpu_s']:.1f} s of CPU", flush=True)
 
 

@@ -1,8 +1,7 @@
 """The sealed campaign: simulate sets, diagnose them blind, print the tables.
 
     python benchmarks/sealed/run.py --part PART --first SEED --draws N
-    python benchmarks/sealed/run.py --settings --draws 20                   # of the engine, halved and doubled
-    python benchmarks/sealed/run.py --tables                                # or --misses; with --settings
+    python benchmarks/sealed/run.py --tables                                # or --misses
 
 Parts are ``single``, ``pairs``, ``clean``, ``triples``, ``forms`` (other than the catalogue's), ``unlisted``,
 ``sliding`` (stiction and play), ``uncalibrated`` (one fault in a team that nobody calibrated), ``logs`` (healthy, by
@@ -31,9 +30,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import tyro
 
-from sealed import store
-from sealed.backgrounds import Background
-from sealed.campaign import How, change_settings, diagnose_all, simulate_all, simulate_and_diagnose
+from sealed import sets
+from sealed.campaign import How, diagnose_all, simulate_all, simulate_and_diagnose
+from sealed.limits import Background
 from sealed.sets import TIMESTEP_S, Kind, SealedSet, plan
 from sealed.tables import misses, tables
 
@@ -55,7 +54,7 @@ class Options:
         jobs: processes.
         only: simulate or diagnose only.
         kept: diagnose every set that is in the folder, whatever its seed.
-        label: name of the results; ``results`` or ``settings`` if not given.
+        label: name of the results.
         background: the robots; drawn if not given.
         factors: sizes over the limit, in turn; drawn if none is given.
         names: causes or forms, in turn; drawn if none is given.
@@ -63,7 +62,6 @@ class Options:
         cpu_s: CPU time after which a diagnosis is given up [s].
         closed_loop: run the recorded commands again.
         keep: keep the recordings of diagnosed sets.
-        settings: diagnose each set by its rows with ten settings of the engine halved, every other with them doubled.
         tables: print the tables of the results instead.
         misses: print every set that is not wholly right instead.
         list: print what the sets are instead.
@@ -76,7 +74,7 @@ class Options:
     jobs: int = 1
     only: Literal["both", "simulate", "diagnose"] = "both"
     kept: bool = False
-    label: str = ""
+    label: str = "results"
     background: Background | None = None
     factors: tuple[float, ...] = ()
     names: tuple[str, ...] = ()
@@ -84,7 +82,6 @@ class Options:
     cpu_s: int = 600
     closed_loop: bool = True
     keep: bool = True
-    settings: bool = False
     tables: bool = False
     misses: bool = False
     list: bool = False
@@ -111,16 +108,13 @@ def planned(options: Options) -> Sequence[SealedSet]:
 
 def main(options: Options) -> None:
     """Run, or print what was run."""
-    label = options.label or ("settings" if options.settings else "results")
-    how = How(options.out, label, options.jobs, options.cpu_s, options.closed_loop, options.keep)
+    how = How(options.out, options.label, options.jobs, options.cpu_s, options.closed_loop, options.keep)
     if options.tables or options.misses:
-        print((tables if options.tables else misses)(store.read(how.path)))
+        print((tables if options.tables else misses)(sets.read(how.path)))
         return
-    requests = store.kept(options.out) if options.kept else planned(options)
+    requests = sets.kept(options.out) if options.kept else planned(options)
     if options.list:
         print("\n".join(request.key for request in requests))
-    elif options.settings:
-        change_settings(requests, how)
     elif options.only == "simulate":
         simulate_all(requests, how)
     else:

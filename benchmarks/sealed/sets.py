@@ -1,31 +1,144 @@
-"""Data sets of the sealed campaign: planned from a seed, drawn, simulated, read through the sensors."""
+"""Data sets of the sealed campaign: planned from a seed, drawn, simulated, read through the sensors, kept on disk."""
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
 
+from discrepancy.team.causes import CAUSES
 from estimator.recording.model import Recording
-from hidden.generator import PAYLOADS, HiddenSet
-from hidden.generator import generate as generate_hidden
-from hidden.logger import Logger
-from hidden.schedule import SHORT, Schedule
-from mocobot.campaign.effects import gimbal_axes
-from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
-from mocobot_sim.effects.geometry import GraspFlex, robot_mass_kg
-from mocobot_sim.effects.readings import TorqueLag, TorqueSkew
+from estimator.recording.parquet import write_recording
+from hidden import PAYLOADS, SHORT, HiddenSet, Logger, Schedule, ground_of
+from hidden import generate as generate_hidden
+from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
+from mocobot.campaign.draw import UNDECIDABLE, draw_effect
+from mocobot.campaign.ground import gimbal_axes
+from mocobot_sim.effects import EFFECTS, Effect, apply_effects, effect_to_dict
+from mocobot_sim.effects.grasp_flex import GraspFlex
+from mocobot_sim.effects.slides import robot_mass_kg
+from mocobot_sim.effects.torque_lag import TorqueLag
+from mocobot_sim.effects.torque_skew import TorqueSkew
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.scene.soft import row_mass_kg, row_relaxation_s
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
-from sealed.backgrounds import BACKGROUNDS, Background, tolerated, units_of
-from sealed.draw import BEYOND, CATALOGUE, NOWHERE, OTHER, SIZES, WORN, draw, family, largest, possible
-from sealed.forms.base import Form
-from sealed.ground import Ground
+from sealed import forces, readings
+from sealed import joints as at_joints
+from sealed import payload as at_payload
+from sealed.form import Form, Ground
+from sealed.limits import BACKGROUNDS, LIMITS, Background, limit_over_nominal, tolerated, units_of
+
+LISTED: tuple[type[Form], ...] = (
+    at_joints.DrivenLugre, at_joints.DrivenDahl, at_joints.GimbalLugre, at_joints.GimbalDahl,
+    at_joints.BoucWenSpring, at_joints.SoftPlay, at_joints.SlowGrasp, at_joints.TurningGrasp,
+    at_joints.SlowBaseCompliance, at_joints.LateCreep, at_payload.RampPush, at_payload.HalfSinePush,
+    at_payload.DoublePendulum, at_payload.UnequalPendulum, at_joints.SecondOrderTorqueLag,
+    at_joints.SingleTorqueLag, at_payload.PayloadCable, at_payload.RobotCable, at_payload.StiffeningStrap,
+    at_payload.RubberCord, at_payload.TurningDrag, at_payload.PowerDrag, at_payload.MassDrift,
+    at_payload.MassOfTrials,
+)  # fmt: skip
+UNLISTED: tuple[type[Form], ...] = (
+    readings.CrossTalk, readings.WarmingScale, readings.WarmingZero, readings.Saturation,
+    readings.QuadraticReading, readings.AngleInTorque, readings.TorqueHum, readings.EccentricPhi,
+    readings.EccentricTheta, readings.CyclicPhi, readings.EncoderBacklash, readings.SoftEncoderMount,
+    readings.SlippingZero, forces.Cogging, forces.CubicSpring, forces.CableSpring, forces.DoorCloser,
+    forces.GrowingPush, forces.Shaker, forces.Gyroscope, forces.ShiftingLoad, forces.SinkingBase,
+)  # fmt: skip
+OUTSIDE: tuple[type[Form], ...] = (
+    readings.ScratchedDisc, readings.SoftSaturation, readings.LooseBridge, readings.FineInterpolation,
+    forces.SlackHose,
+)  # fmt: skip
+"""Unlisted ones whose formula the dictionary of laws does not have either."""
+FAULTY: tuple[type[Form], ...] = (
+    readings.DropoutsPhi, readings.DropoutsTheta, readings.TorqueRamp, readings.TorqueWalk, readings.DeadBand,
+)  # fmt: skip
+"""Unlisted ones of which sensors wear out."""
+FAULTS = (
+    *FAULTY, readings.CrossTalk, readings.EccentricPhi, readings.EccentricTheta, at_payload.MassDrift,
+    at_payload.HalfSinePush,
+)  # fmt: skip
+"""These, and others that come with use: drawn by themselves."""
+KNOWN: tuple[type[Form], ...] = (at_payload.QuadraticDrag, readings.TorqueBacklash)
+"""Listed ones whose law the catalogue has by now: hidden by name only."""
+FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE, *FAULTY)}
+
+
+SIZES = (2.0, 20.0)
+"""Over the limit; drawn evenly in logarithm."""
+MOST: dict[str, float] = {
+    "phi_zero": 60.0, "theta_zero": 80.0, "link_length": 40.0, "base_tilt": 40.0, "base_creep": 100.0,
+    "base_compliance": 40.0, "grasp_flex": 25.0, "grasp_play": 20.0, "sea_bias": 50.0, "sea_scale": 40.0,
+    "sea_hardening": 25.0, "sea_hysteresis": 30.0, "joint_friction": 40.0, "gimbal_friction": 25.0,
+    "torque_skew": 15.0, "torque_lag": 5.0, "sensor_lag": 5.0, "clock_delay": 40.0,
+    "second_order_torque_lag": 5.0, "single_torque_lag": 5.0, "turning_grasp": 15.0, "slow_grasp": 20.0,
+    "soft_play": 20.0, "bouc_wen_spring": 12.0, "driven_lugre": 40.0, "driven_dahl": 40.0, "gimbal_lugre": 25.0,
+    "gimbal_dahl": 25.0, "slow_base_compliance": 40.0, "late_creep": 100.0, "cubic_spring": 6.0,
+    "dropouts_phi": 8.0, "dropouts_theta": 8.0,
+}  # fmt: skip
+"""Largest size over the limit within tolerances with which a trial runs: a torque loop with 9 ms of lag does not."""
+
+
+def largest(name: str, background: Background) -> float:
+    """Largest size over the limit of the background."""
+    return MOST.get(name, np.inf) / over_nominal(name, background)
+
+
+def over_nominal(name: str, background: Background) -> float:
+    """Detection limit of a cause or form in a background over that within tolerances."""
+    if name == "pushes":
+        return 1.0
+    if name in FORMS:
+        return LIMITS[name][background] / LIMITS[name]["x1"]
+    return limit_over_nominal(name, background)
+
+
+def possible(names: Sequence[str], background: Background, least: float = SIZES[0]) -> list[str]:
+    """Those that can be hidden in a background."""
+    hidden = SPREAD_IN_UNCALIBRATED if background == "uncalibrated" else ()
+    return [name for name in names if name not in hidden and largest(name, background) >= least]
+
+
+def family(name: str) -> str:
+    """Family of a cause or form; an unlisted one is its own."""
+    answer = FORMS[name].answer if name in FORMS else name
+    return CAUSES[answer].family if answer in CAUSES else f"unlisted {name}"
+
+
+def draw(
+    name: str, factor: float, background: Background, ground: Ground, rng: np.random.Generator
+) -> list[Effect]:
+    """One effect of ``factor`` times the limit of its background; ``pushes`` are one in every trial that moves."""
+    if name == "pushes":
+        kind = at_payload.RampPush if rng.uniform() < 0.5 else at_payload.HalfSinePush
+        return list(at_payload.in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
+    if name in EFFECTS:
+        factor *= limit_over_nominal(name, background)
+        return [draw_effect(name, factor, ground_of(ground.robots, ground.p_1c, ground.moving), rng)]
+    form = FORMS[name]
+    return [form.drawn(factor * LIMITS[name][background], ground, _place(form, ground, rng), rng)]
+
+
+def _place(form: type[Form], ground: Ground, rng: np.random.Generator) -> dict[str, int]:
+    names = form.place_names()
+    joints = [joint for joint in (1, 2, 3) if (form.answer, joint) not in UNDECIDABLE]
+    place = {"robot": int(rng.integers(1, ground.robots + 1))} if "robot" in names else {}
+    return place | ({"joint": int(rng.choice(joints))} if "joint" in names else {})
+
+
+CATALOGUE = tuple(name for name in CAUSES if name in EFFECTS)
+OTHER = tuple(form.cause for form in LISTED)
+NOWHERE = tuple(form.cause for form in UNLISTED)
+BEYOND = tuple(form.cause for form in OUTSIDE)
+WORN = tuple(form.cause for form in FAULTS)
+
 
 TIMESTEP_S = 1e-3
 """As the diagnosis: the integrator's error is below the sensors' noise."""
@@ -56,7 +169,7 @@ SLIDING = (
 HOUR = Schedule(randoms=2, vias=1375, periodic_s=None, hold_s=None)
 """Two trials of half an hour: 1.31 s a via."""
 SHARES = (0.4, 0.25, 0.2, 0.15)
-"""Of the backgrounds where they are drawn."""
+"""Shares of the backgrounds where they are drawn."""
 
 SPRINGS = {"base_compliance": "base{robot}_compliance_x", "grasp_flex": "grasp{robot}_flex_x"}
 """Rows of a scene that hold what gives way."""
@@ -192,7 +305,7 @@ def generate(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
     background = [
         effect
         for effect in tolerated(request.background, nominal.robots, request.rng("background"))
-        if _place(effect) not in taken
+        if _place_of(effect) not in taken
     ]
     recordings = []
     for number, trajectory in enumerate(trajectories, start=1):
@@ -224,7 +337,7 @@ def _logged(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
 
 def _places(effect: Effect) -> list[tuple[Any, ...]]:
     """Cause and place of an effect, and of what is tolerated in its place."""
-    where = _place(effect)
+    where = _place_of(effect)
     if not isinstance(effect, Form):
         return [where]
     # MuJoCo has six joints between two bodies at most, so a grasp gives way in one form only.
@@ -234,7 +347,7 @@ def _places(effect: Effect) -> list[tuple[Any, ...]]:
     return [where, *((cause, *where[1:]) for cause in instead)]
 
 
-def _place(effect: Effect) -> tuple[Any, ...]:
+def _place_of(effect: Effect) -> tuple[Any, ...]:
     return effect.cause, *(getattr(effect, name) for name in effect.place_names())
 
 
@@ -264,3 +377,83 @@ def _told(effect: Effect, scene: TeamScene, background: Sequence[Effect]) -> dic
         known[LATE[cause]] += sum(getattr(late, LATE[late.cause]) for late in own)
     answer = {"cause": cause, "robot": told.get("robot"), "joint": told.get("joint"), "known": known}
     return told | {"form": isinstance(effect, Form), "answer": answer, "law": law}
+
+
+def folder_of(request: SealedSet, out: Path) -> Path:
+    """Where a set is kept."""
+    return out / "sets" / request.key
+
+
+def is_simulated(request: SealedSet, out: Path) -> bool:
+    """Whether it is there, whole."""
+    return (folder_of(request, out) / "truth.json").is_file()
+
+
+def simulate(request: SealedSet, out: Path) -> dict[str, Any]:
+    """Simulate a set, and keep its recordings and its truth.
+
+    Raises:
+        TrialError: the physics of a trial cannot be trusted.
+    """
+    here = folder_of(request, out)
+    here.mkdir(parents=True, exist_ok=True)
+    recordings, truth = generate(request)
+    for number, recording in enumerate(recordings, start=1):
+        write_recording(recording, here / f"trial{number}.parquet")
+    content = {"request": request.to_dict(), "truth": truth}
+    temporary = here / "truth.tmp"
+    temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    os.replace(temporary, here / "truth.json")  # last: a folder with a truth is complete
+    return truth
+
+
+def kept(out: Path) -> list[SealedSet]:
+    """Every set that is there, whole, by seed."""
+    requests = []
+    for path in sorted((out / "sets").glob("*/truth.json")):
+        values = json.loads(path.read_text(encoding="utf-8"))["request"]
+        values["schedule"] = Schedule(**values["schedule"])
+        values |= {name: tuple(values[name]) for name in ("names", "factors")}
+        requests.append(SealedSet(**values))
+    return sorted(requests, key=lambda request: request.seed)
+
+
+def recordings_of(request: SealedSet, out: Path) -> list[Path]:
+    """Files of its trials, in order."""
+    return sorted(folder_of(request, out).glob("trial*.parquet"))
+
+
+def truth_of(request: SealedSet, out: Path) -> dict[str, Any]:
+    """What was hidden.
+
+    Raises:
+        ValueError: the folder belongs to another request.
+    """
+    path = folder_of(request, out) / "truth.json"
+    content = json.loads(path.read_text(encoding="utf-8"))
+    if content["request"] != json.loads(json.dumps(request.to_dict())):
+        raise ValueError(f"{path} belongs to another request; delete its folder or choose another one")
+    return content["truth"]
+
+
+def forget(request: SealedSet, out: Path) -> None:
+    """Delete its recordings; the truth stays with the results."""
+    shutil.rmtree(folder_of(request, out))
+
+
+def append(path: Path, result: dict[str, Any]) -> None:
+    """Add one line; a line is written whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    try:
+        os.write(descriptor, (json.dumps(result) + "\n").encode())
+    finally:
+        os.close(descriptor)
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """All results; of a set that was repeated, the last."""
+    if not path.is_file():
+        return []
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    return list({(line.get("part"), line["key"]): line for line in lines}.values())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -13,7 +13,7 @@ from discrepancy.team.estimates import errors
 from mocobot.campaign.summary import interval, reliability
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.truth import GroundTruth
-from scoring import AS_THEY_ARE, log_score, median_and_most
+from scoring import log_score, median_and_most
 from sealed.score import Score, Scored, score
 
 SIZES = ((0.0, 3.0, "below 3 limits"), (3.0, np.inf, "3 limits and more"))
@@ -39,7 +39,6 @@ def tables(results: Iterable[Result]) -> str:
         _markdown("Effects by name", NAMES, _by_name(scored)),
         _reliability(stated),
         _markdown("What the verdict is worth: median before -> after, sets in which it falls", WORTH, _worth(scored)),
-        "\n".join(_changes(results)),
         "\n".join(f"{n} x {error}" for error, n in _failures(results).items()),
     ]  # fmt: skip
     return "\n\n".join(table for table in each if table)
@@ -48,17 +47,13 @@ def tables(results: Iterable[Result]) -> str:
 def rows_of(results: Sequence[Result]) -> dict[str, list[Result]]:
     """Results by what is hidden, its size and the robots, from the whole to the parts; a set may be in several."""
     out: dict[str, list[Result]] = {}
-    for result in sorted(results, key=lambda one: (one.get("change", ""), one["set"]["kind"])):
+    for result in sorted(results, key=lambda one: one["set"]["kind"]):
         kind, background = result["set"]["kind"], result["set"]["background"]
-        names = [result["change"]] if "change" in result else [kind, f"{kind}, {background}"]
-        if "change" not in result:
-            least = min(result["set"]["factors"], default=np.nan)
-            names += [f"{kind}, {words}" for low, high, words in SIZES if low <= least < high]
-            names += (
-                ["uncalibrated with a fault"]
-                if background == "uncalibrated" and result["set"]["names"]
-                else []
-            )
+        least = min(result["set"]["factors"], default=np.nan)
+        names = [kind, f"{kind}, {background}"]
+        names += [f"{kind}, {words}" for low, high, words in SIZES if low <= least < high]
+        if background == "uncalibrated" and result["set"]["names"]:
+            names.append("uncalibrated with a fault")
         for name in names:
             out.setdefault(name, []).append(result)
     return out | {"all": list(results)}
@@ -159,22 +154,6 @@ def _before_after(pairs: Sequence[Sequence[float]]) -> str:
         return "-"
     before, after = np.transpose(pairs)
     return f"{np.median(before):.2g} -> {np.median(after):.2g}, {int(np.sum(after < before))}"
-
-
-def _changes(results: Sequence[Result]) -> Iterator[str]:
-    """How many verdicts name something else with a setting changed."""
-    named = {
-        (result["key"].partition(",")[0], result["change"]):
-        sorted((c["cause"], c["place"]) for c in result["verdict"]["causes"])
-        for result in results if "change" in result and not result["error"]
-    }  # fmt: skip
-    for words in sorted({words for _, words in named} - {AS_THEY_ARE}):
-        both = [
-            (key, own)
-            for (key, change), own in named.items()
-            if change == words and (key, AS_THEY_ARE) in named
-        ]
-        yield f"{words}: {sum(named[key, AS_THEY_ARE] != own for key, own in both)} of {len(both)} verdicts change"
 
 
 def _failures(results: Iterable[Result]) -> Counter[str]:

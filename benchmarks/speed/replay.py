@@ -1,4 +1,4 @@
-"""Time to log a replay, and size of its file: python benchmarks/speed/replay.py [REC.parquet]
+"""Time to log a replay, and size of its file: python benchmarks/speed/replay.py [--recording REC.parquet]
 
 Without a recording, a random trial of 110 s with three robots is simulated; `nominal` sensors repeat values, `ideal`
 ones never do, so that their file is as large as such a trial's can be. Reading and estimating are not counted.
@@ -6,10 +6,11 @@ ones never do, so that their file is as large as such a trial's can be. Reading 
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import time
 from pathlib import Path
+
+import tyro
 
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
@@ -38,22 +39,22 @@ def measure(recording: Recording) -> tuple[list[float], list[float], float]:
         return prepare, write, path.stat().st_size / 1e6
 
 
-def main() -> None:
+def main(recording: Path | None = None) -> None:
     """Print times and sizes."""
-    if sys.argv[1:]:
-        recordings = {sys.argv[1]: read_recording(sys.argv[1])}
+    if recording:
+        recordings = {str(recording): read_recording(recording)}
     else:
         presets = [sensor_preset(name) for name in ("nominal", "ideal")]
         recordings = simulate(TrialRequest("a", "random"), presets).recordings
-    for name, recording in recordings.items():
-        prepare, write, size = measure(recording)
+    for name, each in recordings.items():
+        prepare, write, size = measure(each)
         total = sorted(p + w for p, w in zip(prepare, write, strict=True))
         print(
-            f"{name}: {recording.time[-1] - recording.time[0]:.1f} s, {recording.metadata.robots} robots: "
+            f"{name}: {each.time[-1] - each.time[0]:.1f} s, {each.metadata.robots} robots: "
             f"prepare {min(prepare):.2f} s, log and write {min(write):.2f} s, together {total[0]:.2f} .. "
             f"{total[-1]:.2f} s of {RUNS}; {size:.1f} MB"
         )
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main, description=__doc__)

@@ -1,6 +1,6 @@
 """How long the command line takes to say its help, and to refuse what it cannot do: seconds of CPU and of the clock.
 
-python benchmarks/speed/startup.py [RUNS]
+python benchmarks/speed/startup.py [--runs RUNS]
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import sys
 import tempfile
 import time
 from statistics import median
+
+import tyro
 
 LINES = (
     "--help",
@@ -68,4 +70,4 @@ def main(runs: int = 5) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    tyro.cli(main, description=__doc__)

@@ -1,8 +1,7 @@
 """Pictures of results in docs/img, made anew: python docs/site/result_pictures.py [FOLDER]
 
 Runs the scenario of a hidden effect, copies what its verdict shows, and photographs report pages in an installed
-Chromium. FOLDER (out/pictures) keeps verdicts and pages. Of the paper's experiment the page that `make paper` left in
-out/paper is taken.
+Chromium. FOLDER (out/pictures) keeps verdicts and pages. The page of the paper's experiment is that of `make paper`.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import pytest
 from source_tree import SRC, module_files
 
 ROOT = SRC.parent
-PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("models/**/*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("models/**/*.md")])
 TOP = ("src", "tests", "docs", "models", "scenarios", "benchmarks")
 PACKAGES = sorted(path.name for path in SRC.iterdir() if (path / "__init__.py").is_file())
 INVENTED = {"src/mocobot_sim/effects/wind.py", "src/discrepancy/team/causes/wind.py"}
@@ -156,10 +156,9 @@ def test_effects_lists_every_cause() -> None:
     assert sorted(named) == sorted(EFFECTS)
 
 
-def test_readme_lists_every_package_and_no_other() -> None:
-    listed = re.findall(
-        r"^\| `src/([\w/]+)/` \|", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
+def test_contributing_lists_every_package_and_no_other() -> None:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `src/([\w/]+)/` \|", page, re.MULTILINE)
     assert sorted(listed) == PACKAGES
 
 

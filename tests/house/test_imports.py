@@ -1,4 +1,4 @@
-"""Imports run one way and without circles, and each package needs what the README says of it and nothing more."""
+"""Imports run one way and without circles, and each package needs what CONTRIBUTING says of it and nothing more."""
 
 from __future__ import annotations
 

@@ -50,13 +50,13 @@ def test_what_is_known_is_what_the_simulation_has(name, parameter):
 def test_same_seed_same_bits(tmp_path):
     """Recordings and truth, of a team with everything a little off and an effect of another form."""
     request = replace(plan("forms", 3, "x3", 4.0, "driven_lugre"), schedule=TINY)
-    truths = [store.simulate(request, tmp_path / name) for name in "ab"]
-    assert truths[0] == truths[1] == store.truth_of(request, tmp_path / "a")
-    files = [store.recordings_of(request, tmp_path / name) for name in "ab"]
+    truths = [sets.simulate(request, tmp_path / name) for name in "ab"]
+    assert truths[0] == truths[1] == sets.truth_of(request, tmp_path / "a")
+    files = [sets.recordings_of(request, tmp_path / name) for name in "ab"]
     assert len(files[0]) == 1
     assert [f.read_bytes() for f in files[0]] == [f.read_bytes() for f in files[1]]
-    assert store.kept(tmp_path / "a") == [request]
-    other = store.simulate(replace(request, seed=4), tmp_path / "c")
+    assert sets.kept(tmp_path / "a") == [request]
+    other = sets.simulate(replace(request, seed=4), tmp_path / "c")
     assert other["background"] != truths[0]["background"]
     (effect,) = truths[0]["effects"]
     assert effect["answer"]["cause"] == "joint_friction"

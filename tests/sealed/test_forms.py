@@ -15,29 +15,35 @@ from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import Trajectory, random_vias
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
-from sealed.draw import draw
-from sealed.forms.base import Form
-from sealed.forms.cables import PayloadCable, RobotCable, RubberCord, StiffeningStrap
-from sealed.forms.creep import LateCreep
-from sealed.forms.drags import PowerDrag, QuadraticDrag
-from sealed.forms.grasps import SoftPlay, TurningGrasp
-from sealed.forms.lags import SingleTorqueLag
-from sealed.forms.masses import MassDrift
-from sealed.forms.parts import JointTorque, PayloadWrench, PointForce
-from sealed.forms.pendulums import DoublePendulum, UnequalPendulum
-from sealed.ground import Ground
-from sealed.registry import FORMS
-from sealed.unlisted.encoders import CyclicPhi, EccentricPhi, EccentricTheta, SlippingZero, SoftEncoderMount
-from sealed.unlisted.readings import (
+from sealed.form import Form, Ground, JointTorque, PayloadWrench, PointForce
+from sealed.joints import LateCreep, SingleTorqueLag, SoftPlay, TurningGrasp
+from sealed.payload import (
+    DoublePendulum,
+    MassDrift,
+    PayloadCable,
+    PowerDrag,
+    QuadraticDrag,
+    RobotCable,
+    RubberCord,
+    StiffeningStrap,
+    UnequalPendulum,
+)
+from sealed.readings import (
     AngleInTorque,
     CrossTalk,
+    CyclicPhi,
+    EccentricPhi,
+    EccentricTheta,
     QuadraticReading,
     Saturation,
+    SlippingZero,
+    SoftEncoderMount,
     TorqueBacklash,
     TorqueHum,
     WarmingScale,
     WarmingZero,
 )
+from sealed.sets import FORMS, draw
 
 GRAVITY = 9.81
 HOME_PHI = 0.6230299772752583

@@ -7,9 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from sealed.laws.friction import Dahl, Lugre
-from sealed.laws.hysteresis import BoucWen, Play
-from sealed.laws.lag import SecondOrderLag
+from sealed.form import BoucWen, Dahl, Lugre, Play, SecondOrderLag
 
 DT = 1e-3
 

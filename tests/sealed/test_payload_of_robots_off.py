@@ -6,7 +6,7 @@ import pytest
 
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.estimates import errors
-from hidden.schedule import Schedule
+from hidden import Schedule
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.truth import GroundTruth
 from sealed.sets import generate, plan

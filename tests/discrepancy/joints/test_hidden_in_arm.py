@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from arm import machine
-from arm.forms import CAUSE_OF, Form
+from joints import arm as machine
+from joints.arm import CAUSE_OF, Form
 
 SIZES = {"yielding": 1e-4, "rotor": 0.05}
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from arm import machine
-from arm.forms import CAUSE_OF, TYPICAL, Form
-from arm.limits import Shown, read
-from arm.sets import ArmSet
 from discrepancy.joints.problem import TILT_RAD
+from joints import arm as machine
+from joints.arm import CAUSE_OF, TYPICAL, Form
+from joints.sets import ArmSet, Shown, read
 
 
 @pytest.mark.slow

@@ -21,8 +21,8 @@ from mocobot.campaign.effects import cheaper, draw_background
 from mocobot_sim.effects import Effect, make_effect
 from mocobot_sim.extended.extended import load_extended
 from mocobot_sim.scene.scene import build_team
-from sealed.forms.pushes import HalfSinePush
-from sealed.forms.springs import BoucWenSpring
+from sealed.joints import BoucWenSpring
+from sealed.payload import HalfSinePush
 
 pytestmark = pytest.mark.slow
 

@@ -18,8 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.errors import InputError
-from fuzzing.originals import FORMATS, write_original
-from fuzzing.trial import check_original, try_damaged
+from fuzzing import FORMATS, check_original, try_damaged, write_original
 from mocobot_logs.log import CHANNELS, REF, collect
 from mocobot_logs.maps import TIME_UNITS, parse_map
 from mocobot_logs.open_log import open_log

@@ -1,1 +1,0 @@
-"""Effects hidden in a simulated seven-axis arm, and what the diagnosis makes of its logs."""

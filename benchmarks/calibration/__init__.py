@@ -1,1 +1,0 @@
-"""How good calibrations of simulated teams are, against the truth."""

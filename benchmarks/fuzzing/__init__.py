@@ -1,1 +1,0 @@
-"""Damage to real logs, and what the readers make of it."""

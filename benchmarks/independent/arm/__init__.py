@@ -1,1 +1,0 @@
-"""One Delta arm with its gimbal: geometry and inverse dynamics."""

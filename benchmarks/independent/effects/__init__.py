@@ -1,1 +1,0 @@
-"""What can be hidden, and how it is drawn."""

@@ -1,1 +1,0 @@
-"""Made-up joint logs for `benchmarks/inspect_joints.py`."""

@@ -1,1 +1,0 @@
-"""Effects in other forms than the catalogue's laws; ``registry`` lists them."""

@@ -1,1 +1,0 @@
-"""Laws of friction, hysteresis and sensors as the literature has them, one step at a time; no simulator here."""
