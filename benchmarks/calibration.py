@@ -16,17 +16,15 @@ from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 from estimator.arm.unit import AT, COUNT
-from estimator.arrays import Array
+from estimator.arrays import Array, inertia_matrix, inertia_parameters
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import CalibratedPayload, Calibration
-from estimator.calibrate.prior import Prior
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.calibrate.calibration import CalibratedPayload, Calibration, Prior
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.payload import estimate_payload
-from estimator.estimate.principal import inertia_matrix, inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
-from mocobot_sim.effects.base_tilt import BaseTilt
+from mocobot_sim.effects.geometry import BaseTilt
 from mocobot_sim.errors import TrialError
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset
 from mocobot_sim.trial.simulate import TrialRequest, simulate

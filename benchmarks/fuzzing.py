@@ -24,22 +24,21 @@ from scipy.io import savemat
 
 import mocobot
 from discrepancy.joints.model import load_model
-from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.causes import read_tolerances
 from estimator.arm.design import load_design
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot.cli import COMMANDS
-from mocobot.comparison.compare import compare
-from mocobot.parsing import with_config
+from mocobot.api.comparison import compare
+from mocobot.cli import COMMANDS, with_config
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.joints.parse import read_joint_map
+from mocobot_logs.joints.joint_map import read_joint_map
 from mocobot_logs.log import collect
-from mocobot_logs.map.files import MAPS, builtin_map_text, read_map
+from mocobot_logs.maps import MAPS, builtin_map_text, read_map
 from mocobot_logs.open_log import open_log
-from mocobot_sim.effects.spec import EXAMPLE, parse_effect
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.effects.catalogue import EXAMPLE, parse_effect
+from mocobot_sim.scene.as_built import read_units
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 
 DESIGN = Path(__file__).parents[1] / "models" / "omnid" / "design.toml"

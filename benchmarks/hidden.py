@@ -12,12 +12,10 @@ from scipy.interpolate import CubicSpline
 
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
-from mocobot.campaign.background import draw_background
-from mocobot.campaign.draw import draw_effect
-from mocobot.campaign.ground import Ground, gimbal_axes
+from mocobot.campaign.effects import Ground, draw_background, draw_effect, gimbal_axes
 from mocobot_logs.convert import Labels, convert
 from mocobot_logs.log import CHANNELS, REF, Level, Samples
-from mocobot_logs.resample.log import RATE_HZ as CONVERTED_HZ
+from mocobot_logs.resample import RATE_HZ as CONVERTED_HZ
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_team

@@ -23,11 +23,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import tyro
 
-from discrepancy.evidence.odds import borne_out, odds_of
+from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.diagnose import diagnose
-from discrepancy.joints.given import Given
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import Given
 from joints import arm as machine
 from joints.foreign import make
 from joints.sets import ArmSet, Kind
@@ -108,7 +108,7 @@ def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
     steps: list[str] = []
     given = Given(excluded=frozenset(truth.get("excluded", ())))
     outcome = diagnose(model, logs, SETTINGS, say=lambda line: steps.append(str(line)), given=given)
-    state, causes = borne_out(outcome.search, outcome.state), []
+    state, causes = without_unfounded(outcome.search, outcome.state), []
     for o in odds_of(outcome.search, state):
         rivals = [(r.group.key if r.group else ("nothing", ""), r.probability) for r in o.rivals]
         every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mocobot.campaign.draw import REACH_M
+from mocobot.campaign.effects import REACH_M
 from mocobot_sim.effects.base import precise
 from mocobot_sim.effects.geometry import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE, add_slides
 from mocobot_sim.scene.scene import TeamScene

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from scipy.signal import cont2discrete
 
-from mocobot.campaign.ground import moving_intervals
+from mocobot.campaign.effects import moving_intervals
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex

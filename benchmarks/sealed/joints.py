@@ -8,21 +8,22 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocobot_sim.effects.base_creep import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE
-from mocobot_sim.effects.slides import (
+from mocobot_sim.effects.base import precise
+from mocobot_sim.effects.geometry import (
+    ARMATURE_KG,
+    DAMPING_NS_PER_M,
     LOOSE_ARMATURE_KG,
     SPRUNG_ARMATURE_KG,
+    TOLERANCE,
     add_slides,
     add_springs,
     base_slides,
     grasp_body,
     widened,
 )
-from mocobot_sim.effects.solver import precise
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.soft import spring_parameters
-from mocobot_sim.trial.actors import Actor, Reader, Stage
-from mocobot_sim.trial.readings import Misreading, RobotReadings
+from mocobot_sim.trial.actors import Actor, Misreading, Reader, RobotReadings, Stage
 from sealed.form import BoucWen, Dahl, Form, Ground, JointTorque, Kind, Lugre, Place, SecondOrderLag
 
 POSITIVE = (0.0, 1e4)

@@ -14,9 +14,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import default_tolerances
 from hidden import LIMITS as IN_TOLERANCE
-from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED, cheaper, draw_background
+from mocobot.campaign.effects import SPREAD_IN_UNCALIBRATED, cheaper, draw_background
 from mocobot_sim.effects import EFFECTS, Effect
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.trial.sensors import sensor_preset

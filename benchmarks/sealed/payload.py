@@ -12,11 +12,10 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from estimator.arrays import Array
-from estimator.estimate.principal import inertia_parameters
+from estimator.arrays import Array, inertia_parameters
 from hidden import pendulum_limit_kg
-from mocobot.campaign.draw import REACH_M
-from mocobot_sim.effects.spring import add_site, tie
+from mocobot.campaign.effects import REACH_M
+from mocobot_sim.effects.payload import add_site, tie
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Actor, Stage

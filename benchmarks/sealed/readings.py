@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from mocobot_sim.trial.actors import Reader
-from mocobot_sim.trial.readings import Misreading, RobotReadings
+from mocobot_sim.trial.actors import Misreading, Reader, RobotReadings
 from sealed.form import BoucWen, Form, Ground, Place, Play
 
 SCRATCH_RAD = 0.05

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.team.causes import CAUSES
-from discrepancy.team.tolerances import default_tolerances
+from discrepancy.team.causes import CAUSES, default_tolerances
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
-from mocobot.campaign.ground import one_axis
+from mocobot.campaign.effects import one_axis
 from mocobot.campaign.summary import Score, match
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.scene.models import omnid_design

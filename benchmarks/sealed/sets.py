@@ -17,14 +17,10 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from hidden import PAYLOADS, SHORT, HiddenSet, Logger, Schedule, ground_of
 from hidden import generate as generate_hidden
-from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
-from mocobot.campaign.draw import UNDECIDABLE, draw_effect
-from mocobot.campaign.ground import gimbal_axes
+from mocobot.campaign.effects import SPREAD_IN_UNCALIBRATED, UNDECIDABLE, draw_effect, gimbal_axes
 from mocobot_sim.effects import EFFECTS, Effect, apply_effects, effect_to_dict
-from mocobot_sim.effects.grasp_flex import GraspFlex
-from mocobot_sim.effects.slides import robot_mass_kg
-from mocobot_sim.effects.torque_lag import TorqueLag
-from mocobot_sim.effects.torque_skew import TorqueSkew
+from mocobot_sim.effects.geometry import GraspFlex, robot_mass_kg
+from mocobot_sim.effects.readings import TorqueLag, TorqueSkew
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.scene.soft import row_mass_kg, row_relaxation_s
 from mocobot_sim.trial.sensors import measure, sensor_preset

@@ -10,16 +10,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import mocobot_report as sought
 from estimator.errors import InputError
 from estimator.files import check_place, check_target, holds, system_errors
 from estimator.strict import read_json
 from mocobot import options as opt
 from mocobot_logs.formats import PARQUET as MAGIC
 from mocobot_logs.formats import log_kind, output_kind
-from mocobot_report import sought
 from mocobot_sim.effect_names import check_effect_name
-from mocobot_sim.scene.model_files import payload_path
-from mocobot_sim.trial.sidecar import truth_path
+from mocobot_sim.scene.models import payload_path, truth_path
 
 CALIBRATION = "calibration.json"
 """The file in the folder of ``mocobot calibrate --out``."""
@@ -70,7 +69,7 @@ def map_file(name: str) -> list[Path]:
     """The file that a map is read from, none for a built-in one."""
     if not Path(name).is_file():
         return []
-    from mocobot_logs.map.files import MAPS  # takes time, and files are seldom named like built-in maps
+    from mocobot_logs.maps import MAPS
 
     return [] if name in MAPS else [Path(name)]
 
@@ -190,7 +189,7 @@ def check_simulate(options: opt.Simulate) -> None:
     options.check()
     _check_payload(options.payload)
     if options.effects:
-        from mocobot_sim.effects.spec import parse_effect  # numpy, and a file for each effect
+        from mocobot_sim.effects.catalogue import parse_effect
 
         for text in options.effects:
             parse_effect(str(text))

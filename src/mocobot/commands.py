@@ -25,7 +25,7 @@ from mocobot.checks import TRUTH, check_target_of, inputs_of, targets
 from mocobot.cli import NotGood
 from mocobot.progress import bar, share_bar, stages
 from mocobot.results import Folder, file_facts, provenance
-from mocobot_sim.trial.sidecar import truth_path
+from mocobot_sim.scene.models import truth_path
 
 WIDTH, WIDEST, INDENT = 110, 100, "    "
 
@@ -263,7 +263,7 @@ def simulate(options: opt.Simulate) -> None:
 
 def effects(options: opt.Effects) -> None:
     """List what can be hidden in a simulated team, from the effects' own classes."""
-    from mocobot_sim.effects.spec import EXAMPLE, allowed, paragraphs
+    from mocobot_sim.effects.catalogue import EXAMPLE, allowed, paragraphs
 
     width = min(WIDEST, shutil.get_terminal_size((WIDEST, 24)).columns)
     for name in options.name or mocobot.EFFECTS:

@@ -17,7 +17,7 @@ from discrepancy.cause_names import JOINTS, TEAM, excluded_from
 from discrepancy.evidence.settings import ODDS
 from estimator.errors import InputError
 from mocobot_sim.effect_names import check_effect_name
-from mocobot_sim.scene.model_files import payload_path
+from mocobot_sim.scene.models import payload_path
 
 if TYPE_CHECKING:  # from Python the object may be given that a file holds
     AnyPath: TypeAlias = Any

@@ -28,7 +28,7 @@ from typing import Any, ClassVar, TypeVar
 
 from estimator.files import file_facts, holds, whole_folder
 from mocobot.checks import check_folder
-from mocobot_sim.scene.model_files import models_dir
+from mocobot_sim.scene.models import models_dir
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
 """Libraries that a result's numbers pass through."""

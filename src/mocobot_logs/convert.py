@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pcsv
 
+from estimator.arm.delta import wrist_of
 from estimator.arm.design import OmnidDesign
-from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
 from estimator.files import whole_file
 from estimator.recording.checks import check_recording

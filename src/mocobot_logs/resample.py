@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
 from estimator.quantisation import rounding_step
-from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.sampling import SENSORS, Method
+from estimator.recording.metadata import SENSORS, Method, RecordingMetadata
 from mocobot_logs.log import NS, Array, Level, LogSource, Samples, Stamps, joined, repeated, rows_of
 from mocobot_logs.resample_filter import Decimator, Grid, Interpolator, Merger, fineness, fitted_rows
 

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.signal import firwin, kaiser_beta, kaiserord, upfirdn
 
-from estimator.recording.sampling import Sampling
+from estimator.recording.metadata import Sampling
 from mocobot_logs.log import NS, Array, Stamps
 
 PASS, STOP = 0.2, 0.5

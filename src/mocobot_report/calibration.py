@@ -7,9 +7,8 @@ import numpy as np
 from markupsafe import Markup
 
 from estimator.arm.unit import AT
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import carried, grasps_of
-from estimator.calibrate.outcome.text import DEG, MASSES, SHOWN, alike, frames_sentence, shown_groups
+from estimator.calibrate.calibration import Calibration, carried, grasps_of
+from estimator.calibrate.text import DEG, MASSES, SHOWN, alike, frames_sentence, shown_groups
 from mocobot_report.charts import Axis, Chart, Key, axis, bars, dots, log_axis, row_layout
 from mocobot_report.numbers import NONE, counted, kinds_of, percent, plain, short_names, with_error
 from mocobot_report.tables import Entry, Num, measurement, table, vector
@@ -263,10 +262,7 @@ def shares_of(calibration: Calibration) -> tuple[list[str], list[tuple[str, list
 
 def kind_names(kinds: list[str]) -> list[str]:
     """Deviations, grasps and inertial parameters in words."""
-    from estimator.calibrate.outcome.shares import (
-        GRASPS,
-        INERTIAL,
-    )  # with parts of scipy that tables do not need
+    from estimator.calibrate.calibration import GRASPS, INERTIAL
 
     names = {GRASPS: "grasps", INERTIAL: "mass, centre of mass, inertia"}
     return [names.get(kind) or SHOWN[kind].name for kind in kinds]

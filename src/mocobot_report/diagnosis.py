@@ -10,7 +10,6 @@ from markupsafe import Markup
 from scipy.spatial.transform import Rotation
 
 from discrepancy.numbers import one_each, parameter
-from discrepancy.result.lines import NEAREST, NOTHING_WRONG_HERE, SAID, label
 from discrepancy.result.read import (
     AS_FOUND,
     EXTENDED,
@@ -21,16 +20,20 @@ from discrepancy.result.read import (
     read_diagnosis,
 )
 from discrepancy.result.remains import all_as_found, farthest, remedy, sizes_of
-from discrepancy.result.text_gain import (
+from discrepancy.result.report import NEAREST, NOTHING_WRONG_HERE, SAID, label
+from discrepancy.result.tables import (
     ERRORS,
+    blocks,
+    diverged_sentences,
     floor_words,
     foretold_torques,
+    lost,
     response_units,
+    shown_units,
     something_is_off,
 )
-from discrepancy.result.text_rollouts import blocks, diverged_sentences, lost, shown_units
 from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import LIST
 from mocobot_report import residuals

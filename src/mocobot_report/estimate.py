@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.signal import welch
 
+from estimator.arm.unit import frames_said
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.frames import frames_said
-from estimator.estimate.identifiability import FACTOR
+from estimator.estimate.leftover import CONTRADICTS
 from estimator.estimate.result import PayloadEstimate
-from estimator.leftover.contradiction import CONTRADICTS
+from estimator.estimate.uncertainty import FACTOR
 from estimator.statistics import rms_length
 from mocobot_report.charts import (
     Chart,

@@ -8,13 +8,11 @@ from typing import Any
 
 from jinja2 import UndefinedError
 
-from discrepancy.channel import Channel
 from discrepancy.result.read import FORMAT as DIAGNOSIS
 from discrepancy.result.read import as_now, parse_diagnosis
 from discrepancy.result.report import format_verdict
-from discrepancy.result.traces import Trace
-from discrepancy.result.traces_file import NAME as RESIDUALS
-from discrepancy.result.traces_file import load_traces
+from discrepancy.result.traces import NAME as RESIDUALS
+from discrepancy.result.traces import Channel, Trace, load_traces
 from estimator.calibrate.json import FORMAT as CALIBRATION
 from estimator.calibrate.json import calibration_from_dict
 from estimator.errors import InputError

@@ -12,9 +12,8 @@ from mocobot_report.charts import Chart, Key, Trace, column_axis, dots, log_axis
 from mocobot_report.folder import Paper, Result
 from mocobot_report.numbers import PLUS_MINUS, about, plain, spelled, spelled_text
 from mocobot_report.tables import Entry, Num, distance, mass, moment, place, quantity, value
-from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER
-from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.scoring import SPRING_SCALE
+from mocobot_sim.paper.experiment import ONE_FIT, SELF_CALIBRATED, TRANSFER
+from mocobot_sim.paper.scoring import SPRING_SCALE, payload_truth
 from mocobot_sim.paper.tables import (
     BY_ENCODERS,
     MOMENTS,
@@ -25,7 +24,7 @@ from mocobot_sim.paper.tables import (
     spring_share,
     summary_table,
 )
-from mocobot_sim.trial.rows import ROD_LIMIT_M, WELD_LIMIT_M, WELD_LIMIT_RAD
+from mocobot_sim.trial.trial_log import ROD_LIMIT_M, WELD_LIMIT_M, WELD_LIMIT_RAD
 from mocobot_view.pictures.shots import team_shot
 
 COLUMNS = {

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from estimator.arm.unit import AT
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.calibrate.text import SHOWN, shown_groups
 from mocobot_report.calibration import COLOURS, FITS, fits_of, kind_names, shares_of
 from mocobot_report.numbers import short_names
 from mocobot_report.palette import LIGHT

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from discrepancy.numbers import Shown
-from discrepancy.result.lines import drawn, label, relation
-from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.read import is_of_joints
-from discrepancy.result.traces import Group, Trace, group_units, groups
+from discrepancy.result.report import drawn, label, relation
+from discrepancy.result.traces import Group, Trace, binned, group_units, groups, multiples, spectrum
 from estimator.arrays import Array
 from mocobot_report.charts import (
     Axis,

@@ -14,13 +14,11 @@ import pytest
 from scipy.stats import binomtest
 
 from command import refused, run
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, default_tolerances
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
-from hidden.generator import HiddenSet, generate
-from hidden.limits import LIMITS as TABLE
-from hidden.schedule import Schedule
+from hidden import LIMITS as TABLE
+from hidden import HiddenSet, Schedule, generate
 from mocobot.campaign import run as command
 from mocobot.campaign.effects import FORCE, Ground, MeasuredLimits, draw_at, push_limits
 from mocobot.campaign.run import CampaignPlan, CampaignSet, CampaignStore, run_campaign

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mocobot_report.blocks.html import words
 from scipy.spatial.transform import Rotation
 
 import mocobot
 from command import refused, run
+from discrepancy.result.tables import answer
 from discrepancy.team.estimates import errors, seen_by
 from estimator.arm.unit import COUNT
 from estimator.calibrate.calibrate import calibrate
@@ -24,8 +26,6 @@ from invented_calibration import invented_calibration
 from mocobot.api.calibration import Calibration, read_calibration, write_calibration
 from mocobot.api.watch import payload_line as _payload
 from mocobot.cli import main
-from mocobot_report.blocks.html import words
-from mocobot_report.estimate.part import answer
 from mocobot_report.folder import Estimated
 from mocobot_sim.extended.extended import load_extended
 from mocobot_view.facts.fact_files import read_truth

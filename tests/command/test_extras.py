@@ -91,7 +91,7 @@ def test_a_trial_has_the_same_bits_without_numba():
 
 def test_drives_have_the_same_bits_without_numba(monkeypatch):
     from mocobot_sim import compiled
-    from mocobot_sim.base.drive_kernel import update_drives
+    from mocobot_sim.kernels import update_drives
 
     rng = np.random.default_rng(4)
     addresses = [rng.permutation(20)[:8].reshape(2, 4) for _ in range(3)]

@@ -15,8 +15,8 @@ from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.parquet import write_recording
 from invented_calibration import invented_calibration
-from mocobot.files.calibrations import write_calibration
-from mocobot.files.provenance import provenance
+from mocobot.api.calibration import write_calibration
+from mocobot.results import provenance
 from mocobot_sim.paper.experiment import SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.scoring import ENCODER_FRAMES, MOMENTS, SPRING_SCALE, published_errors
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry

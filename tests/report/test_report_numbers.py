@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from discrepancy.numbers import fitting, one_each, parameter
-from discrepancy.result.pictures.residual_statistics import binned, running_rms, spectrum
-from discrepancy.result.traces import Trace
+from discrepancy.result.traces import Trace, binned, running_rms, spectrum
 from mocobot_report.charts import thinned
 from mocobot_report.numbers import (
     about,

@@ -17,13 +17,13 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from estimator.leftover.leftover import Leftover
+from estimator.estimate.leftover import Leftover
 from mocobot_report.charts import around_zero
 from mocobot_report.folder import read_folder, sources
 from mocobot_report.numbers import measured, plain
 from mocobot_report.page import write_report
 from mocobot_report.palette import DARK, LIGHT
-from mocobot_sim.paper.published import published_errors
+from mocobot_sim.paper.scoring import published_errors
 from report_folders import (
     NASTY,
     calibration_folder,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from discrepancy.result.text_rollouts import rollout_lines
+from discrepancy.result.tables import rollout_lines
 from report_folders import rolled
 
 

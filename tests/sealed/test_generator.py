@@ -8,9 +8,7 @@ import pytest
 
 import discrepancy.team.causes
 import mocobot_sim.effects
-from hidden.generator import HiddenSet, generate
-from hidden.schedule import Schedule
-from hidden.sealed import Sealed
+from hidden import HiddenSet, Schedule, Sealed, generate
 from mocobot_sim.effects import EFFECTS
 
 generated = cache(generate)

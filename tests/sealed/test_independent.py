@@ -5,16 +5,13 @@ import pytest
 
 from estimator.arm.design import load_design
 from estimator.recording.parquet import write_recording
-from independent.arm.delta import OUT, Legs, driven_angles, legs_of, link_directions, wrist_position
-from independent.arm.dynamics import arm_load
-from independent.as_built import draw_as_built
-from independent.effects.on_payload import Pendulum
-from independent.effects.registry import FORMS, NAMES, PLAIN
+from independent.arm import OUT, Legs, arm_load, driven_angles, legs_of, link_directions, wrist_position
+from independent.bodies import MODELS, draw_as_built, load_payload
+from independent.draw import FORMS, NAMES, PLAIN
+from independent.effects import Pendulum
 from independent.generate import generate
-from independent.motion import random_motion
 from independent.numerics import FINE_HZ, derivative
-from independent.payload import MODELS, load_payload
-from independent.team import Truth, carry, place_bases, scene_of
+from independent.team import Truth, carry, place_bases, random_motion, scene_of
 
 DESIGN = load_design(MODELS / "omnid" / "design.toml")
 LEGS = Legs(

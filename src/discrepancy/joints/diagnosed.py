@@ -22,7 +22,7 @@ from discrepancy.result.read import EXTENDED
 from discrepancy.result.remains import excess_removed
 from discrepancy.result.traces import Channel
 from estimator.arrays import Array
-from mocobot_sim.scene.named_files import check_named
+from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.extended import write_extended as write_model
 
 

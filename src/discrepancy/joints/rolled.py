@@ -45,9 +45,9 @@ from discrepancy.joints.verdict import JointVerdict
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_sim.serial.built import Built, build
 from mocobot_sim.serial.effects import RobotEffect
-from mocobot_sim.serial.rollout import Drive, Start, rollout
+from mocobot_sim.serial.extended import Drive, Start, rollout
+from mocobot_sim.serial.mjcf import Built, build
 
 LONGEST_STEP_S = 1e-3
 """Longest step of MuJoCo's integration [s]. Chosen: a twentieth of the shortest period that smoothing leaves."""

@@ -56,11 +56,12 @@ class Diagnosed(ABC, Generic[V]):
         """All that there is to say."""
         return format_verdict(self.values, verbose=True)
 
-    def write_into(self, folder: Path, **more: Any) -> None:
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
         """Write models to take away, residuals, pictures, JSON and report into an existing folder.
 
         Args:
             folder: where.
+            pictures: whether pictures are drawn, too.
             more: further keys of the JSON.
 
         Raises:
@@ -73,7 +74,7 @@ class Diagnosed(ABC, Generic[V]):
             except InputError as error:  # values that no effect can have, such as a negative friction
                 note = f"There is no {what}: {error}."
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        draw(values, self.verdict.traces(), self.channels, self.unit, folder)
+        draw(values, self.verdict.traces(), self.channels, self.unit, folder, pictures=pictures)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self.verbose_text()}\n")
 
@@ -88,7 +89,7 @@ def draw(
         InputError: something cannot be written.
     """
     save_traces(traces, channels, folder / RESIDUALS)
-    if draws_plots():
+    if pictures and draws_plots():
         from discrepancy.result.pictures import save_plots
 
         save_plots(values, traces, channels, unit, folder)

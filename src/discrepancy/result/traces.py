@@ -22,10 +22,9 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import welch
 
 from discrepancy.numbers import Shown, one_each
-from estimator.archive import read_archive, words, write_archive
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.files import system_errors
+from estimator.files import read_archive, system_errors, words, write_archive
 
 
 @dataclass(frozen=True)

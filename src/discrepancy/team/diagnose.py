@@ -18,11 +18,10 @@ from discrepancy.team.linear.start import exact_residual, linearised_trials, sen
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.problem import TeamProblem, team_problem
 from discrepancy.team.rig import TeamRig
-from estimator.arm.arms import true_joints
-from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arm.unit import COUNT, ArmUnit, true_joints
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.rigid_team.residual import Shared
+from estimator.rigid_team import Shared
 
 STRAIGHT_CHI2_PER_N = 1e-3
 """What curvature adds to chi-square, from which all is linearised again. Chosen: some ten nats of four trials' rows."""

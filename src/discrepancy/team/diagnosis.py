@@ -25,13 +25,12 @@ from discrepancy.team.response import confirm, left_by
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import TeamDiagnosed
 from discrepancy.team.verdict import judged_team
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import ENCODERS, ArmUnit, in_encoder_frames
 from estimator.errors import InputError
-from estimator.estimate.frames import ENCODERS, in_encoder_frames
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
-from estimator.held import angle_of, without_held
+from estimator.quantisation import angle_of, without_held
 from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
 

@@ -15,9 +15,9 @@ from discrepancy.evidence.posterior import Group
 from discrepancy.formulas.formula import Curve, Kind, Piece, formula_of
 from discrepancy.formulas.law import Law, Of, traces
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.gimbal import moment_about_axes
+from estimator.arm.dynamics import moment_about_axes
+from estimator.arm.motion import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 from estimator.arrays import Array
-from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 
 XYZ = ("x", "y", "z")
 

@@ -35,7 +35,7 @@ from discrepancy.team.problem import TeamProblem
 from discrepancy.team.rig import AsFound, TeamRig
 from discrepancy.team.verdict import parts_of
 from estimator.arrays import Array
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.law import Law as LawEffect

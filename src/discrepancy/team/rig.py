@@ -40,12 +40,12 @@ from discrepancy.team.linear.start import (
 )
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.long import LaterPart
+from estimator.arm.motion import PHI, TAU, THETA
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared
-from estimator.rigid_team.slots import PHI, TAU, THETA
+from estimator.rigid_team import Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.pymjcf import why_not_composed
 

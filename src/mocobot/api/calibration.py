@@ -21,11 +21,10 @@ import numpy as np
 
 from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
+from estimator.calibrate.calibration import Prior, read_prior
+from estimator.calibrate.flanges import in_drawing_frames
 from estimator.calibrate.json import calibration_to_dict
-from estimator.calibrate.outcome.flanges import in_drawing_frames
-from estimator.calibrate.outcome.text import format_calibration
-from estimator.calibrate.outcome.unit_toml import unit_toml
-from estimator.calibrate.prior import Prior, read_prior
+from estimator.calibrate.text import format_calibration, unit_toml
 from estimator.errors import InputError
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
@@ -85,7 +84,7 @@ class Calibration(Folder, Below):
         Raises:
             InputError: something cannot be written.
         """
-        from mocobot_sim.extended.calibrated import write_calibrated  # MuJoCo, which reading does not need
+        from mocobot_sim.extended.extended import write_calibrated
 
         notes = []
         for k in range(len(self.payloads)):
@@ -97,7 +96,7 @@ class Calibration(Folder, Below):
         for robot in range(1, self.robots + 1):
             write_text(folder / f"omnid{robot}.toml", unit_toml(self, robot))
         if pictures and draws_plots():
-            from mocobot_report.calibration.plots import save_plots  # matplotlib, which reading does not need
+            from mocobot_report.plots_calibration import save_plots
 
             save_plots(self, folder)
         write_json(folder / CALIBRATION, self.to_dict() | more)

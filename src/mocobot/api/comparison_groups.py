@@ -12,16 +12,13 @@ from scipy.special import gammaincc
 
 from discrepancy.result.read import VERDICTS, name_of
 from estimator import so3
-from estimator.arm.unit import AT, COUNT, GROUPS
-from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedPayload, Calibration
-from estimator.calibrate.outcome.carried import carried
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.arm.unit import AT, COUNT, GROUPS, MIXED, in_encoder_frames
+from estimator.arrays import Array, inertia_parameters
+from estimator.calibrate.calibration import CalibratedPayload, Calibration, carried
+from estimator.calibrate.text import SHOWN, shown_groups
 from estimator.errors import InputError
-from estimator.estimate.frames import MIXED, in_encoder_frames
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import PARAMETERS
-from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 
 LEVEL = 0.01

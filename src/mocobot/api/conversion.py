@@ -13,11 +13,10 @@ from mocobot.api.recordings import quiet
 from mocobot.options import ConvertOptions, MapOptions, made
 from mocobot.results import public
 from mocobot_logs import convert as below
-from mocobot_logs.convert_json import conversion_dict
-from mocobot_logs.convert_report import format_conversion, format_omissions
-from mocobot_logs.cut.choice import parse_choice
+from mocobot_logs.convert_report import conversion_dict, format_conversion, format_omissions
+from mocobot_logs.cut import parse_choice
 from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 
@@ -191,12 +190,12 @@ def map(
     """
     chosen = made(MapOptions, options, fields)
     if model is None:
-        from mocobot_logs.draft.of_log import draft_of
+        from mocobot_logs.draft import draft_of
 
         draft = draft_of(Path(log), chosen.episode)
         return MapDraft(draft.text, _count(draft.robots, "robot"), draft.doubtful, draft.missing)
     from mocobot.api.joints import read_model
-    from mocobot_logs.joints.draft import draft_joint_map
+    from mocobot_logs.draft import draft_joint_map
 
     robot = read_model(model)
     made_of = draft_joint_map(Path(log), robot.joints, [bool(s) for s in robot.slides], chosen.episode)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from discrepancy.evidence.findings import Word
 from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.result.read import name_of
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import read_tolerances
 from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
 from mocobot.cluster import workers_of
 from mocobot.options import DiagnoseOptions, made
@@ -197,7 +197,7 @@ def _diagnosed_joints(
     model: GivenModel, logs: Any, reference: Any, chosen: DiagnoseOptions, say: Say
 ) -> JointDiagnosed:
     """The verdict on one robot of joints, with rollouts on request."""
-    from discrepancy.joints.rolled.told import rolled_out
+    from discrepancy.joints.rolled import rolled_out
     from discrepancy.joints.verdict import judged
     from mocobot.api.joints import read_logs, read_model
 
@@ -213,8 +213,9 @@ def _diagnosed_joints(
 
 def _joint_tolerances(path: Path | str | None) -> dict[str, dict[str, float]] | None:
     """Tolerances of the causes that a file names; the others keep their own."""
-    from discrepancy.joints.values import NAMES
     from discrepancy.tolerances_file import read_tolerances as read
+
+    from discrepancy.joints.effects import NAMES
 
     if path is None:
         return None

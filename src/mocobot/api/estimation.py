@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.outcome import one_fit
-from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on, one_payload
-from estimator.estimate.result import PayloadEstimate
-from estimator.estimate.text import format_estimate
+from estimator.estimate import fit as one_fit
+from estimator.estimate.fit import estimate_calibrated, estimate_on, one_payload
+from estimator.estimate.result import PayloadEstimate, format_estimate
 from estimator.files import write_json
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording

@@ -149,10 +149,7 @@ def _inspect_joints(
     advance: Callable[[int], object],
     tried: Callable[[int], object],
 ) -> JointInspection:
-    from discrepancy.joints.mechanics.motion import Motion
-    from discrepancy.joints.mechanics.nominal import inverse_torque
-    from discrepancy.joints.mechanics.regressor import body_regressor
-    from discrepancy.joints.mechanics.tree import Tree
+    from discrepancy.joints.mechanics import Motion, Tree, body_regressor, inverse_torque
     from mocobot.api.joints import map_of, read_model
     from mocobot_logs.joints.read import open_joint_log
 

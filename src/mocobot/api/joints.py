@@ -9,8 +9,7 @@ from discrepancy.joints.model import SerialModel, load_model
 from estimator.errors import InputError
 from mocobot.api.recordings import quiet
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.joints.joint_map import JointMap
-from mocobot_logs.joints.parse import read_joint_map
+from mocobot_logs.joints.joint_map import JointMap, read_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
 
 MAP = "log.toml"

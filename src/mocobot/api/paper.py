@@ -15,7 +15,7 @@ from mocobot.options import Paper
 from mocobot.results import NAME, folder_provenance, provenance, run_key
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.store import Store
-from mocobot_sim.paper.text import format_summary, format_tables
+from mocobot_sim.paper.tables import format_summary, format_tables
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import draw_units

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import ArmUnit
-from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.calibration import Calibration, calibrated, units_for
 from estimator.calibrate.json import calibration_from_dict
-from estimator.calibrate.outcome.apply import calibrated, units_for
 from estimator.errors import InputError, RepeatedRowsError
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
@@ -19,12 +18,11 @@ from estimator.strict import read_json
 from mocobot.checks import CALIBRATION
 from mocobot_logs.convert import Labels, convert
 from mocobot_logs.convert_report import format_on_the_fly
-from mocobot_logs.formats import FORMATS, log_kind
+from mocobot_logs.formats import FORMATS, is_recording, log_kind
 from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import read_map
+from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
-from mocobot_logs.resample.log import RATE_HZ
-from mocobot_logs.table.parquet import is_recording
+from mocobot_logs.resample import RATE_HZ
 
 GivenCalibration = Calibration | Path | str
 """A calibration, or the path of its file, or of the folder that ``mocobot calibrate --out`` wrote."""

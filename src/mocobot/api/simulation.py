@@ -14,9 +14,9 @@ from mocobot.options import SimulateOptions, made
 from mocobot.results import public
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.effects.spec import parse_effect
+from mocobot_sim.effects.catalogue import parse_effect
 from mocobot_sim.extended.extended import load_extended
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.scene.as_built import read_units
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest
 from mocobot_sim.trial.simulate import simulate as simulate_request

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from estimator.arm.unit import AT
-from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from estimator.arm.unit import AT, frames_said
+from estimator.calibrate.text import SHOWN, shown_groups
 from estimator.errors import InputError
-from estimator.estimate.frames import frames_said
 from estimator.files import write_json, write_text
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
@@ -25,10 +24,9 @@ from mocobot.api.recordings import Say, quiet, read
 from mocobot.checks import CALIBRATION
 from mocobot.options import WatchOptions, made
 from mocobot.results import Folder
-from mocobot_logs.formats import log_kind
-from mocobot_logs.table.parquet import is_recording
+from mocobot_logs.formats import is_recording, log_kind
+from mocobot_report import NAME
 from mocobot_report.page import write_report
-from mocobot_report.sought import NAME
 
 BEYOND, MOST = 3.0, 3
 """Standard deviations of the prior from which on a robot is said to be off, and how many places are named. Chosen: of

@@ -10,14 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Candidate, Transient
 from discrepancy.evidence.posterior import Posterior
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, default_tolerances
 from discrepancy.team.causes.payload import MASS_OVER_S
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import default_tolerances
 from estimator.arrays import Array
+from independent.draw import gimbal_friction as listed
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
-from mocobot_sim.effects import gimbal_friction as listed
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.trajectories import SETTLE_S, Trajectory

@@ -21,15 +21,13 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, default_tolerances, read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.told import TeamDiagnosed
-from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.extras import draws_plots
-from estimator.files import file_facts, make_folder, write_json, write_text
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this, file_facts, make_folder, write_json, write_text
 from estimator.recording.model import Recording
 from estimator.strict import read_json
 from mocobot.api.recordings import Robots, calibration_of, quiet, recordings_of
@@ -51,8 +49,7 @@ from mocobot.options import CampaignOptions
 from mocobot.results import NAME, folder_provenance, provenance, run_key
 from mocobot_sim.effects import EFFECTS, Effect, effect_to_dict
 from mocobot_sim.errors import TrialError
-from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.scene.as_built import AsBuilt, read_units
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, make_trajectory

@@ -32,7 +32,8 @@ from scipy.stats import beta
 
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.effects import one_axis
-from mocobot_report.campaign.words import FORMAT, sentences, tables
+from mocobot_report import CAMPAIGN_FORMAT as FORMAT
+from mocobot_report.campaign import sentences, tables
 from mocobot_sim.effects.catalogue import EFFECTS
 
 Json = dict[str, Any]

@@ -20,8 +20,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.archive import refuse_other_packing
 from estimator.errors import InputError
+from estimator.files import refuse_other_packing
 from estimator.inputs import Unpacked, open_input
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.formats import shown, told_in_one_sentence

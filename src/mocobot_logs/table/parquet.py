@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.inputs import Unpacked, plain
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.parquet import METADATA_KEY
-from estimator.recording.parquet_claims import claimed_bytes
+from estimator.recording.parquet import METADATA_KEY, claimed_bytes
 from mocobot_logs.formats import DATASET_INFO, dataset_root, detail_of, read_small, told_in_one_sentence
 from mocobot_logs.log import Stamps
 from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from estimator.arrays import Array
+from estimator.arrays import Array, inertia_matrix, inertia_parameters
 from estimator.errors import InputError
-from estimator.inertia import inertia_matrix, inertia_parameters
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.actors import Stage

@@ -12,8 +12,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import Carried, carried
+from estimator.calibrate.calibration import Calibration, Carried, carried
 from estimator.errors import InputError
 from estimator.files import holds, whole_folder
 from estimator.inputs import JSON_BYTES, read_input

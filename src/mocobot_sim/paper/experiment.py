@@ -21,15 +21,14 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
 from estimator.calibrate.calibrate import calibrate, start_estimate
-from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.calibration import Calibration, Prior
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic
 from estimator.estimate.result import PayloadEstimate
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from estimator.recording.model import Recording
-from estimator.signals.process import process_recording
+from estimator.signals import process_recording
 from mocobot_sim.paper.scoring import TrialSummary, payload_truth, score, score_fit
 from mocobot_sim.paper.store import Progress, Store, Work
 from mocobot_sim.scene.models import payload_path

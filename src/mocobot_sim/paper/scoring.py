@@ -21,12 +21,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.unit import seen_by_encoders
 from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedPayload
-from estimator.calibrate.outcome.carried import carried
+from estimator.calibrate.calibration import CalibratedPayload, carried
 from estimator.errors import InputError
-from estimator.estimate.frames import seen_by_encoders
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.strict import Fields, read_toml
 from mocobot_sim.scene.as_built import AsBuilt, theta_x_zeros, units_of

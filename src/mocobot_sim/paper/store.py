@@ -15,13 +15,11 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from estimator.archive import read_archive, words, write_archive
 from estimator.arrays import Array
 from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
-from estimator.files import make_folder, whole_file
-from estimator.processes import scratch_folder
+from estimator.files import make_folder, read_archive, scratch_folder, whole_file, words, write_archive
 from estimator.recording.model import Recording
 from mocobot_sim.paper.scoring import TrialSummary
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells
-from discrepancy.evidence.odds import borne_out
+from discrepancy.evidence.odds import without_unfounded
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Search
 from estimator.arrays import Array
@@ -31,7 +31,7 @@ def test_an_event_beside_an_unlisted_law_must_explain_half_as_much(
     event = Group("push", "joint", (1,), (5.0,), event=True)
     search = Search(Machine(cells, [first, event]), np.full((1, 3), 0.05**2))
     state = search.settled(search.value([Chosen(first, 1.0), Chosen(event, 1.0)], None))
-    assert (("push", "joint") in borne_out(search, state).keys) == stays
+    assert (("push", "joint") in without_unfounded(search, state).keys) == stays
 
 
 def test_a_part_without_kin_is_usual_where_the_machine_is_as_far_off() -> None:

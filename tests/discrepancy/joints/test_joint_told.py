@@ -34,8 +34,6 @@ from joint_verdicts import (
     off_everywhere,
     offset_or_spring,
 )  # fmt: skip
-from mocobot.api.comparison_groups import diagnosis_changes as changes_of
-from mocobot.api.comparison_groups import diagnosis_groups as groups_of
 from mocobot.api.diagnosis import Diagnosis
 from mocobot_view.replay.replay_trial import replay_trial
 from recordings import small_recording

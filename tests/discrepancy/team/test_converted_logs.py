@@ -13,8 +13,8 @@ from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import statements
 from estimator.estimate.payload import estimate_payload
-from estimator.recording.sampling import Sampling
-from hidden.logger import Logger
+from estimator.recording.metadata import Sampling
+from hidden import Logger
 from team_case import exact, residual_of
 
 LOGGERS = {

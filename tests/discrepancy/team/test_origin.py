@@ -9,8 +9,7 @@ from discrepancy.team.candidates import every_candidate, origin_of, places_of
 from discrepancy.team.causes import CAUSES, default_tolerances
 from discrepancy.team.linear.start import Sensed, SignalNoise, exact_residual
 from discrepancy.team.rig import TeamRig
-from estimator.arm.arms import true_joints
-from estimator.arm.unit import COUNT, GROUPS, ArmUnit
+from estimator.arm.unit import COUNT, GROUPS, ArmUnit, true_joints
 from team_case import DESIGN, exact
 from uncalibrated_team import SPREAD
 

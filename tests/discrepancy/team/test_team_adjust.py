@@ -11,7 +11,7 @@ from discrepancy.team.linear.rows import Whitening
 from discrepancy.team.linear.start import Sensed, SignalNoise, noise_rows, with_adjusted_signals
 from discrepancy.team.linear.trial_linear import by_bases, by_shared, filtered
 from discrepancy.team.rig import TeamRig
-from estimator.rigid_team.residual import grasp_data
+from estimator.rigid_team import grasp_data
 from team_case import DESIGN, exact, residual_of
 
 DRAWS = 12

@@ -19,8 +19,8 @@ from discrepancy.team.linear.start import Sensed
 from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
-from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.rigid_team.residual import Bases, Shared
+from estimator.estimate.grasps import GraspEstimate
+from estimator.rigid_team import Bases, Shared
 from team_case import DESIGN, assert_close, exact, rate_of, residual_of
 
 ROBOTS = (0, 2)

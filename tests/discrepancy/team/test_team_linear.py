@@ -8,8 +8,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics
-from estimator.rigid_team.residual import pose_error, pose_residual
-from estimator.rigid_team.slots import PHI
+from estimator.arm.motion import PHI
+from estimator.rigid_team import pose_error, pose_residual
 from team_case import DESIGN, exact, residual_of
 
 

@@ -23,7 +23,7 @@ from estimator.calibrate.text import format_calibration, frames_sentence, shown_
 from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
 from invented_calibration import invented_calibration
-from mocobot.files.calibrations import read_calibration, write_calibration
+from mocobot.api.calibration import read_calibration, write_calibration
 from mocobot_sim.scene.scene import build_team
 
 

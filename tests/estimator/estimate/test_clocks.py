@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.clocks import Rates, estimate_clocks, fit_clock, likely_lags, recorded_clocks
-from mocobot_sim.scene.sensor_effects import SensorEffects
+from mocobot_sim.scene.as_built import SensorEffects
 from mocobot_sim.trial.sensors import PRESETS, measure
 from turning_body import RATE_HZ, clocked, swaying, theta_at
 

@@ -12,7 +12,7 @@ from estimator.estimate.inertia import estimate_inertia, principal_inertia, proj
 from estimator.estimate.joint import estimate_joint
 from estimator.estimate.uncertainty import standard_errors
 from estimator.rigid_team import inertia_regressor, momentum_regressor, newton_euler_regressor
-from mocobot_sim.paper.published import PAYLOADS, payload_truth
+from mocobot_sim.paper.scoring import PAYLOADS, payload_truth
 from mujoco_body import mujoco_data
 from rigid_body_data import RATE, make_body, make_data, moving, still
 

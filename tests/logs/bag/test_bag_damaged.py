@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import bags
 from bags import EPOCH_NS, NO_SUMMARY, OMNID, UNCHUNKED, Team, raw_mcap, rosbags_bag
 from estimator.errors import InputError
-from fuzzing.damage import damaged
+from fuzzing import damaged
 from mocobot_logs.bag.cdr import CdrReader, Selector, message_type
 from mocobot_logs.bag.messages import Topic, joined
 from mocobot_logs.bag.read import open_bag

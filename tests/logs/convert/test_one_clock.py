@@ -11,9 +11,8 @@ from scipy.signal import butter, freqz_sos, sosfiltfilt
 from array_log import ArrayLog, stream, tones
 from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
-from estimator.leftover.steps import steps_of
-from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.sampling import Sampling
+from estimator.estimate.leftover import steps_of
+from estimator.recording.metadata import RecordingMetadata, Sampling
 from mocobot_inspect.stream.survey import survey
 from mocobot_logs.log import CHANNELS, REF, Samples
 from mocobot_logs.one_clock import to_recording

@@ -21,15 +21,14 @@ from joblib import Parallel, delayed
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedTrial, Calibration
+from estimator.calibrate.calibration import CalibratedTrial, Calibration, Prior
 from estimator.calibrate.json import calibration_from_dict
-from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
-from estimator.estimate.identifiability import StepReport, WeakDirection
+from estimator.estimate.leftover import Leftover
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import MassEstimate
-from estimator.leftover.leftover import Leftover
-from estimator.rigid_team.residual import Bases
+from estimator.estimate.uncertainty import StepReport, WeakDirection
+from estimator.rigid_team import Bases
 from mocobot.cli import main
 from mocobot_sim.paper import experiment
 from mocobot_sim.paper import store as shares_module

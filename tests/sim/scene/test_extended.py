@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 import mocobot
 from effect_cases import example, one_robot, team_with
 from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arrays import inertia_parameters
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.errors import InputError
-from estimator.estimate.principal import inertia_parameters
 from estimator.files import LIST
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases
+from estimator.rigid_team import Bases
 from invented_calibration import invented_calibration
 from mocobot.api.simulation import SimulatedRecording
 from mocobot.cli import main

@@ -11,8 +11,8 @@ import pytest
 from effect_cases import example
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import arm_torque
-from estimator.arm.unit import Arms as Arm
 from estimator.arm.unit import AT, COUNT, ArmUnit
+from estimator.arm.unit import Arms as Arm
 from estimator.errors import InputError
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.effects import EFFECTS, apply_effects

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import Cause, ReadingError, one_joint, one_robot, stack
-from estimator.arm.arms import design_of
 from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
-from estimator.arm.unit import ArmUnit
-from estimator.rigid_team.slots import PHI
+from estimator.arm.motion import PHI
+from estimator.arm.unit import ArmUnit, design_of
 
 
 class Late(ReadingError):

@@ -15,7 +15,7 @@ from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.metadata import SENSORS
-from mocobot_logs.resample.resampling import Resampling
+from mocobot_logs.resample_filter import Resampling
 
 NOISE_SEED = 20250
 """Seed of the noise draws, fixed so that verdicts can be reproduced."""

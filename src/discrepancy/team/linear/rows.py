@@ -15,7 +15,7 @@ from scipy.sparse import csc_array, csr_array, eye_array
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-from estimator.held import doubtful
+from estimator.quantisation import doubtful
 
 PATCH_COLUMNS = 48
 """Columns of a latent state that are kept together: a compromise of calls and zeros."""

@@ -27,14 +27,14 @@ from discrepancy.team.linear.trial_linear import (
     linearise,
     stored,
 )
-from estimator.arm.arms import Arms
-from estimator.arrays import Array
+from estimator.arm.motion import PHI, TAU, THETA
+from estimator.arm.unit import Arms
+from estimator.arrays import Array, inertia_matrix, inertia_parameters
 from estimator.errors import InputError
-from estimator.estimate.principal import inertia_matrix, inertia_parameters
 from estimator.estimate.result import PayloadEstimate
-from estimator.processes import ends_with_this
+from estimator.files import ends_with_this
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import (
+from estimator.rigid_team import (
     Bases,
     Shared,
     balance,
@@ -44,8 +44,7 @@ from estimator.rigid_team.residual import (
     poses,
     start_bases,
 )
-from estimator.rigid_team.slots import PHI, TAU, THETA
-from estimator.signals.grasp_data import GraspData
+from estimator.signals import GraspData
 
 INERTIA_OFF = 0.3
 """Relative error of the inertia up to which noise in moments is not drawn again."""

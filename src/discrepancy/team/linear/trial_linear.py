@@ -17,15 +17,23 @@ from scipy.spatial.transform import Rotation
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.rows import Patches, Reduction
 from discrepancy.team.linear.signals import Signals
-from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
+from estimator.arm.motion import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
+from estimator.arm.unit import Arms, arm_of, design_of
 from estimator.arrays import Array
-from estimator.estimate.fusion import BodyMotion, fuse, fusion_matrix
-from estimator.rigid_team.changes import needed_wrench
-from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual
-from estimator.rigid_team.slots import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
-from estimator.signals.grasp_data import GraspData
+from estimator.rigid_team import (
+    Bases,
+    BodyMotion,
+    Shared,
+    balance,
+    fuse,
+    fusion_matrix,
+    grasp_data,
+    needed_wrench,
+    pose_residual,
+)
+from estimator.signals import GraspData
 from estimator.so3 import inverse_left_jacobian, skew
 
 Kind = TypeVar("Kind", bound=np.generic)
