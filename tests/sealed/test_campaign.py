@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sealed.registry import UNLISTED
 
 from discrepancy.team.causes import CAUSES
 from hidden import Schedule
 from mocobot_sim.effects import EFFECTS
+from sealed import sets
 from sealed.limits import LIMITS
 from sealed.score import score
-from sealed.sets import FORMS, LISTED, generate, plan
+from sealed.sets import FORMS, LISTED, UNLISTED, generate, plan
 
 TINY = Schedule(randoms=1, vias=1, periodic_s=None, hold_s=None)
 

@@ -15,8 +15,8 @@ from discrepancy.team.causes.payload import MASS_OVER_S
 from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
-from independent.draw import gimbal_friction as listed
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
+from mocobot_sim.effects import springs as listed
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.trajectories import SETTLE_S, Trajectory
