@@ -23,11 +23,12 @@ from mocobot.api.diagnosis import Diagnosis
 from mocobot.api.look import Look
 from mocobot.api.public import public
 from mocobot.checks import check_seconds
-from mocobot_inspect.joints import inspection
-from mocobot_inspect.joints.findings import joint_findings
-from mocobot_inspect.joints.json import joint_inspection_dict
-from mocobot_inspect.joints.robot import Robot
-from mocobot_inspect.joints.text import format_joint_inspection, joint_ready_line
+from mocobot_inspect import joints as inspection
+from mocobot_inspect.findings import findings as joint_findings
+from mocobot_inspect.joint_wiring import Robot
+from mocobot_inspect.report import format_inspection as format_joint_inspection
+from mocobot_inspect.report import inspection_dict as joint_inspection_dict
+from mocobot_inspect.report import ready_line as joint_ready_line
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap
 from mocobot_logs.joints.parse import read_joint_map
@@ -114,8 +115,8 @@ def map_of(model: SerialModel, log: Path, given: Path | str | None) -> JointMap:
 class JointInspection(Look, inspection.JointInspection):
     """Stamps, columns, signs, order, units and delays of a joint log, judged by the robot's model: printable.
 
-    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``, the JSON's keys those of
-    ``mocobot_inspect.joints.json``.
+    The attributes are those of ``mocobot_inspect.joints.JointInspection``, the JSON's keys those of
+    ``mocobot_inspect.report``.
     """
 
     _findings, _ready_line = joint_findings, joint_ready_line

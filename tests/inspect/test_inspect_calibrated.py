@@ -10,8 +10,7 @@ from estimator.arm.wrist_level import wrist_of
 from estimator.recording.model import Recording
 from mocobot_inspect.readiness import readiness
 from mocobot_inspect.signals import signals_of
-from mocobot_inspect.wiring.check import Team
-from mocobot_inspect.wiring.misfit import Misfit
+from mocobot_inspect.team_wiring import Misfit, Team
 from mocobot_logs.log import Level
 from omnid_design import DESIGN
 from uncalibrated_team import uncalibrated

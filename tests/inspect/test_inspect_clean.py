@@ -12,7 +12,7 @@ from effect_cases import example
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot_inspect.findings import findings
-from mocobot_inspect.inspection import Inspection, inspect_log
+from mocobot_inspect.team import Inspection, inspect_log
 from mocobot_logs.open_log import open_log
 from mocobot_sim.effects import apply_effects
 from mocobot_sim.scene.scene import build_team

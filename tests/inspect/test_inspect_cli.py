@@ -19,8 +19,8 @@ from estimator.recording.parquet import write_recording
 from log_files import write_text
 from miswired import miswire
 from mocobot.cli import main
-from mocobot_inspect.inspection import Standing
-from mocobot_inspect.text import ready_line
+from mocobot_inspect.report import ready_line
+from mocobot_inspect.team import Standing
 from mocobot_logs.bag.write import write_bag
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.trial_log import TrialLog

@@ -8,7 +8,8 @@ import pytest
 from joint_logs import write_csv
 from made_arm import JOINTS, RATE_HZ, made, write_map, write_model
 from mocobot import serial
-from mocobot_inspect.joints.numbers import later, percent
+from mocobot_inspect.findings import percent
+from mocobot_inspect.report import later
 
 
 def inspected(folder, values) -> serial.JointInspection:

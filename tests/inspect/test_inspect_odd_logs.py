@@ -14,11 +14,10 @@ from estimator.recording.parquet import write_recording
 from joint_logs import write_table
 from log_files import write_text
 from mocobot_inspect.findings import findings
-from mocobot_inspect.inspection import Inspection, inspect_log
 from mocobot_inspect.readiness import QUANTITIES, Readiness
-from mocobot_inspect.text import ready_line
-from mocobot_inspect.wiring.check import Wiring
-from mocobot_inspect.wiring.misfit import Misfit
+from mocobot_inspect.report import ready_line
+from mocobot_inspect.team import Inspection, inspect_log
+from mocobot_inspect.team_wiring import Misfit, Wiring
 from mocobot_logs.open_log import open_log
 from omnid_design import DESIGN
 from recordings import small_recording

@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from array_log import ArrayLog, stream
+from mocobot_inspect.channels import Oscillation, joined, oscillation
 from mocobot_inspect.findings import findings
-from mocobot_inspect.inspection import inspect_log
-from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.stream.channels import Oscillation, joined, oscillation
+from mocobot_inspect.report import inspection_dict
+from mocobot_inspect.team import inspect_log
 from omnid_design import DESIGN
 
 RATE = 100.0

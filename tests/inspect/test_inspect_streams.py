@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from array_log import ArrayLog, stream
 from estimator.quantisation import quantisation_step
-from mocobot_inspect.inspection import clean_stream, inspect_log, stretches
-from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.stream import survey as survey_module
-from mocobot_inspect.stream.channels import Channel, frozen
-from mocobot_inspect.stream.noise import noise_level
-from mocobot_inspect.stream.survey import Survey, survey
-from mocobot_inspect.text import format_inspection
+from mocobot_inspect import survey as survey_module
+from mocobot_inspect.channels import Channel, clipped, noise_level, stuck
+from mocobot_inspect.report import format_inspection, inspection_dict
+from mocobot_inspect.survey import Survey, survey
+from mocobot_inspect.team import clean_stream, inspect_log, stretches
 from mocobot_logs.log import CHANNELS, Level, Samples
 from omnid_design import DESIGN
 
@@ -138,6 +137,21 @@ def test_rounding_and_noise_together_as_a_torque_sensor_has_them() -> None:
 
 
 # Stuck and clipped
+
+
+class Run(NamedTuple):
+    """Rows in which a channel stands."""
+
+    kind: str
+    channel: int
+    start: int
+    stop: int
+    value: float
+
+
+def frozen(values: np.ndarray, rate_hz: float) -> list[Run]:
+    runs = [("stuck", run) for run in stuck(values, rate_hz)] + [("clipped", run) for run in clipped(values)]
+    return [Run(kind, k, start, stop, values[start, k]) for kind, (k, start, stop, _) in runs]
 
 
 @pytest.mark.parametrize("step", [0.0, 1e-4, 3e-3])

@@ -11,8 +11,7 @@ from estimator.arm.wrist_level import wrist_of
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
 from mocobot_inspect.signals import Signals, signals_of
-from mocobot_inspect.wiring.check import Wiring, check_wiring, shows
-from mocobot_inspect.wiring.misfit import SUSPICIOUS
+from mocobot_inspect.team_wiring import SUSPICIOUS, Wiring, check_wiring, shows
 from mocobot_logs.log import Level
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, measure
@@ -57,7 +56,7 @@ def test_a_mistake_is_named(trials: dict[str, Recording], payload: str, mistake:
     assert found.mistake.kind == mistake.kind
     assert sorted(robot + 1 for robot in found.mistake.robots) == list(mistake.robots)
     assert set(found.mistake.channels) == set(mistake.channels)
-    assert mistake.words in found.mistake.sentence()
+    assert mistake.words in found.mistake.sentence
     assert found.before > 15 * found.after
     assert wiring.undone.total < 0.05
 
@@ -114,7 +113,7 @@ def test_two_mistakes_are_both_named(trials: dict[str, Recording]) -> None:
         tau[:, 2] *= -1
 
     wiring = look(signals(miswire(trials["a"], edit)))
-    sentences = {found.mistake.sentence() for found in wiring.found}
+    sentences = {found.mistake.sentence for found in wiring.found}
     assert sentences == {"all robots: theta is in degrees, not radians", "robot 3: tau has the wrong sign"}
     assert wiring.undone.total < 0.05
 
@@ -137,7 +136,7 @@ def test_a_mirror_image_is_not_told_apart(trials: dict[str, Recording]) -> None:
         tau[..., [1, 2]] = tau[..., [2, 1]]
 
     (found,) = look(signals(miswire(trials["a"], edit))).found
-    either = {m.sentence() for m in (found.mistake, *found.alternatives)}
+    either = {m.sentence for m in (found.mistake, *found.alternatives)}
     assert either == {
         "all robots: phi2 and phi3 are exchanged and tau2 and tau3 are exchanged",
         "all robots: theta_z and theta_x have the wrong sign",
@@ -200,7 +199,7 @@ def test_mistakes_at_wrist_level(
 ) -> None:
     wiring = look(wrist_edits(name, signals(trials[payload], "wrist")))
     (found,) = wiring.found
-    assert sentence in {m.sentence() for m in (found.mistake, *found.alternatives)}
+    assert sentence in {m.sentence for m in (found.mistake, *found.alternatives)}
     assert wiring.undone.total < 0.05
 
 
@@ -214,7 +213,7 @@ def test_mistakes_that_would_not_show_are_said(trials: dict[str, Recording]) -> 
         tau[:, 0] = tau[:, 0].mean(axis=-1, keepdims=True)
 
     wiring = check_wiring(signals(miswire(trials["a"], edit)), DESIGN)
-    sentences = {mistake.sentence() for mistake in wiring.hidden}
+    sentences = {mistake.sentence for mistake in wiring.hidden}
     assert "robot 1: tau2 and tau3 are exchanged" in sentences
     assert "robot 2: tau2 and tau3 are exchanged" not in sentences
 
@@ -236,7 +235,7 @@ def test_without_rotation_nothing_is_claimed(trials: dict[str, Recording]) -> No
     (found,) = look(
         signals(dataclasses.replace(whole, time=time, ref=None, **still | {"tau": -still["tau"]}))
     ).found
-    assert found.mistake.sentence() == "all robots: tau has the wrong sign"
+    assert found.mistake.sentence == "all robots: tau has the wrong sign"
 
 
 @pytest.mark.parametrize("robot", [0, 2])

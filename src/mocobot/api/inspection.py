@@ -8,10 +8,9 @@ from estimator.arm.design import OmnidDesign, load_design
 from mocobot.api.given import GivenCalibration, Robots
 from mocobot.api.look import Look
 from mocobot.api.public import public
-from mocobot_inspect import inspection
+from mocobot_inspect import team as inspection
 from mocobot_inspect.findings import findings
-from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.text import format_inspection, ready_line
+from mocobot_inspect.report import format_inspection, inspection_dict, ready_line
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
@@ -21,7 +20,7 @@ from mocobot_sim.scene.models import omnid_design
 class Inspection(Look, inspection.Inspection):
     """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
 
-    The attributes are those of ``mocobot_inspect.inspection.Inspection``; ``mocobot_inspect.json`` has the JSON's keys.
+    The attributes are those of ``mocobot_inspect.team.Inspection``; ``mocobot_inspect.report`` has the JSON's keys.
     """
 
     _findings, _ready_line = findings, ready_line

@@ -8,9 +8,8 @@ from mocobot.api.given import Robots
 from mocobot.options import Inspect
 from mocobot.progress import bar
 from mocobot.strict import NotGood
-from mocobot_inspect.inspection import inspect_log
-from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.text import format_inspection, ready_line
+from mocobot_inspect.report import format_inspection, inspection_dict, ready_line
+from mocobot_inspect.team import inspect_log
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design

@@ -11,7 +11,7 @@ from estimator.errors import InputError
 from estimator.leftover.steps import steps_of
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.sampling import Sampling
-from mocobot_inspect.stream.survey import survey
+from mocobot_inspect.survey import survey
 from mocobot_logs.one_clock import to_recording
 from mocobot_logs.resample.log import resample
 from mocobot_logs.resample.resampling import Resampling

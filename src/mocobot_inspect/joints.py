@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,20 +10,17 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_inspect.joints.lags import (
+from mocobot_inspect.channels import Channel, ChannelTally, Stretch, seconds, wild
+from mocobot_inspect.joint_motion import (
     Follows,
+    Motion,
     command_follows,
     exchanged_commands,
-    torque_delay,
+    motion_of,
     velocity_follows,
 )
-from mocobot_inspect.joints.motion import Motion, motion_of
-from mocobot_inspect.joints.robot import Robot
-from mocobot_inspect.joints.samples import wrapped
-from mocobot_inspect.joints.wiring import Wiring, check_wiring
-from mocobot_inspect.stream.channels import Channel, ChannelTally, Stretch, seconds
-from mocobot_inspect.stream.noise import wild
-from mocobot_inspect.stream.timing import Timing, TimingTally
+from mocobot_inspect.joint_wiring import Robot, TorqueDelay, Wiring, check_wiring, torque_delay
+from mocobot_inspect.survey import Timing, TimingTally
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
 from mocobot_logs.joints.quantities import COMMANDS, EFFORTS, POSITIONS, VELOCITIES
@@ -32,22 +29,11 @@ from mocobot_logs.log import LogSource, Samples, collect
 
 LEAST_ROWS = 50
 """Fewer samples of smooth motion tell nothing."""
+WORDS = (8, 10, 12, 16, 24, 32)
+"""Bits of numbers whose sign may have got lost."""
+EMPTY = 0.02
+"""Share of samples in the middle half of such a number's range, at most: wrapped ones are near its ends."""
 _NOISES, _MOVES = 4.0, 0.05  # a velocity is one beyond so much of its noise, and of its rms
-
-
-@dataclass(frozen=True)
-class TorqueDelay:
-    """How torques lag behind the motion.
-
-    Attributes:
-        delay_s, delay_se_s: of all torques, and its standard error [s].
-        before, after: share of their variance that model and friction leave, without and with it.
-    """
-
-    delay_s: float
-    delay_se_s: float
-    before: float
-    after: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,31 +94,49 @@ def inspect_joints(
     samples = collect(source, advance).streams[0]
     timing = TimingTally()
     timing.add(samples)
-    keys = list(log_map.channels)
     found = JointInspection(
         name=source.name,
         robot=robot,
         log_map=log_map,
         timing=timing.finish(),
         channels=_channels(samples, log_map),
-        signs_lost=tuple(wrapped(keys, samples.values, log_map)),
+        signs_lost=tuple(_signs_lost(samples.values, log_map)),
         logs=(),
         unchecked=None,
         moves=np.zeros(len(robot.joints), dtype=bool),
     )
     # Refused, or taken for readings otherwise: they count as missing.
-    odd = np.apply_along_axis(wild, 0, samples.values)
-    samples = replace(samples, values=np.where(odd, np.nan, samples.values))
+    samples = replace(samples, values=np.where(wild(samples.values), np.nan, samples.values))
     try:
         logs = joint_logs_of(source.name, samples, log_map)
     except InputError as error:
         return replace(found, unchecked=str(error).removeprefix(f"{source.name}: "))
-    motions = [motion_of(log) for log in logs]
-    whole = [(log, motion) for log, motion in zip(logs, motions, strict=True) if len(motion.q) >= LEAST_ROWS]
     found = replace(found, logs=tuple(logs))
+    whole = [motion for motion in map(motion_of, logs) if len(motion.q) >= LEAST_ROWS]
     if not whole:
         return replace(found, unchecked="no part of it is long enough for its motion to be looked at")
     return _with_motion(found, whole, try_advance)
+
+
+def _with_motion(
+    found: JointInspection, parts: Sequence[Motion], advance: Callable[[int], object]
+) -> JointInspection:
+    """The inspection with signs, order and delays."""
+    robot, longest = found.robot, max(parts, key=lambda part: len(part.q))
+    wiring = check_wiring(parts, robot, advance)
+    delay = None
+    if wiring is not None and not wiring.found:
+        asked = robot.asked(longest.q, longest.dq, longest.ddq, wiring.payload)
+        delay = torque_delay(longest, asked)
+    return replace(
+        found,
+        moves=np.any([part.moves for part in parts], axis=0),
+        wiring=wiring,
+        velocities=tuple(velocity_follows(longest)),
+        commands=tuple(command_follows(longest)),
+        crossed=tuple(exchanged_commands(longest)),
+        delay=delay,
+    )
 
 
 def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
@@ -140,36 +144,28 @@ def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
     keys = list(log_map.channels)
     sensing = [k for k, (name, _) in enumerate(keys) if name in (*POSITIONS, *VELOCITIES, *EFFORTS)]
     order = [*sensing, *(k for k in range(len(keys)) if k not in sensing)]
-    tally = ChannelTally(tuple(label(*keys[k]) for k in order), len(sensing))
-    if len(samples.stamp_ns):
-        time_s = seconds(samples.stamp_ns, int(samples.stamp_ns[0]))
-        forward = np.diff(time_s)
-        forward = forward[forward > 0]
-        rate_hz = 1.0 / float(np.median(forward)) if len(forward) else None
-        with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
-            tally.add(time_s, samples.values[:, order], rate_hz)
+    tally = ChannelTally([label(*keys[k]) for k in order], len(sensing))
+    time_s = seconds(samples.stamp_ns, int(samples.stamp_ns[0]) if len(samples.stamp_ns) else 0)
+    if len(time_s):
+        tally.add(time_s, samples.values[:, order])
     told = dict(zip(order, tally.finish(), strict=True))
-    return tuple(_without_rests(k, told, log_map, samples) for k in range(len(keys)))
+    return tuple(_without_rests(k, told, log_map, time_s, samples.values) for k in range(len(keys)))
 
 
-def _rms(x: Array) -> float:
-    """Of what is known."""
-    return float(np.sqrt(np.nansum(x**2) / max(len(x), 1)))
-
-
-def _without_rests(k: int, told: dict[int, Channel], log_map: JointMap, samples: Samples) -> Channel:
+def _without_rests(
+    k: int, told: dict[int, Channel], log_map: JointMap, time_s: Array, values: Array
+) -> Channel:
     """A channel, without stretches in which a position stands because its joint's velocity or command does, too."""
     c, (quantity, joint) = told[k], list(log_map.channels)[k]
     if quantity not in POSITIONS or not (c.stuck or c.clipped):
         return c
-    time_s = seconds(samples.stamp_ns, int(samples.stamp_ns[0]))
     moving = (*VELOCITIES, *(COMMANDS if log_map.control.command == "position" else ()))
-    of_joint = [i for i, (other, of) in enumerate(log_map.channels) if of == joint and other in moving]
     speeds = []
-    for i in of_joint:
-        x = np.where(wild(samples.values[:, i]), np.nan, samples.values[:, i])
-        speed = np.diff(x, prepend=x[:1]) if list(log_map.channels)[i][0] in COMMANDS else x
-        speeds.append((speed, max(_NOISES * told[i].noise, _MOVES * _rms(speed))))
+    for i, (other, of) in enumerate(log_map.channels):
+        if of == joint and other in moving:
+            x = np.where(wild(values[:, i]), np.nan, values[:, i])
+            speed = np.diff(x, prepend=x[:1]) if other in COMMANDS else x
+            speeds.append((speed, max(_NOISES * told[i].noise, _MOVES * _rms(speed))))
 
     def stays(s: Stretch) -> bool:
         inside = (time_s > s.start_s) & (time_s < s.start_s + s.duration_s)
@@ -186,25 +182,31 @@ def _without_rests(k: int, told: dict[int, Channel], log_map: JointMap, samples:
     )
 
 
-def _with_motion(
-    found: JointInspection,
-    whole: Sequence[tuple[JointLog, Motion]],
-    advance: Callable[[int], object],
-) -> JointInspection:
-    robot = found.robot
-    log, motion = max(whole, key=lambda part: len(part[1].q))
-    moves = np.any([part.moves for _, part in whole], axis=0)
-    wiring = check_wiring([part for _, part in whole], robot, advance)
-    delay = None
-    if wiring is not None and not wiring.found:
-        late = torque_delay(log, motion, robot.asked(motion.q, motion.dq, motion.ddq, wiring.payload))
-        delay = None if late is None else TorqueDelay(*late)
-    return replace(
-        found,
-        moves=moves,
-        wiring=wiring,
-        velocities=tuple(velocity_follows(log, motion)),
-        commands=tuple(command_follows(log, motion)),
-        crossed=tuple(exchanged_commands(log, motion)),
-        delay=delay,
-    )
+def _rms(x: Array) -> float:
+    """Of what is known."""
+    return float(np.sqrt(np.nansum(x**2) / max(len(x), 1)))
+
+
+def _signs_lost(values: Array, log_map: JointMap) -> Iterator[str]:
+    """Numbers that must have been signed: they leap from one end of an unsigned word to the other.
+
+    Args:
+        values: samples [SI], shape (q, C).
+        log_map: how they were read.
+    """
+    for x, ((quantity, joint), channel) in zip(values.T, log_map.channels.items(), strict=True):
+        if channel.bits is not None:
+            continue
+        raw = channel.undo(x[np.isfinite(x)])
+        if len(raw) < 2 or raw.min() < -0.5 or np.abs(raw - np.rint(raw)).max() > 1e-6 * max(raw.max(), 1.0):
+            continue
+        for bits in WORDS:
+            full = 2.0**bits
+            middle = np.mean((raw > 0.25 * full) & (raw < 0.75 * full))
+            leaps = np.sum(np.abs(np.diff(raw)) > 0.5 * full)
+            if 0.75 * full < raw.max() < full and middle < EMPTY and leaps:
+                yield (
+                    f"{label(quantity, joint)} leaps {leaps} times between {raw.min():g} and {raw.max():g}: is it a "
+                    f"signed number of {bits} bits without its sign (bits = {bits} in the map)?"
+                )
+                break

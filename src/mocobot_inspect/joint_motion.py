@@ -1,6 +1,6 @@
-"""Delays and gains between channels of a joint log: measured velocity, torque and command against the motion.
+"""Smooth motion of a joint log, and how its other channels follow it: gains, delays and their standard errors.
 
-Every number has a standard error, and what all joints share is told from all joints together.
+Measured velocities, torques and commands are compared with the motion; what all joints share is told from all together.
 """
 
 from __future__ import annotations
@@ -9,30 +9,96 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-from mocobot_inspect.joints.motion import Motion, cutoff_hz, passed_noise, smooth
-from mocobot_inspect.joints.wiring import columns_of, fit
 from mocobot_logs.joints.joint_log import JointLog
+
+CUTOFF_HZ, CUTOFF_SHARE = 10.0, 0.1
+"""Low-pass of positions and torques alike: motion of robots is slower; a tenth of the rate where that is little."""
+MOST_ROWS = 1500
+"""So many samples are looked at: a model's torque takes 20 us a sample, and fifty mistakes are tried."""
+MOVES = 1e-6
+"""Smaller spans are no motion [rad or m]."""
+NOISES = 12.0
+"""Nor are spans of less than so many standard deviations of what noise the low-pass lets through."""
 
 LONGEST_S = 0.1
 """Longest delay that is looked for [s]."""
 FOLLOWS = 0.8
 """Correlation with the motion from which on a channel is taken to follow it, up to gain and delay."""
-SLOW = 0.4
-"""Of a joint's rms speed; where it is slower, dry friction has any value, and leads or lags by milliseconds."""
-SIGMAS = 5.0
-"""Standard errors by which a number must differ from what it should be for it to be reported."""
 _UNKNOWN_S, _UNKNOWN = 2e-3, 0.2
 """A delay with a larger standard error than this [s], and than this share of a period, is not known."""
 _APART, _GRID = 3.0, 0.02
 """Standard errors within which joints agree; share of a period to which interpolation tells a delay."""
 _CLEAR = 0.5  # share of a signal that must not be noise for a correlation to mean anything
-_STEPS = 10  # delays tried on either side
-_SHARPENED = 3
 _ITERATIONS = 12
 _BLOCKS = 10  # of a log, whose errors are independent of each other
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Of Q samples, J joints, all through one low-pass.
+
+    Attributes:
+        log: what it is of.
+        q, dq, ddq: positions and their derivatives, shape (Q, J).
+        torque: shape (Q, J), NaN where a joint has none; a duty, which is a torque but for its gain and what the
+            speed takes off it, where it has that instead.
+        torque_noise: noise of the torques that the low-pass lets through, shape (J,).
+        at: the samples' numbers in the log, shape (Q,).
+    """
+
+    log: JointLog
+    q: Array
+    dq: Array
+    ddq: Array
+    torque: Array
+    torque_noise: Array
+    at: NDArray[np.int64]
+
+    @property
+    def moves(self) -> NDArray[np.bool_]:
+        """Whether each joint moves, shape (J,)."""
+        noise = passed_noise(self.log, self.log.q[self.at], self.q)
+        least = np.maximum(np.maximum(MOVES, 3.0 * self.log.position_step), NOISES * noise)
+        return np.ptp(self.q, axis=0) > least
+
+
+def motion_of(log: JointLog) -> Motion:
+    """Smooth motion of a log, away from its ends and from gaps."""
+    q = smooth(log, log.q)
+    dq = differentiate(q, log.rate_hz)
+    ddq = differentiate(dq, log.rate_hz)
+    effort = np.full(log.q.shape, np.nan) if log.torque is None else log.torque
+    if log.drive.duty is not None:
+        effort = np.where(np.isnan(effort).all(axis=0), log.drive.duty, effort)
+    torque = smooth(log, effort)
+    edge = max(4, round(0.3 * log.rate_hz / cutoff_hz(log)))
+    at = np.flatnonzero(binary_erosion(log.usable, iterations=edge, border_value=0))
+    at = at[:: max(1, -(-len(at) // MOST_ROWS))]
+    return Motion(log, q[at], dq[at], ddq[at], torque[at], passed_noise(log, effort[at], torque[at]), at)
+
+
+def cutoff_hz(log: JointLog) -> float:
+    """Cut-off of the low-pass [Hz]."""
+    return min(CUTOFF_HZ, CUTOFF_SHARE * log.rate_hz)
+
+
+def smooth(log: JointLog, values: Array) -> Array:
+    """A signal of the log through the low-pass, shape (Q, ...); joints without one stay NaN."""
+    known = np.isfinite(values)
+    return np.where(known, low_pass(np.where(known, values, 0.0), log.rate_hz, cutoff_hz(log)), np.nan)
+
+
+def passed_noise(log: JointLog, raw: Array, smoothed: Array) -> Array:
+    """Noise that the low-pass lets through, shape (J,).
+
+    What it takes off is noise, and as much of white noise is left as its band is of the whole.
+    """
+    return np.std(raw - smoothed, axis=0) * np.sqrt(2.0 * cutoff_hz(log) / log.rate_hz)
 
 
 @dataclass(frozen=True)
@@ -61,35 +127,37 @@ class Follows:
         return self.possible > _CLEAR and self.correlation < FOLLOWS * self.possible
 
 
-def velocity_follows(log: JointLog, motion: Motion) -> list[Follows]:
+def velocity_follows(motion: Motion) -> list[Follows]:
     """Measured velocities against differentiated positions, through one low-pass."""
+    log = motion.log
     if log.dq is None:
         return []
     q = smooth(log, log.q)
     # A derivative's noise grows with frequency: 2 pi times the cut-off over sqrt(3) in all.
     noise = passed_noise(log, log.q, q) * 2.0 * np.pi * cutoff_hz(log) / np.sqrt(3.0)
-    return _pairs(log, motion, log.dq, differentiate(q, log.rate_hz), noise)
+    return _pairs(motion, log.dq, differentiate(q, log.rate_hz), noise)
 
 
-def command_follows(log: JointLog, motion: Motion) -> list[Follows]:
+def command_follows(motion: Motion) -> list[Follows]:
     """Positions against commanded ones: gain and delay of the motion after its command."""
+    log = motion.log
     if log.command is None or log.drive.command != "position":
         return []
     command = smooth(log, log.command)
-    return _pairs(log, motion, log.q, command, passed_noise(log, log.command, command))
+    return _pairs(motion, log.q, command, passed_noise(log, log.command, command))
 
 
-def exchanged_commands(log: JointLog, motion: Motion) -> list[tuple[int, int]]:
+def exchanged_commands(motion: Motion) -> list[tuple[int, int]]:
     """Pairs of joints that follow each other's command, and not their own, from 0."""
+    log = motion.log
     if log.command is None or log.drive.command != "position":
         return []
-    q, command = motion.q, smooth(log, log.command)[motion.at]
-    count = q.shape[1]
-    size = np.array([[_correlation(command[:, j], q[:, k]) for k in range(count)] for j in range(count)])
+    command = smooth(log, log.command)[motion.at]
+    size = np.array([[_correlation(c, q) for q in motion.q.T] for c in command.T])
     return [
         (j, k)
-        for j in range(count)
-        for k in range(j + 1, count)
+        for j in range(len(size))
+        for k in range(j + 1, len(size))
         if min(size[j, k], size[k, j]) > FOLLOWS > max(size[j, j], size[k, k])
     ]
 
@@ -104,71 +172,16 @@ def pooled(found: Sequence[Follows]) -> tuple[float, float] | None:
     return None if np.any(np.abs(delay - mean) > _APART * se) else (mean, float(np.sum(se**-2.0) ** -0.5))
 
 
-def torque_delay(log: JointLog, motion: Motion, asked: Array) -> tuple[float, float, float, float] | None:
-    """Delay of all torques after the motion and its standard error [s], and what is left of their variance, or None.
-
-    The latter without the delay and with it. Samples in which a joint is slow are left out.
-
-    Args:
-        log: the log.
-        motion: its motion.
-        asked: torques of the model, shape (Q, J).
-    """
-    if log.torque is None:
-        return None
-    rate = log.rate_hz
-    known = np.isfinite(log.torque).all(axis=0) & motion.moves
-    if not known.any():
-        return None
-    torque = low_pass(log.torque[:, known], rate, cutoff_hz(log))
-    slope = differentiate(torque, rate)
-    joints = np.flatnonzero(known)
-    most = min(LONGEST_S, 0.1 * len(log.time) / rate)
-    time = np.arange(len(torque)) / rate
-    speeds = motion.dq[:, joints]
-    fast = np.abs(speeds) > SLOW * np.sqrt(np.mean(speeds**2, axis=0))
-
-    def rest(k: int, delay_s: float) -> tuple[Array, Array, float]:
-        """Columns of a joint's torque, what they leave of it, and the logarithm of that share."""
-        at, j = fast[:, k], joints[k]
-        late = np.interp(motion.at[at] / rate + delay_s, time, torque[:, k])
-        values, left = fit(asked[at, j], motion.dq[at, j], motion.ddq[at, j], late)
-        columns = columns_of(asked[at, j], motion.dq[at, j], motion.ddq[at, j])[:, values != 0.0]
-        return columns, left, float(np.log(np.var(left) / max(np.var(late), 1e-30) + 1e-9))
-
-    def shares(delay_s: float) -> float:
-        return float(np.mean([rest(k, delay_s)[2] for k in range(len(joints))]))
-
-    centre, width = 0.0, most
-    for _ in range(_SHARPENED):
-        tried = centre + np.linspace(-width, width, 2 * _STEPS + 1)
-        centre, width = (
-            float(tried[int(np.argmin([shares(float(delay)) for delay in tried]))]),
-            width / _STEPS,
-        )
-    # One more step by Newton, joint by joint: they scatter by what the model lacks.
-    steps, errors = [], []
-    for k in range(len(joints)):
-        columns, left, _ = rest(k, centre)
-        moved = np.interp(motion.at[fast[:, k]] / rate + centre, time, slope[:, k])
-        values, se = _solved(np.column_stack([-moved, columns]), left)
-        steps.append(values[0])
-        errors.append(se[0])
-    weights = np.maximum(errors, 1e-12) ** -2.0
-    scatter = np.sum(weights * np.square(steps)) / max(len(joints) - 1, 1)
-    se = float(np.sqrt(max(1.0, scatter) / np.sum(weights)))
-    return centre, se, float(np.exp(shares(0.0))), float(np.exp(shares(centre)))
-
-
-def _pairs(log: JointLog, motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[Follows]:
+def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[Follows]:
     """Every moving joint's channel as gain times another one a little earlier, by least squares.
 
     Args:
-        log, motion: of the robot.
+        motion: of the robot.
         late_raw: the channel, not filtered, shape (Q, J).
         early: the other one, filtered, shape (Q, J).
         noise: what is left of its noise, shape (J,).
     """
+    log = motion.log
     late = smooth(log, late_raw)
     late_noise = passed_noise(log, late_raw, late)
     rate, samples = differentiate(np.nan_to_num(early), log.rate_hz), np.arange(len(early))
@@ -182,7 +195,7 @@ def _pairs(log: JointLog, motion: Motion, late_raw: Array, early: Array, noise: 
         for _ in range(_ITERATIONS):  # the delay enters linearly, and then what is left of it
             at = motion.at - delay * log.rate_hz
             now, slope = np.interp(at, samples, early[:, j]), np.interp(at, samples, rate[:, j])
-            (gain, shift, _), se = _solved(np.column_stack([now, -slope, np.ones_like(now)]), y)
+            (gain, shift, _), se = solved(np.column_stack([now, -slope, np.ones_like(now)]), y)
             step = float(shift / gain) if gain else np.inf
             if abs(delay + step) > LONGEST_S:
                 break
@@ -194,15 +207,25 @@ def _pairs(log: JointLog, motion: Motion, late_raw: Array, early: Array, noise: 
         bias = max(float(clear[0]), _CLEAR)  # noise in what is followed makes the gain smaller
         out.append(
             Follows(
-                int(j), float(gain) / bias, float(np.hypot(se[0], gain * (1.0 - bias)) / bias),
-                delay if known else np.nan, delay_se, correlation, float(np.sqrt(np.prod(clear))),
+                joint=int(j),
+                gain=float(gain) / bias,
+                gain_se=float(np.hypot(se[0], gain * (1.0 - bias)) / bias),
+                delay_s=delay if known else np.nan,
+                delay_se_s=delay_se,
+                correlation=correlation,
+                possible=float(np.sqrt(np.prod(clear))),
             )
-        )  # fmt: skip
+        )
     return out
 
 
-def _solved(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares and its standard errors, from residuals that are alike for a while: block by block."""
+def solved(columns: Array, y: Array) -> tuple[Array, Array]:
+    """Least squares and its standard errors, from residuals that are alike for a while: block by block.
+
+    Args:
+        columns: shape (Q, P).
+        y: shape (Q,).
+    """
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     scaled = columns / size
     inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
