@@ -33,13 +33,13 @@ EARLY_S = 1.0
 RECORDER_S = 1.0
 """Spread of the recorder's lead over the stamps from which on two clocks are mixed."""
 MARGIN = 0.02
-"""Of its range (and no less in rad or m) may a joint be beyond it: calibrated zeros."""
+"""Share of its range, plus as much in rad or m, by which a joint may leave it: zeros are calibrated."""
 COARSE = 0.005
 """Steps that are a larger share of what a joint moves are coarse."""
 SATURATED = 0.98
-"""Of the drive's limit."""
+"""Share of the drive's limit from which on a torque is at it."""
 LATE = 1.1
-"""So much more of the torques must be left without a delay than with it."""
+"""A delay is reported if the torques' unexplained share without it is so many times that with it."""
 FACTORS = {
     180.0 / np.pi: "degrees, taken for radians",
     np.pi / 180.0: "radians, taken for degrees",
@@ -52,16 +52,13 @@ FACTORS = {
 }
 """Gains that a wrong unit makes."""
 CLOSE = 0.05
-"""Relative; so near must a gain be to one of them, and to 1 not to be worth a word."""
+"""Relative distance within which a gain equals a factor, or 1."""
 _NAMED = 4  # channels of a sentence
 _TURN = 2 * np.pi
 _ONE_TURN = 0.01  # angles that cover a full turn to this share of it are an encoder's that starts again there
 _TIME_UNITS = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 _FOLLOWED = 0.9  # correlation of a motion with its command
-_NEVER, _NEAR = (
-    1e-3,
-    0.02,
-)  # of its largest value may a torque be negative that never is; so near it comes to zero
+_NEVER, _NEAR = 1e-3, 0.02  # of its largest value: one without sign is hardly negative, and comes near zero
 _UNEXPLAINED = 0.5  # share of a torque, noise aside, above which the model hardly says anything of it
 
 

@@ -19,11 +19,11 @@ from mocobot_logs.joints.joint_log import JointLog
 CUTOFF_HZ, CUTOFF_SHARE = 10.0, 0.1
 """Low-pass of positions and torques alike: motion of robots is slower; a tenth of the rate where that is little."""
 MOST_ROWS = 1500
-"""So many samples are looked at: a model's torque takes 20 us a sample, and fifty mistakes are tried."""
+"""Samples looked at, at most: a model's torque takes 20 us a sample, and fifty mistakes are tried."""
 MOVES = 1e-6
-"""Smaller spans are no motion [rad or m]."""
+"""Spans below this are no motion [rad or m]."""
 NOISES = 12.0
-"""Nor are spans of less than so many standard deviations of what noise the low-pass lets through."""
+"""Spans below so many standard deviations of the noise behind the low-pass are no motion either."""
 
 LONGEST_S = 0.1
 """Longest delay that is looked for [s]."""
@@ -40,7 +40,7 @@ _BLOCKS = 10  # of a log, whose errors are independent of each other
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Of Q samples, J joints, all through one low-pass.
+    """Smooth motion and torques of J joints at Q samples, all through one low-pass.
 
     Attributes:
         log: what it is of.

@@ -31,8 +31,8 @@ SUSPICIOUS = 0.2
 0.27 at two whose drives are coupled; up to 0.08 on 24 simulated arms of seven joints with masses and centres off by
 10 or 50 %, none of which was suspected of anything."""
 DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
-"""So many times smaller must undoing a mistake make the misfit of the joints that it concerns; the second where none of
-them is suspected: rubbing joints hide that they are exchanged as wholes, 7 to 12 times on a real arm."""
+"""Factors by which undoing a mistake must lower the misfit of the joints that it concerns: where one of them is
+suspected, and where none is. Friction hides that whole joints are exchanged: 7 to 12 times on a real arm."""
 SAME = 2.0
 """Mistakes whose misfits, multiplied over the joints, differ by less cannot be told apart."""
 WORTH = 0.03
@@ -42,7 +42,7 @@ WRONG_SCALE = 8.0
 SHOWS = 0.3
 """Share of a torque's variance that the model's must make up for its gain to be known."""
 SLOW = 0.4
-"""Of a joint's rms speed; where it is slower, dry friction has any value, and leads or lags by milliseconds."""
+"""Share of a joint's rms speed; below it dry friction has any value, and leads or lags by milliseconds."""
 _FLOOR = 1e-4  # of a misfit
 _CHANGED = 1.5  # a joint is concerned by a mistake that changes its misfit by so much
 _RESTS = 0.05  # of the rms speed, below which the sign of a speed means nothing
@@ -55,7 +55,7 @@ _STEPS, _SHARPENED = 10, 3  # delays tried on either side, and how often
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """What an inspection has to know of a robot: no simulator, only what its model asks for.
+    """What an inspection has to know of a robot; no simulator.
 
     Attributes:
         joints: names of its J joints.

@@ -183,7 +183,7 @@ def _without_rests(
 
 
 def _rms(x: Array) -> float:
-    """Of what is known."""
+    """Root mean square; NaN counts as zero."""
     return float(np.sqrt(np.nansum(x**2) / max(len(x), 1)))
 
 

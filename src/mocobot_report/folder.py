@@ -25,7 +25,7 @@ from estimator.strict import Fields, is_number, read_json
 from mocobot_report.campaign.words import FORMAT as CAMPAIGN
 from mocobot_report.sought import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
-from mocobot_view.facts.fact_files import read_estimate
+from mocobot_view.payload import read_estimate
 
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")

@@ -13,8 +13,8 @@ import pytest
 from estimator import extras
 from invented_calibration import invented_calibration
 from mocobot.files.calibrations import write_into
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.render import Shot, render_shots
+from mocobot_view.camera import Camera
+from mocobot_view.render import Shot, render_shots
 
 OPTIONAL = ("numba", "matplotlib", "PIL", "rerun", "distributed", "dask")
 BLOCK = f"import sys\nfor name in {OPTIONAL!r}: sys.modules[name] = None\n"

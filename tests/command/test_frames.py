@@ -21,7 +21,7 @@ from mocobot.api.calibration import Calibration
 from mocobot.commands.watch import _payload
 from mocobot_report.estimate.part import answer
 from mocobot_report.folder import Estimated
-from mocobot_view.facts.fact_files import read_truth
+from mocobot_view.payload import read_truth
 from recorded_team import COM, GRASPS, INERTIA, MASS
 from uncalibrated_team import DEFAULT, uncalibrated
 

@@ -16,7 +16,7 @@ from estimator.errors import InputError
 from mocobot.cli import main
 from mocobot.files import provenance as module
 from mocobot.files.provenance import file_facts, folder_provenance, provenance
-from mocobot_view.facts.fact_files import read_estimate
+from mocobot_view.payload import read_estimate
 
 KEYS = ["mocobot", "commit", "python", "platform", "packages", "command", "options", "files"]
 GIT = ["git", "-c", "user.name=test", "-c", "user.email=test@test.invalid", "-c", "init.defaultBranch=main"]

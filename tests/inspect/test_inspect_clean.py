@@ -35,8 +35,7 @@ def inspected(recording: Recording, folder: Path) -> Inspection:
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", ["nominal", "uncalibrated"])
 @pytest.mark.parametrize(
-    ("payload", "trial"),
-    [("a", "random"), ("b", "static"), ("c", "periodic"), ("d", "random")],
+    ("payload", "trial"), [("a", "random"), ("b", "static"), ("c", "periodic"), ("d", "random")]
 )
 def test_trials_of_all_payloads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, payload: str, trial: str, preset: str

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.render import Picture, render
+from mocobot_view.camera import Camera
+from mocobot_view.render import Picture, render
 
 
 def made(pictures: list[Picture] | str) -> list[np.ndarray]:

@@ -12,8 +12,8 @@ from estimator.arm.unit import AT
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from mocobot_view.pictures.shots import measured_team
-from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
+from mocobot_view.pictures import measured_team
+from mocobot_view.replay_trial import ReplayTrial, replay_trial
 from uncalibrated_team import knowing, uncalibrated
 
 

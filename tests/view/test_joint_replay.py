@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from joint_logs import write_csv
 from made_arm import JOINTS, MODEL, made, write_log, write_map, write_model
 from mocobot import serial
-from mocobot_view.joints.joint_replay import joint_replay
+from mocobot_view.joint_replay import joint_replay
 
 
 def test_bodies_are_where_mujoco_puts_them(tmp_path) -> None:

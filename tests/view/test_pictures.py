@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from mocobot_sim.base.solo import build_solo, compile_solo
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import render
+from mocobot_view.camera import Camera, Marks
+from mocobot_view.render import render
 from rendering import made
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"

@@ -8,10 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocobot_view.pictures.camera import MARGIN, NEAREST, Camera, clearest, corners, framing, pixels
-from mocobot_view.pictures.labels import with_labels
-from mocobot_view.pictures.marks import Label, Marks
-from mocobot_view.pictures.render import render
+from mocobot_view.camera import (
+    MARGIN,
+    NEAREST,
+    Camera,
+    Label,
+    Marks,
+    clearest,
+    corners,
+    framing,
+    pixels,
+    with_labels,
+)
+from mocobot_view.render import render
 from rendering import made
 
 EMPTY = "<mujoco><visual><global fovy='30'/></visual><worldbody><light pos='0 0 5'/></worldbody></mujoco>"

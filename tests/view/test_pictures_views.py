@@ -18,20 +18,21 @@ from estimator.estimate.statics import MassEstimate
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view import colours
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.pictures import render as render_module
-from mocobot_view.pictures.camera import pixels
-from mocobot_view.pictures.render import Shot, render_shots
-from mocobot_view.pictures.shots import (
+from mocobot_view import render as render_module
+from mocobot_view.camera import pixels
+from mocobot_view.payload import BodyFacts, Grasps
+from mocobot_view.pictures import (
     FOVY,
     MeasuredTeam,
     diagnosis_shot,
+    diagnosis_view,
     estimate_shot,
+    estimate_view,
     measured_team,
     team_shot,
+    team_view,
 )
-from mocobot_view.pictures.views import diagnosis_view, estimate_view, team_view
+from mocobot_view.render import Shot, render_shots
 from rendering import made
 from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate
 
@@ -292,7 +293,7 @@ def test_without_any_renderer_the_sentence_says_what_to_install(monkeypatch: pyt
 
 def test_pictures_need_no_rerun() -> None:
     code = (
-        "import sys, mocobot_view.pictures.views\n"
+        "import sys, mocobot_view.pictures\n"
         "assert not {'rerun', 'OpenGL'} & set(sys.modules), 'pictures load more than they need'\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -14,11 +14,10 @@ from estimator.recording.model import Recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_view import colours
+from mocobot_view.blueprint import ALL_PLOTS, FOVY_DEG, SCENE_ASPECT, blueprint
 from mocobot_view.colours import FORCE_M_PER_N
-from mocobot_view.replay.blueprint import ALL_PLOTS, FOVY_DEG, SCENE_ASPECT, blueprint
-from mocobot_view.replay.outputs import save_replay
-from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
-from mocobot_view.replay.stream import summary
+from mocobot_view.replay_trial import ReplayTrial, replay_trial
+from mocobot_view.stream import save_replay, summary
 from replay_case import Replayed
 
 

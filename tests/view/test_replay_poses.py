@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_view.facts.placement import Grasps, payload_motion, place_bases
-from mocobot_view.replay.outputs import save_replay
-from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
+from mocobot_view.payload import Grasps, payload_motion, place_bases
+from mocobot_view.replay_trial import ReplayTrial, replay_trial
+from mocobot_view.stream import save_replay
 from replay_case import BODIES, Placed, Replayed, payload_body, placed_trial, robot_body, true_estimate
 
 ENCODER_RAD = np.pi / 2**16

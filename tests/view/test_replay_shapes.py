@@ -10,10 +10,8 @@ import pytest
 
 from estimator.arm.delta import inverse_kinematics
 from mocobot_sim.scene.models import models_dir, omnid_design, payload_path
-from mocobot_view.bodies.poses import body_motion
-from mocobot_view.bodies.primitives import Triangles, box, capsule, cylinder, ellipsoid, join
-from mocobot_view.bodies.robot import PATHS, robot_shapes
-from mocobot_view.bodies.shapes import body_shape
+from mocobot_view.robot import PATHS, body_motion, robot_shapes
+from mocobot_view.shapes import Triangles, body_shape, box, capsule, cylinder, ellipsoid, join
 from omnid_design import DESIGN
 
 SOLIDS = {

@@ -17,13 +17,11 @@ from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial_log import TrialLog
-from mocobot_view.bodies.payload_shape import BAR_M, cad_shape, held_elsewhere
-from mocobot_view.facts.cause_body import body_of
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.blueprint import blueprint
-from mocobot_view.replay.outputs import save_replay
-from mocobot_view.replay.replay_trial import distinct_names, replay_trial
-from mocobot_view.replay.stream import summary
+from mocobot_view.blueprint import blueprint
+from mocobot_view.payload import BAR_M, Grasps, cad_shape, held_elsewhere
+from mocobot_view.replay_trial import distinct_names, replay_trial
+from mocobot_view.robot import body_of
+from mocobot_view.stream import save_replay, summary
 from payload_mjcf import FIVE
 from recordings import metadata
 from replay_case import Replayed, true_estimate

@@ -12,9 +12,8 @@ from estimator.files import check_target
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot_sim.scene.as_built import theta_x_zeros
 from mocobot_sim.trial.truth import GroundTruth
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.replay_trial import distinct_names, replay_trial
+from mocobot_view.payload import BodyFacts, Grasps
+from mocobot_view.replay_trial import distinct_names, replay_trial
 
 INSTALL = "pip install 'mocobot[replay]'"
 SUFFIX = ".rrd"
@@ -51,7 +50,7 @@ def replay(
     target = Path(path)
     check_target(target, SUFFIX)
     check_rerun()
-    from mocobot_view.replay.outputs import check_enabled, save_replay
+    from mocobot_view.stream import check_enabled, save_replay
 
     check_enabled()
     found = read_diagnosis(Path(diagnosis)) if diagnosis is not None else None

@@ -16,11 +16,11 @@ from mocobot.api.replay import check_rerun
 from mocobot.files.recordings import read
 from mocobot.options import Replay
 from mocobot.progress import bar
-from mocobot_view.facts.fact_files import read_estimate, read_truth
-from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
+from mocobot_view.payload import read_estimate, read_truth
+from mocobot_view.replay_trial import ReplayTrial, distinct_names, replay_trial
 
 if TYPE_CHECKING:
-    from mocobot_view.joints.joint_replay import JointReplay
+    from mocobot_view.joint_replay import JointReplay
 
 
 def run(options: Replay) -> None:
@@ -31,7 +31,7 @@ def run(options: Replay) -> None:
             written.
     """
     check_rerun()
-    from mocobot_view.replay.outputs import (
+    from mocobot_view.stream import (
         check_enabled,
         has_display,
         save_content,
@@ -85,7 +85,7 @@ def _trials(options: Replay) -> list[ReplayTrial]:
 
 def _joint_replays(options: Replay, model: Path) -> list[JointReplay]:
     from mocobot import serial
-    from mocobot_view.joints.joint_replay import joint_replay
+    from mocobot_view.joint_replay import joint_replay
 
     robot, replays = serial.read_model(model), []
     with bar(len(options.rec), "reading", "log") as advance:
@@ -100,9 +100,8 @@ def _joint_replays(options: Replay, model: Path) -> list[JointReplay]:
 def _log(
     trials: list[ReplayTrial] | list[JointReplay], advance: Callable[[int], object], stream: Any
 ) -> None:
-    from mocobot_view.joints.joint_replay import JointReplay
-    from mocobot_view.joints.log_joints import log_joint_replay
-    from mocobot_view.replay.stream import log_replay
+    from mocobot_view.joint_replay import JointReplay, log_joint_replay
+    from mocobot_view.stream import log_replay
 
     joints = [trial for trial in trials if isinstance(trial, JointReplay)]
     if joints:

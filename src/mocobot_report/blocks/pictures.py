@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from mocobot_report.blocks.html import Node, add, el
 from mocobot_report.blocks.prose import verdict
-from mocobot_view.pictures.render import Shot, render_shots
+from mocobot_view.render import Shot, render_shots
 
 WIDTH, HEIGHT, QUALITY = 1120, 700, 84
 """Size of a picture [px] and quality of its JPEG."""

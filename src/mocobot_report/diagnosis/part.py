@@ -37,7 +37,7 @@ from mocobot_report.diagnosis.gain import gain_section
 from mocobot_report.diagnosis.keys import cause_name, chance_of, numbers_of, sentence_of, share_of
 from mocobot_report.folder import Diagnosed
 from mocobot_report.sources import sources
-from mocobot_view.pictures.shots import diagnosis_shot
+from mocobot_view.pictures import diagnosis_shot
 
 Values = Mapping[str, Any]
 

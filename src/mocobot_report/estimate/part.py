@@ -43,10 +43,9 @@ from mocobot_report.blocks.tables import (
 from mocobot_report.folder import Estimated
 from mocobot_report.sources import Source, sources
 from mocobot_sim.paper.scoring import rotation_error_deg
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.fact_files import read_truth
-from mocobot_view.pictures.shots import estimate_shot
-from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
+from mocobot_view.payload import BodyFacts, read_truth
+from mocobot_view.pictures import estimate_shot
+from mocobot_view.replay_trial import ReplayTrial, replay_trial
 
 
 def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:

@@ -33,7 +33,7 @@ from mocobot_sim.paper.tables import (
     summary_table,
 )
 from mocobot_sim.trial.rows import ROD_LIMIT_M, WELD_LIMIT_M, WELD_LIMIT_RAD
-from mocobot_view.pictures.shots import team_shot
+from mocobot_view.pictures import team_shot
 
 FITS = {
     ONE_FIT: ("nominal", "circle-open"), SELF_CALIBRATED: ("c1", "triangle-up"), TRANSFER: ("c1", "triangle-up-open"),

@@ -37,7 +37,7 @@ from joint_verdicts import (
 )  # fmt: skip
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.comparison.diagnoses import changes_of, groups_of
-from mocobot_view.replay.replay_trial import replay_trial
+from mocobot_view.replay_trial import replay_trial
 from recordings import small_recording
 
 

@@ -18,7 +18,7 @@ from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
-from mocobot_view.facts.fact_files import read_truth
+from mocobot_view.payload import read_truth
 
 
 def held(scene: TeamScene, samples: int = 2) -> Trajectory:

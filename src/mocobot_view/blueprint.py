@@ -2,6 +2,7 @@
 
 import uuid
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -9,12 +10,12 @@ import rerun.blueprint as rrb
 
 from estimator.arrays import Array
 from mocobot_view import colours
-from mocobot_view.bodies.robot import robot_shapes
+from mocobot_view.camera import CORNERS, Camera, clearest, framing
 from mocobot_view.colours import FORCE_M_PER_N
-from mocobot_view.pictures.camera import CORNERS, Camera, clearest, framing
-from mocobot_view.replay.log_robots import trail_paths
-from mocobot_view.replay.log_time import TIMELINE
-from mocobot_view.replay.replay_trial import ReplayTrial
+from mocobot_view.replay_trial import ReplayTrial
+from mocobot_view.robot import robot_shapes
+
+TIMELINE = "time"
 
 # The viewer's own legend lies on top of a plot's first seconds, and shows six of nine lines where there is room.
 
@@ -71,7 +72,7 @@ FOVY_DEG = 55.0
 AZIMUTH, ELEVATION = 135.0, -36.0
 """Direction of view that is preferred [deg]."""
 INSTANTS = 50
-"""Of a trial, at which everything must be in sight."""
+"""Instants of a trial at which everything must be in sight."""
 
 
 def scene_eye(trial: ReplayTrial, aspect: float) -> rrb.EyeControls3D:
@@ -191,17 +192,41 @@ def scene_view(trial: ReplayTrial, aspect: float = 1.0) -> rrb.Spatial3DView:
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL_S),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
+    overrides = {path: rrb.VisibleTimeRanges([window]) for path in trail_paths(trial)}
+    return world_view(trial.name, ["$origin/**", "- $origin/series/**"], scene_eye(trial, aspect), overrides)
+
+
+def world_view(
+    name: str, contents: list[str], eye: rrb.EyeControls3D, overrides: dict[Any, Any] | None = None
+) -> rrb.Spatial3DView:
+    """A 3D view of what is below a name, over a floor with a grid."""
     return rrb.Spatial3DView(
-        origin=f"/{trial.name}",
-        contents=["$origin/**", "- $origin/series/**"],
-        name=trial.name,
+        origin=f"/{name}",
+        contents=contents,
+        name=name,
         background=BACKGROUND,
         line_grid=rrb.LineGrid3D(
             visible=True, spacing=0.25, plane=rr.components.Plane3D.XY, color=(220, 225, 235, 70)
         ),
-        eye_controls=scene_eye(trial, aspect),
-        overrides={path: rrb.VisibleTimeRanges([window]) for path in trail_paths(trial)},
+        eye_controls=eye,
+        overrides=overrides,
     )
+
+
+def plot_view(origin: str, title: str, axis_y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
+    """Series below a path, on the time that all plots share."""
+    return rrb.TimeSeriesView(
+        origin=origin,
+        name=title,
+        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+        axis_y=axis_y,
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
+
+
+def trail_paths(trial: ReplayTrial) -> list[str]:
+    """Entities that hold wrist paths piece by piece, to be seen over a window of time."""
+    return [f"{trial.name}/omnid{i + 1}/base/wrist" for i in range(trial.robots)]
 
 
 def _tabs(contents: list[rrb.Container | rrb.View], tab: str | None) -> rrb.Tabs:
@@ -280,13 +305,8 @@ def _plot(trial: ReplayTrial, quantity: str, title: str) -> rrb.TimeSeriesView:
     if trial.motion is not None and quantity.startswith("grasp_"):  # distances: from zero up
         gap = trial.motion.gap_position_m if "position" in quantity else trial.motion.gap_rotation_rad
         top = 1e3 * float(gap.max()) or None
-    return rrb.TimeSeriesView(
-        origin=f"/{trial.name}/series/{quantity}",
-        name=title,
-        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        axis_y=None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top)),
-        plot_legend=rrb.PlotLegend(visible=False),
-    )
+    axis_y = None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top))
+    return plot_view(f"/{trial.name}/series/{quantity}", title, axis_y)
 
 
 def _share_range(body: rrb.Container, end_s: float) -> None:
@@ -295,8 +315,7 @@ def _share_range(body: rrb.Container, end_s: float) -> None:
     plot.id = ALL_PLOTS
     boundary = rrb.TimeRangeBoundary.absolute
     plot.properties["TimeAxis"] = rrb.TimeAxis(
-        link="LinkToGlobal",
-        view_range=rr.encodings.TimeRange(boundary(seconds=0.0), boundary(seconds=end_s)),
+        link="LinkToGlobal", view_range=rr.encodings.TimeRange(boundary(seconds=0.0), boundary(seconds=end_s))
     )
 
 

@@ -1,4 +1,4 @@
-"""The process in which ``render`` renders: python -m mocobot_view.pictures.render_process FOLDER
+"""The process in which ``render`` renders: python -m mocobot_view.render_process FOLDER
 
 The folder holds ``task.npz`` and the models it names; the pictures go to ``result.npy``.
 """

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from estimator.arrays import Array
 from estimator.extras import NO_PLOTS, has_plots
 from estimator.processes import scratch_folder
-from mocobot_view.pictures.camera import Camera, pixels
-from mocobot_view.pictures.marks import Marks
+from mocobot_view.camera import Camera, Marks, pixels
 
 Picture = NDArray[np.uint8]
 
@@ -88,7 +87,7 @@ def render_shots(shots: Sequence[Shot], width: int = 1600, height: int = 1000) -
         return []
     if not has_plots():
         return NO_PLOTS
-    from mocobot_view.pictures.labels import with_labels  # matplotlib, an extra
+    from mocobot_view.camera import with_labels  # matplotlib, an extra
 
     with scratch_folder() as folder:
         _write_task(folder, shots, width, height)
@@ -135,7 +134,7 @@ def _run(folder: Path) -> NDArray[np.uint8] | str:
             env.pop("PYOPENGL_PLATFORM", None)  # that of another renderer stops this one
         try:
             done = subprocess.run(
-                [sys.executable, "-m", "mocobot_view.pictures.render_process", str(folder)],
+                [sys.executable, "-m", "mocobot_view.render_process", str(folder)],
                 env=env, capture_output=True, text=True, timeout=LONGEST_S, check=False,
             )  # fmt: skip
         except (OSError, subprocess.TimeoutExpired) as error:

@@ -20,12 +20,23 @@ from estimator.recording.model import Recording
 from estimator.signals.grasp_data import GraspData
 from estimator.signals.process import process_recording
 from estimator.statistics import rms
-from mocobot_view.bodies.payload_shape import bars, cad_shape, drawn_payload
-from mocobot_view.bodies.poses import BodyMotion, body_motion
-from mocobot_view.bodies.robot import robot_shapes
-from mocobot_view.bodies.shapes import Shape
-from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
-from mocobot_view.facts.placement import Bases, Grasps, PayloadMotion, as_estimated, placed, tilted
+from mocobot_view.payload import (
+    Bases,
+    BodyFacts,
+    Grasps,
+    PayloadMotion,
+    as_estimated,
+    bars,
+    cad_shape,
+    check_robots,
+    drawn_payload,
+    facts_of,
+    held,
+    placed,
+    tilted,
+)
+from mocobot_view.robot import BodyMotion, body_motion, robot_shapes
+from mocobot_view.shapes import Shape
 
 CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
 """Cut-off of the filter, and the rate at which its output is kept."""

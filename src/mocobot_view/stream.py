@@ -1,24 +1,149 @@
-"""A replay as one Rerun recording."""
+"""Replays as streams of Rerun: robots, payload, causes, series, summary; and where they go: file, browser, viewer."""
 
-from collections.abc import Callable, Sequence
+import os
+import shutil
+import sys
+import warnings
+import webbrowser
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import ArrayLike
+from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
 from estimator.arrays import Array
+from estimator.errors import InputError
 from estimator.estimate.frames import frames_said
+from estimator.files import whole_file
 from estimator.statistics import rms, rms_length
 from mocobot_view import colours
-from mocobot_view.colours import FORCE_M_PER_N, FRAME_M, Colour
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.blueprint import blueprint, log_keys
-from mocobot_view.replay.log_robots import log_causes, log_label, log_robots, log_shape
-from mocobot_view.replay.log_time import send, send_poses
-from mocobot_view.replay.replay_trial import ReplayTrial
+from mocobot_view.blueprint import TIMELINE, blueprint, log_keys, trail_paths
+from mocobot_view.colours import FORCE_M_PER_N, FRAME_M, MARK_M, Colour
+from mocobot_view.payload import BodyFacts, Grasps
+from mocobot_view.replay_trial import ReplayTrial
+from mocobot_view.robot import PATHS, TINTED, by_place, fixed_frames, robot_shapes
+from mocobot_view.shapes import Shape
+
+
+def time_column(time: Array) -> rr.TimeColumn:
+    """The timeline's column for times [s]: whole nanoseconds, rounded where the SDK itself would cut off."""
+    return rr.TimeColumn(TIMELINE, duration=np.round(1e9 * time).astype("timedelta64[ns]"))
+
+
+def send(stream: rr.RecordingStream, path: str, time: Array, columns: Iterable[rr.ComponentColumn]) -> None:
+    """Log columns of one entity at times [s]."""
+    stream.send_columns(path, [time_column(time)], columns)
+
+
+def send_poses(
+    stream: rr.RecordingStream, path: str, time: Array, position: Array | None, quaternion: Array | None
+) -> None:
+    """Log the pose of an entity in its parent: positions [m], (Q, 3), and quaternions (x, y, z, w), (Q, 4).
+
+    None for what is constant, zero and unturned. Single precision: 0.1 um at 1 m, far below what an encoder resolves.
+    """
+    place, turn = (None if part is None else part.astype(np.float32) for part in (position, quaternion))
+    send(stream, path, time, rr.Transform3D.columns(translation=place, quaternion=turn))
+
+
+TRAIL_HZ = 25.0
+"""Pieces of a wrist path per second; it is drawn only, the samples are among the series."""
+
+
+def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
+    """Log all robots below the trial's root."""
+    shapes = robot_shapes(trial.recording.metadata.design)
+    for i in range(trial.robots):
+        robot = f"{trial.name}/omnid{i + 1}"
+        turn = Rotation.from_matrix(trial.bases.R_Wb[i]).as_quat()
+        standing = rr.Transform3D(translation=trial.bases.p_Wb[i], quaternion=turn)
+        stream.log(f"{robot}/base", standing, static=True)
+        log_shape(stream, f"{robot}/base/shape", shapes.standing)
+        foot = [0.0, 0.0, 0.02 - shapes.base_height_m]
+        log_label(stream, f"{robot}/base/name", foot, f"omnid{i + 1}", colours.of_robot(i + 1))
+        for path, (position, quaternion) in fixed_frames(trial.recording.metadata.design).items():
+            fixed = rr.Transform3D(translation=position, quaternion=rr.Quaternion(xyzw=quaternion))
+            stream.log(f"{robot}/{path}", fixed, static=True)
+        send_poses(stream, f"{robot}/{PATHS['platform']}", trial.time, trial.bodies.wrist[:, i], None)
+        for body, turn in trial.bodies.turns.items():
+            send_poses(stream, f"{robot}/{PATHS[body]}", trial.time, None, turn[:, i])
+        for body, shape in shapes.moving.items():
+            tinted = shape.in_colour(colours.of_robot(i + 1)) if body in TINTED else shape
+            log_shape(stream, f"{robot}/{PATHS[body]}/shape", tinted)
+        _log_paths(stream, trial, i)
+        _log_force(stream, trial, i)
+
+
+def log_causes(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
+    """Mark every cause of the diagnosis where it sits; several at one place share a mark."""
+    named = trial.diagnosis.causes if trial.diagnosis else ()
+    for (robot, body), causes in by_place(named).items():
+        position = np.zeros(3)
+        place = "payload" if robot is None else f"omnid{robot}/{PATHS[body] if body else 'base'}"
+        if robot is None and trial.facts is not None and trial.facts.p_1c is not None:
+            position = trial.facts.p_1c
+        path = f"{trial.name}/{place}/cause"
+        label = ", ".join(f"! {cause.name}" for cause in causes)
+        stream.log(path, rr.Points3D([position], colors=[colours.FAULT], radii=MARK_M), static=True)
+        log_label(stream, f"{path}/name", position + np.array([0.0, 0.0, 2.0 * MARK_M]), label, colours.FAULT)
+
+
+def log_label(
+    stream: rr.RecordingStream, path: str, position: ArrayLike, text: str, colour: Colour, show: bool = True
+) -> None:
+    """Write text at a point of the entity's parents' frame, readable on the viewer's dark labels."""
+    pale = [colours.pale(colour)]
+    stream.log(
+        path, rr.Points3D([position], labels=[text], colors=pale, radii=0.001, show_labels=show), static=True
+    )
+
+
+def log_shape(stream: rr.RecordingStream, path: str, shape: Shape) -> None:
+    """Log a coloured mesh once, in the frame of the entity's parents."""
+    mesh = shape.triangles
+    drawn = rr.Mesh3D(
+        vertex_positions=mesh.vertices.astype(np.float32),
+        vertex_normals=mesh.normals.astype(np.float32),
+        triangle_indices=mesh.faces,
+        vertex_colors=shape.rgba,
+    )
+    stream.log(path, drawn, static=True)
+
+
+def _log_paths(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
+    """Measured and commanded wrist positions in {b}, piece by piece."""
+    every = slice(None, None, max(1, round(trial.recording.metadata.rate_hz / TRAIL_HZ)))
+    path = trail_paths(trial)[i]
+    paths, looks = [trial.bodies.wrist[:, i]], [(colours.of_robot(i + 1), 1.5)]
+    if trial.recording.ref is not None:
+        paths.append(trial.recording.ref[:, i])
+        looks.append((colours.COMMAND, 1.0))
+    corners = np.stack([p[every] for p in paths], axis=1).astype(np.float32)
+    pieces = np.stack([corners[:-1], corners[1:]], axis=2)  # (pieces, paths, 2, 3)
+    tones, radii = zip(*looks, strict=True)
+    look = rr.LineStrips3D.from_fields(colors=tones, radii=rr.Radius.ui_points(radii))
+    stream.log(path, look, static=True)
+    strips = rr.LineStrips3D.columns(strips=pieces.reshape(-1, 2, 3))
+    send(stream, path, trial.time[every][1:], strips.partition(np.full(len(pieces), len(paths))))
+
+
+def _log_force(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
+    """Force of the robot on the payload, in {i}; it ends where the filtered data do."""
+    if trial.data is None:
+        return
+    path = f"{trial.name}/omnid{i + 1}/{PATHS['flange']}/force"
+    force = trial.data.wrench[:, i, 3:]
+    stream.log(path, rr.Arrows3D.from_fields(colors=colours.of_robot(i + 1), radii=0.008), static=True)
+    time = np.append(trial.data.time, trial.data.time[-1] + 1.0 / trial.data.rate_hz)
+    counts = np.append(np.ones(len(force), dtype=int), 0)
+    vectors = (FORCE_M_PER_N * force).astype(np.float32)
+    send(stream, path, time, rr.Arrows3D.columns(vectors=vectors).partition(counts))
 
 
 def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
@@ -104,7 +229,7 @@ def log_series(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
         for quantity, values in (("balance_force", balance.force), ("balance_moment", balance.moment)):
             if values is not None:
                 path = f"{trial.name}/series/{quantity}"
-                _lines(stream, path, data.time, values, list(XYZ), list(colours.AXES))
+                log_lines(stream, path, data.time, values, XYZ, colours.AXES)
 
 
 def _log_wrists(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
@@ -112,11 +237,13 @@ def _log_wrists(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     for i in range(trial.robots):
         path = f"{trial.name}/series/wrist/omnid{i + 1}"
         measured = trial.bodies.wrist[:, i]
-        _lines(stream, f"{path}/measured", trial.time, measured, list(XYZ), colours.shades(i + 1))
+        log_lines(stream, f"{path}/measured", trial.time, measured, XYZ, colours.shades(i + 1))
         if trial.recording.ref is not None:
             names = [f"{axis} commanded" for axis in XYZ]
             pale = colours.shades(i + 1, saturation=0.15)
-            _lines(stream, f"{path}/commanded", trial.time, trial.recording.ref[:, i], names, pale, width=3.0)
+            log_lines(
+                stream, f"{path}/commanded", trial.time, trial.recording.ref[:, i], names, pale, width=3.0
+            )
 
 
 def _per_robot(
@@ -132,16 +259,16 @@ def _per_robot(
     for robot in range(1, trial.robots + 1):
         names += [f"omnid{robot} {part}".strip() for part in parts]
         shades += colours.shades(robot) if len(parts) == 3 else [colours.of_robot(robot)]
-    _lines(stream, f"{trial.name}/series/{quantity}", time, values.reshape(len(values), -1), names, shades)
+    log_lines(stream, f"{trial.name}/series/{quantity}", time, values.reshape(len(values), -1), names, shades)
 
 
-def _lines(
+def log_lines(
     stream: rr.RecordingStream,
     path: str,
     time: Array,
     values: Array,
-    names: list[str],
-    shades: list[Colour],
+    names: Sequence[str],
+    shades: Sequence[Colour],
     width: float = 1.2,
 ) -> None:
     """k lines of one entity at times [s], shape (Q, k)."""
@@ -252,11 +379,7 @@ def _key(trial: ReplayTrial) -> str:
 
 
 def _rows(
-    name: str,
-    parts: str,
-    values: tuple[Array | None, Array | None, Array | None],
-    scale: float,
-    digits: int,
+    name: str, parts: str, values: tuple[Array | None, Array | None, Array | None], scale: float, digits: int
 ) -> list[tuple[str, str, str]]:
     """Rows of three numbers with the standard errors and the truth, shapes (3,), as far as they are known."""
     estimate, errors, truth = (None if value is None else scale * value for value in values)
@@ -295,6 +418,14 @@ def new_stream() -> rr.RecordingStream:
     return rr.RecordingStream(APPLICATION)
 
 
+def begin(stream: rr.RecordingStream, layout: rrb.Blueprint, names: Sequence[str]) -> None:
+    """Start a stream with its layout and a root for every name, z up."""
+    stream.send_blueprint(layout, make_active=True, make_default=True)
+    stream.send_recording_name(", ".join(names))
+    for name in names:
+        stream.log(name, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+
 def log_replay(
     stream: rr.RecordingStream,
     trials: Sequence[ReplayTrial],
@@ -309,10 +440,8 @@ def log_replay(
         progress: called with 1 after each trial.
         tab: tab that is open at first (see ``blueprint``).
     """
-    stream.send_blueprint(blueprint(trials, tab), make_active=True, make_default=True)
-    stream.send_recording_name(", ".join(trial.name for trial in trials))
+    begin(stream, blueprint(trials, tab), [trial.name for trial in trials])
     for trial in trials:
-        stream.log(f"{trial.name}", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         stream.log(
             f"{trial.name}/summary", rr.TextDocument(summary(trial), media_type="text/markdown"), static=True
         )
@@ -323,3 +452,123 @@ def log_replay(
         log_keys(stream, trial)
         if progress:
             progress(1)
+
+
+Progress = Callable[[int], object] | None
+Content = Callable[[rr.RecordingStream], object]
+
+WEB_PORT, DATA_PORT = 9090, 9876
+"""Ports of the web viewer and of its data: Rerun's own."""
+FLUSH_S = 20.0
+"""How long a viewer may take to accept everything; a long recording takes it one."""
+
+
+def has_display() -> bool:
+    """Whether a window could be opened."""
+    return not sys.platform.startswith("linux") or bool(
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+
+
+def check_enabled() -> None:
+    """Find out that Rerun is switched off, when it takes everything and keeps nothing.
+
+    Raises:
+        InputError: it is.
+    """
+    if not rr.is_enabled(new_stream()):
+        raise InputError(
+            f"RERUN is {os.environ.get('RERUN', '')!r} in the environment, which turns Rerun off; unset it"
+        )
+
+
+def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = None) -> None:
+    """Write a replay as an .rrd file, as ``save_content`` does.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    save_content(lambda stream: log_replay(stream, trials, progress), path)
+
+
+def save_content(content: Content, path: Path) -> None:
+    """Write whatever logs itself into a stream as an .rrd file, which replaces an earlier one only when it is complete.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with whole_file(path) as temporary:
+        temporary.touch(exist_ok=False)  # the SDK's message would name the temporary file
+        stream = new_stream()
+        try:
+            stream.save(temporary)
+            content(stream)
+            stream.flush()
+            stream.disconnect()
+        except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
+            raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
+        _check_complete(temporary)
+
+
+def show_content(content: Content) -> None:
+    """Show whatever logs itself into a stream: open the viewer, or use an open one, and return when it has everything.
+
+    Raises:
+        InputError: the viewer does not start.
+    """
+    stream = new_stream()
+    beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
+    try:
+        rr.spawn(executable_path=beside, hide_welcome_screen=True, recording=stream)
+        content(stream)
+        stream.flush(timeout_sec=FLUSH_S)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(
+            f"the Rerun viewer does not open ({_line(error)}); write a file with --save, or use --web"
+        ) from error
+    stream.disconnect()
+
+
+def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
+    """Serve whatever logs itself into a stream to browsers, until the process, or the returned stream, ends.
+
+    Returns:
+        The stream, to be kept, and the address to open.
+
+    Raises:
+        InputError: the servers do not start; another one may be using their ports.
+    """
+    stream = new_stream()
+    try:
+        data = stream.serve_grpc()
+        rr.serve_web_viewer(web_port=WEB_PORT, open_browser=False)
+        content(stream)
+        stream.flush(timeout_sec=FLUSH_S)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(
+            f"the replay cannot be served ({_line(error)}); is another one running on ports {WEB_PORT} and {DATA_PORT}?"
+        ) from error
+    # Labels are drawn for the dark theme, whatever the browser prefers.
+    address = f"http://localhost:{WEB_PORT}?url={quote(data, safe='')}&theme=dark"
+    if has_display():
+        webbrowser.open(address)
+    return stream, address
+
+
+def _check_complete(path: Path) -> None:
+    """The SDK writes in the background and only logs what goes wrong there, so read back what it says it wrote."""
+    try:
+        with warnings.catch_warnings():  # about a missing footer, which is an error here
+            warnings.simplefilter("ignore")
+            reader = RrdReader(path)
+            whole = (
+                len(reader.recordings()) == 1 and len(reader.blueprints()) >= 1 and len(reader.store()) > 0
+            )
+    except (RuntimeError, ValueError):
+        whole = False
+    if not whole:
+        raise OSError("only a part of it arrived; is the disk full?")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

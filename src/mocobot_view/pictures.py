@@ -1,4 +1,7 @@
-"""What pictures of teams show: a payload as designed, an estimate, and where a diagnosis sees causes."""
+"""Pictures of teams: a payload as designed, an estimate, and where a diagnosis sees causes.
+
+A shot says what is to be rendered; a view is its picture. ``render_shots`` renders several shots in one process.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,16 +28,24 @@ from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home
 from mocobot_view import colours
-from mocobot_view.bodies.payload_shape import BAR_M, BAR_RGBA, drawn_payload
-from mocobot_view.bodies.poses import rod_angles
-from mocobot_view.bodies.robot import LEGS, TINTED, fit_design, robot_shapes
+from mocobot_view.camera import Marks, clearest, corners
 from mocobot_view.colours import MARK_M, Colour
-from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
-from mocobot_view.facts.cause_body import body_of, by_place
-from mocobot_view.facts.placement import Bases, Grasps, as_estimated, placed, tilted
-from mocobot_view.pictures.camera import clearest, corners
-from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import Shot
+from mocobot_view.payload import (
+    BAR_M,
+    BAR_RGBA,
+    Bases,
+    BodyFacts,
+    Grasps,
+    as_estimated,
+    check_robots,
+    drawn_payload,
+    facts_of,
+    held,
+    placed,
+    tilted,
+)
+from mocobot_view.render import Picture, Shot, render_shots
+from mocobot_view.robot import LEGS, TINTED, body_of, by_place, fit_design, robot_shapes, rod_angles
 
 SAMPLES = 2000
 """Samples, spread over a recording, from which bases are placed."""
@@ -384,3 +395,44 @@ def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> N
         marks.ellipsoid(where, MARK_M, (*RED[:3], 0.45))
         text = ", ".join(cause.kind or cause.name for cause in here)
         marks.label(text, where + np.array([0.0, 0.0, 2.0 * MARK_M]), colours.FAULT)
+
+
+WIDTH, HEIGHT = 1600, 1000
+
+
+def team_view(payload: str | Path, width: int = WIDTH, height: int = HEIGHT) -> Picture | str:
+    """The team as designed, at rest, holding a payload; see ``team_shot``."""
+    return _one(team_shot(payload, width / height), width, height)
+
+
+def estimate_view(
+    recording: Recording,
+    estimate: PayloadEstimate,
+    width: int = WIDTH,
+    height: int = HEIGHT,
+    *,
+    truth: BodyFacts | None = None,
+    payload: str | Path | None = None,
+    time_s: float | None = None,
+) -> Picture | str:
+    """The team as estimated, at one measured instant; see ``estimate_shot``."""
+    return _one(estimate_shot(recording, estimate, truth, payload, time_s, width / height), width, height)
+
+
+def diagnosis_view(
+    recording: Recording,
+    estimate: PayloadEstimate,
+    causes: Sequence[NamedCause],
+    width: int = WIDTH,
+    height: int = HEIGHT,
+    *,
+    payload: str | Path | None = None,
+    time_s: float | None = None,
+) -> Picture | str:
+    """The team as estimated, causes of a diagnosis in red; see ``diagnosis_shot``."""
+    return _one(diagnosis_shot(recording, estimate, causes, payload, time_s, width / height), width, height)
+
+
+def _one(shot: Shot, width: int, height: int) -> Picture | str:
+    made = render_shots([shot], width, height)
+    return made if isinstance(made, str) else made[0]
