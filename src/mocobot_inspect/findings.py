@@ -173,7 +173,7 @@ def _team_time(found: Inspection) -> Iterator[str]:
     if known and max(known) - min(known) > SAME_RATE * max(known):
         yield "the robots are sampled at different rates: " + ", ".join(f"{r:.6g}" for r in known) + " Hz"
     for verb, which, ends_ns in (
-        ("begins", "after the first", [t.first_ns and -t.first_ns for t in timing]),
+        ("begins", "after the first", [None if t.first_ns is None else -t.first_ns for t in timing]),
         ("ends", "before the last", [t.last_ns for t in timing]),
     ):
         latest_ns = max((end for end in ends_ns if end is not None), default=0)

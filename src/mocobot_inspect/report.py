@@ -51,6 +51,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from estimator.clocks.offsets import ClockEstimate
 from mocobot_inspect.channels import UNITS, Channel
 from mocobot_inspect.findings import evidence, findings, milliseconds, mistake_words, percent, wrong_scales
 from mocobot_inspect.joint_motion import Follows, pooled
@@ -398,8 +399,13 @@ def inspection_dict(found: Inspection | JointInspection) -> dict[str, Any]:
 
 
 def _without(record: Any, *left_out: str) -> dict[str, Any]:
-    """Fields of a dataclass by name."""
-    return {f.name: getattr(record, f.name) for f in fields(record) if f.name not in left_out}
+    """Fields of a dataclass by name, without some."""
+    return _only(record, *(f.name for f in fields(record) if f.name not in left_out))
+
+
+def _only(record: Any, *names: str) -> dict[str, Any]:
+    """Some attributes of an object by name."""
+    return {name: getattr(record, name) for name in names}
 
 
 def _timing(t: Timing) -> dict[str, Any]:
@@ -407,20 +413,13 @@ def _timing(t: Timing) -> dict[str, Any]:
 
 
 def _team_dict(found: Inspection) -> dict[str, Any]:
-    seen, rested, wiring = found.survey, found.segments, found.wiring
+    seen, rested = found.survey, found.segments
     first_s = [None if t.first_ns is None else (t.first_ns - seen.origin_ns) * 1e-9 for t in seen.timing]
     return {
         "format": "mocobot-inspection",
         "version": 1,
-        "log": {
-            "name": found.name,
-            "level": found.level,
-            "robots": found.robots,
-            "channels": found.channel_names,
-            "assumed_design": found.assumed_design,
-            "calibrated": found.units is not None,
-            "free": found.free,
-        },
+        "log": _only(found, "name", "level", "robots", "assumed_design", "free")
+        | {"channels": found.channel_names, "calibrated": found.units is not None},
         "streams": [{"start_s": s} | _timing(t) for s, t in zip(first_s, seen.timing, strict=True)],
         "channels": [{c.name: _without(c, "name") for c in of_robot} for of_robot in seen.channels],
         "excerpt": {
@@ -429,34 +428,8 @@ def _team_dict(found: Inspection) -> dict[str, Any]:
             "unchecked": found.unchecked,
         },
         "segments": rested and (_without(rested, "rests") | {"rests": _stretches(rested.rests)}),
-        "clocks": found.clocks
-        and [
-            {
-                **{
-                    name: getattr(found.clocks, name)[k]
-                    for name in ("offset_s", "offset_se_s", "drift", "drift_se")
-                },
-                "differs": differs(found.clocks, k),
-                "why_not": found.clocks.why_not[k],
-            }
-            for k in range(found.robots)
-        ],
-        "wiring": wiring
-        and {
-            "misfit": _misfit(wiring.as_is),
-            "misfit_undone": _misfit(wiring.undone),
-            "found": [
-                f.mistake.to_dict()
-                | {
-                    "alternatives": [m.to_dict() for m in f.alternatives],
-                    "misfit_before": f.before,
-                    "misfit_after": f.after,
-                }
-                for f in wiring.found
-            ],
-            "tried": wiring.tried,
-            "hidden": [mistake.to_dict() for mistake in wiring.hidden],
-        },
+        "clocks": None if found.clocks is None else _clocks(found.clocks),
+        "wiring": None if found.wiring is None else _wiring(found.wiring),
         "excitation": {"as_it_is": _excitation(found.ready), "undone": _excitation(found.ready_undone)},
     }
 
@@ -465,16 +438,33 @@ def _stretches(told: tuple[tuple[float, float], ...]) -> list[dict[str, float]]:
     return [{"start_s": start, "duration_s": duration} for start, duration in told]
 
 
-def _misfit(misfit: Misfit) -> dict[str, Any]:
+def _clocks(clocks: ClockEstimate) -> list[dict[str, Any]]:
+    names = ("offset_s", "offset_se_s", "drift", "drift_se", "why_not")
+    every = _only(clocks, *names)
+    return [
+        {name: every[name][robot] for name in names} | {"differs": differs(clocks, robot)}
+        for robot in range(len(clocks.why_not))
+    ]
+
+
+def _wiring(wiring: Wiring) -> dict[str, Any]:
     return {
-        "total": misfit.total,
-        "relative": misfit.relative,
-        "scaled": misfit.scaled,
-        "faults": [fault.reason for fault in misfit.faults],
-        "determined": misfit.determined,
-        "mass_kg": misfit.mass,
-        "span_m": misfit.span,
+        "misfit": _misfit(wiring.as_is),
+        "misfit_undone": _misfit(wiring.undone),
+        "found": [
+            f.mistake.to_dict()
+            | {"alternatives": [m.to_dict() for m in f.alternatives]}
+            | {"misfit_before": f.before, "misfit_after": f.after}
+            for f in wiring.found
+        ],
+        "tried": wiring.tried,
+        "hidden": [mistake.to_dict() for mistake in wiring.hidden],
     }
+
+
+def _misfit(misfit: Misfit) -> dict[str, Any]:
+    reasons = [fault.reason for fault in misfit.faults]
+    return {"total": misfit.total, "faults": reasons} | _without(misfit, "faults", "parts")
 
 
 def _excitation(ready: Readiness | None) -> dict[str, Any] | None:
@@ -499,14 +489,8 @@ def _joint_dict(found: JointInspection) -> dict[str, Any]:
         "stamps": _timing(found.timing),
         "channels": {c.name: _without(c, "name") for c in found.channels},
         "parts": [
-            {
-                "start_s": log.start_s,
-                "duration_s": float(log.time[-1]),
-                "samples": len(log.time),
-                "rate_hz": log.rate_hz,
-                "resampled": log.resampled,
-                "notes": log.notes,
-            }
+            {"duration_s": log.time[-1], "samples": len(log.time)}
+            | _only(log, "start_s", "rate_hz", "resampled", "notes")
             for log in found.logs
         ],
         "unchecked": found.unchecked,

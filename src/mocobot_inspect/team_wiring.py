@@ -91,8 +91,8 @@ class Misfit:
         scaled: the same over tolerance and noise.
         faults: why the channels cannot be what they are taken for.
         determined: whether the payload turns enough to compare grasps.
-        mass: mass that fits best [kg], or None.
-        span: largest distance of a grasp from the first one [m], or None.
+        mass_kg: mass that fits best, or None.
+        span_m: largest distance of a grasp from the first one, or None.
         parts: number of disagreements that there are, those included that were left out.
     """
 
@@ -100,8 +100,8 @@ class Misfit:
     scaled: dict[str, float]
     faults: tuple[Fault, ...]
     determined: bool
-    mass: float | None = None
-    span: float | None = None
+    mass_kg: float | None = None
+    span_m: float | None = None
     parts: int | None = None
 
     @property
