@@ -101,24 +101,27 @@ def place_bases(R_bi: Array, p_bi: Array, grasps: Grasps, height_m: float) -> Ba
     return Bases(np.array(R_b1b), np.array(p_b1b) + np.array([0.0, 0.0, height_m]))
 
 
-def in_a_row(robots: int, height_m: float) -> Bases:
-    """Robots side by side, for recordings that do not tell how they stand."""
-    places = np.zeros((robots, 3))
-    places[:, 0], places[:, 2] = SPACING_M * np.arange(robots), height_m
-    return Bases(np.tile(np.eye(3), (robots, 1, 1)), places)
-
-
 def placed(
-    R_bi: Array, p_bi: Array, grasps: Grasps | None, height_m: float, at: slice = slice(None)
+    R_bi: Array, p_bi: Array, grasps: Grasps | None, height_m: float, arms: Arms, at: slice = slice(None)
 ) -> tuple[Bases, PayloadMotion | None]:
-    """Bases, and the payload at the samples ``at``; a row of robots and None where the grasps are not known.
+    """Bases as they stand, and the payload at the samples ``at``; a row of robots and None without grasps.
 
-    Arguments as for ``place_bases``.
+    Args:
+        R_bi, p_bi, grasps, height_m: as for ``place_bases``, which takes bases as level.
+        arms: the robots; a calibration may say how far their bases are tilted.
+        at: samples at which the payload is wanted.
     """
+    motion = None
     if grasps is None:
-        return in_a_row(R_bi.shape[1], height_m), None
-    bases = place_bases(R_bi, p_bi, grasps, height_m)
-    return bases, payload_motion(R_bi[at], p_bi[at], grasps, bases)
+        places = np.zeros((R_bi.shape[1], 3))
+        places[:, 0], places[:, 2] = SPACING_M * np.arange(len(places)), height_m
+        bases = Bases(np.tile(np.eye(3), (len(places), 1, 1)), places)
+    else:
+        bases = place_bases(R_bi, p_bi, grasps, height_m)
+        motion = payload_motion(R_bi[at], p_bi[at], grasps, bases)
+    if isinstance(arms, ArmUnit) and np.any(arms.of("tilt")):
+        bases = Bases(np.asarray(bases.R_Wb @ arms.R_ba), bases.p_Wb)
+    return bases, motion
 
 
 def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> PayloadMotion:
@@ -146,14 +149,6 @@ def as_estimated(recording: Recording, estimate: PayloadEstimate | None) -> Reco
     if units.design != metadata.design or len(units.x) != metadata.robots:
         return recording
     return replace(recording, metadata=replace(metadata, units=units))
-
-
-def tilted(bases: Bases, arms: Arms) -> Bases:
-    """Bases as they stand: level ones, turned by what a calibration says of each."""
-    if not isinstance(arms, ArmUnit) or not np.any(arms.of("tilt")):
-        return bases
-    R: Array = bases.R_Wb @ arms.R_ba
-    return Bases(R, bases.p_Wb)
 
 
 THINNEST = 0.02

@@ -42,7 +42,6 @@ from mocobot_view.payload import (
     facts_of,
     held,
     placed,
-    tilted,
 )
 from mocobot_view.render import Picture, Shot, render_shots
 from mocobot_view.robot import LEGS, TINTED, body_of, by_place, fit_design, robot_shapes, rod_angles
@@ -116,12 +115,12 @@ def measured_team(
     height = robot_shapes(meta.design).base_height_m
     facts = facts_of(estimate)
     grasps = held(facts, meta.robots)
-    bases, motion = placed(R_bi, p_bi, grasps, height, slice(-1, None))
+    bases, motion = placed(R_bi, p_bi, grasps, height, meta.arms, slice(-1, None))
     pose = None if motion is None else (motion.R_W1[0], motion.p_W1[0])
     drawn = None if grasps is None else drawn_payload(payload, meta.payload, grasps, notes)
     if grasps is None:
         notes.append("The grasps are not known: the robots are drawn in a row, without a payload.")
-    model = _model(tilted(bases, meta.arms), drawn, meta.design, height)
+    model = _model(bases, drawn, meta.design, height)
     angles = (phi[-1], theta[-1], wrist[-1], swing[-1], tilt[-1])
     return MeasuredTeam(
         model=model,

@@ -33,7 +33,6 @@ from mocobot_view.payload import (
     facts_of,
     held,
     placed,
-    tilted,
 )
 from mocobot_view.robot import BodyMotion, body_motion, robot_shapes
 from mocobot_view.shapes import Shape
@@ -177,7 +176,7 @@ def replay_trial(
     height = robot_shapes(meta.design).base_height_m
     facts = None if estimate is None else facts_of(estimate)
     grasps = held(facts, meta.robots)
-    bases, motion = placed(R_bi, wrist, grasps, height)
+    bases, motion = placed(R_bi, wrist, grasps, height, meta.arms)
     if motion is None and meta.trial != FREE:
         notes.append(
             "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
@@ -196,7 +195,7 @@ def replay_trial(
         recording=recording,
         time=recording.time - recording.time[0],
         bodies=bodies,
-        bases=tilted(bases, meta.arms),
+        bases=bases,
         motion=motion,
         shape=_shape(recording, payload, facts, grasps, notes),
         data=data,
