@@ -17,8 +17,8 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, simulate
-from mocobot_view.replay.outputs import save_replay
-from mocobot_view.replay.replay_trial import replay_trial
+from mocobot_view.replay_trial import replay_trial
+from mocobot_view.stream import save_replay
 
 RUNS = 5
 

@@ -14,8 +14,8 @@ from PIL import Image
 import mocobot
 from mocobot.pictures import render
 from mocobot_sim.scene.models import posed
-from mocobot_view.pictures.camera import clearest, corners
-from mocobot_view.pictures.shots import measured_team
+from mocobot_view.camera import clearest, corners
+from mocobot_view.pictures import measured_team
 
 WIDTH, HEIGHT = 640, 360
 BEGIN_S, FRAMES, FRAME_MS = 12.0, 50, 80

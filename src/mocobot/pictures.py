@@ -1,9 +1,8 @@
 """Pictures without a screen: teams at rest, teams as estimated, and models in any state."""
 
 from estimator.files import make_folder
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import render
-from mocobot_view.pictures.views import estimate_view, team_view
+from mocobot_view.camera import Camera, Marks
+from mocobot_view.pictures import estimate_view, team_view
+from mocobot_view.render import render
 
 __all__ = ["Camera", "Marks", "estimate_view", "make_folder", "render", "team_view"]

@@ -61,21 +61,13 @@ def readiness(name: str, level: Level, parts: Sequence[tuple[float, Array]], arm
             ]
             trials = [Trial(f"stretch {k + 1}", "random", None, d) for k, d in enumerate(data)]
             estimate = estimate_from_trials(trials)
-    except InputError as error:
-        return Readiness((), 0, None, dict.fromkeys(QUANTITIES, str(error)), ())
-    except (FloatingPointError, np.linalg.LinAlgError) as error:
-        return Readiness(
-            (), 0, None, dict.fromkeys(QUANTITIES, f"the equations cannot be solved ({error})"), ()
-        )
+    except (InputError, FloatingPointError, np.linalg.LinAlgError) as error:
+        reason = str(error) if isinstance(error, InputError) else f"the equations cannot be solved ({error})"
+        return Readiness((), 0, None, dict.fromkeys(QUANTITIES, reason), ())
     omega = np.concatenate([d.twist[:, 0, :3] for d in data])
-    axes = np.sqrt(np.mean(omega**2, axis=0))
-    return Readiness(
-        steps=estimate.steps,
-        holds=sum(recording.holds for recording in estimate.recordings),
-        axes=(float(axes[0]), float(axes[1]), float(axes[2])),
-        reasons=_reasons(estimate, omega),
-        flags=estimate.flags,
-    )
+    x, y, z = (float(rate) for rate in np.sqrt(np.mean(omega**2, axis=0)))
+    holds = sum(recording.holds for recording in estimate.recordings)
+    return Readiness(estimate.steps, holds, (x, y, z), _reasons(estimate, omega), estimate.flags)
 
 
 def _processed(name: str, level: Level, part: Array, start_s: float, arms: Arms) -> GraspData:
@@ -97,34 +89,28 @@ def _processed(name: str, level: Level, part: Array, start_s: float, arms: Arms)
 
 
 def _reasons(estimate: PayloadEstimate, omega: Array) -> dict[str, str | None]:
+    """Why each of ``QUANTITIES`` cannot be had."""
+    grasps = estimate.grasps is not None
     weak = [direction for step in estimate.steps for direction in step.weak]
+    turning = (step.noise for step in estimate.steps if step.step.startswith("rotation"))
+    idle = idle_axes(omega, max(turning, default=0.0))
 
     def why(*words: str) -> str:
-        idle = idle_axes(omega, _noise(estimate))
         if idle:
             return " and ".join(idle) + " not excited"
-        found = next((d for d in weak if any(word in d.step for word in words)), None) or next(
-            iter(weak), None
-        )
-        return f"{found.direction}: {found.reason}" if found else "nothing moves, and there is no static hold"
+        own = [direction for direction in weak if any(word in direction.step for word in words)]
+        for direction in own or weak:
+            return f"{direction.direction}: {direction.reason}"
+        return "nothing moves, and there is no static hold"
 
-    had = {
-        "grasps": estimate.grasps is not None,
-        "mass": estimate.mass is not None,
-        "centre of mass": estimate.p_1c is not None,
-        "inertia": estimate.inertia is not None,
+    return {
+        "grasps": None if grasps else why("rotation", "position"),
+        "mass": None if estimate.mass is not None else why("mass"),
+        **{
+            name: None if value is not None else why(name) if grasps else "it needs the grasps"
+            for name, value in (("centre of mass", estimate.p_1c), ("inertia", estimate.inertia))
+        },
     }
-    steps = {"grasps": ("rotation", "position"), "mass": ("mass",)}
-    reasons: dict[str, str | None] = {}
-    for name, known in had.items():
-        needs_grasps = name in ("centre of mass", "inertia") and not had["grasps"]
-        words = steps.get(name, (name,))
-        reasons[name] = None if known else "it needs the grasps" if needs_grasps else why(*words)
-    return reasons
-
-
-def _noise(estimate: PayloadEstimate) -> float:
-    return max((step.noise for step in estimate.steps if step.step.startswith("rotation")), default=0.0)
 
 
 def idle_axes(omega: Array, noise: float) -> list[str]:

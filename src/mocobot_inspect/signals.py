@@ -1,4 +1,4 @@
-"""What the wiring of a log is judged by: filtered channels with their rates, at a few hundred instants.
+"""What the wiring of a team's log is judged by: filtered channels with their rates, at a few hundred instants.
 
 Wiring mistakes permute, turn round, scale and shift channels. All of that commutes with filters and differences, so a
 mistake is undone on these few numbers and not on the log.
@@ -39,30 +39,28 @@ class Group:
     values: Array
     noise: Array
 
-    def arranged(self, robots: Sequence[int], order: Sequence[int], signs: Sequence[int]) -> Group:
-        """Channel k of some robots is channel ``order[k]`` times ``signs[k]``."""
+    def mapped(
+        self,
+        robots: Sequence[int],
+        order: Sequence[int] = (0, 1, 2),
+        factors: Sequence[float] | float = 1.0,
+        offset: Sequence[float] | float = 0.0,
+    ) -> Group:
+        """Channel k of some robots is channel ``order[k]`` times ``factors[k]``, plus ``offset[k]`` [SI]."""
         values, noise = self.values.copy(), self.noise.copy()
+        columns, gains = list(order), np.asarray(factors, dtype=float)
         for robot in robots:
-            values[:, :, robot] = self.values[:, :, robot][..., list(order)] * np.asarray(signs, dtype=float)
-            noise[robot] = self.noise[robot][list(order)]
+            values[:, :, robot] = self.values[:, :, robot][..., columns] * gains
+            values[0, :, robot] += offset
+            noise[robot] = self.noise[robot][columns] * np.abs(gains)
         return Group(values, noise)
 
-    def scaled(self, robots: Sequence[int], factor: float) -> Group:
-        """The channels of some robots in another unit."""
+    def taken(self, robots: Sequence[int], other: Group, of: Sequence[int]) -> Group:
+        """Some robots get what robots ``of`` have in another group."""
         values, noise = self.values.copy(), self.noise.copy()
-        values[:, :, list(robots)] *= factor
-        noise[list(robots)] *= factor
+        at, source = list(robots), list(of)
+        values[:, :, at], noise[at] = other.values[:, :, source], other.noise[source]
         return Group(values, noise)
-
-    def shifted(self, robots: Sequence[int], offset: Sequence[float]) -> Group:
-        """The channels of some robots with another zero [SI], three numbers."""
-        values = self.values.copy()
-        values[0][:, list(robots)] += np.asarray(offset, dtype=float)
-        return Group(values, self.noise)
-
-    def renumbered(self, order: Sequence[int]) -> Group:
-        """Robot i gets what robot ``order[i]`` has."""
-        return Group(self.values[:, :, list(order)], self.noise[list(order)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,29 +84,23 @@ class Signals:
         """Number of robots N."""
         return self.theta.values.shape[2]
 
-    @property
-    def instants(self) -> int:
-        """Number of instants Q."""
-        return self.theta.values.shape[1]
-
     def group(self, kind: Kind) -> Group:
         """One of the three groups."""
         return getattr(self, kind)
 
-    def having(self, kind: Kind, group: Group) -> Signals:
-        """The same with another group in one place."""
-        return replace(self, **{kind: group})
+    def having(self, **groups: Group) -> Signals:
+        """The same with other groups, by kind."""
+        return replace(self, **groups)
 
 
-def signals_of(level: Level, stretches: Sequence[Array], noise: Array, instants: int = INSTANTS) -> Signals:
-    """Filter uniform stretches of a log and pick instants evenly.
+def signals_of(level: Level, stretches: Sequence[Array], noise: Array) -> Signals:
+    """Filter uniform stretches of a log and pick ``INSTANTS`` evenly.
 
     Args:
         level: what the channels are.
         stretches: samples at ``RATE_HZ``, each (q, N, 9) in the order of ``CHANNELS[level]``; each longer than
             twice ``TRIM_S``.
         noise: white noise of every channel [SI], shape (N, 9).
-        instants: about how many instants to keep.
     """
     drop = round(TRIM_S * RATE_HZ)
     parts = []
@@ -117,8 +109,12 @@ def signals_of(level: Level, stretches: Sequence[Array], noise: Array, instants:
         rate = differentiate(value, RATE_HZ)
         parts.append(np.stack([value, rate, differentiate(rate, RATE_HZ)])[:, drop:-drop])
     values = np.concatenate(parts, axis=1)
-    keep = np.unique(np.linspace(0, values.shape[1] - 1, instants).astype(int))
-    values = values[:, keep]
+    keep = np.unique(np.linspace(0, values.shape[1] - 1, INSTANTS).astype(int))
+    return of_arrays(level, values[:, keep], noise)
+
+
+def of_arrays(level: Level, values: Array, noise: Array) -> Signals:
+    """Signals from nine channels: values (3, Q, N, 9) and their noise (N, 9)."""
     groups = [Group(values[..., 3 * k : 3 * k + 3], noise[:, 3 * k : 3 * k + 3]) for k in range(3)]
     return Signals(level, *groups)
 
@@ -130,6 +126,5 @@ def noise_gains() -> tuple[float, float, float]:
     impulse[500] = 1.0
     value = low_pass(impulse, RATE_HZ, CUTOFF_HZ)
     rate = differentiate(value, RATE_HZ)
-    acceleration = differentiate(rate, RATE_HZ)
-    norms = [float(np.linalg.norm(response)) for response in (value, rate, acceleration)]
+    norms = [float(np.linalg.norm(response)) for response in (value, rate, differentiate(rate, RATE_HZ))]
     return norms[0], norms[1], norms[2]

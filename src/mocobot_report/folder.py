@@ -27,7 +27,7 @@ from estimator.strict import Fields, is_number, read_json
 from mocobot_report import CAMPAIGN_FORMAT as CAMPAIGN
 from mocobot_report import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
-from mocobot_view.facts.fact_files import read_estimate
+from mocobot_view.payload import read_estimate
 
 KINDS = ("paper", "estimate", "calibration", "diagnosis", "campaign")
 """Kinds of results, in the order of a page."""

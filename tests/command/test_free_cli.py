@@ -12,10 +12,9 @@ import pytest
 import command
 import mocobot
 from estimator.recording.parquet import read_recording, write_recording
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.replay_trial import replay_trial
-from mocobot_view.replay.stream import summary
+from mocobot_view.payload import BodyFacts, Grasps
+from mocobot_view.replay_trial import replay_trial
+from mocobot_view.stream import summary
 
 READY = "mocobot calibrate --free yes, an estimate no (the robots hold nothing)"
 

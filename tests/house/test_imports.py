@@ -138,5 +138,5 @@ def test_only_what_draws_or_replays_needs_an_extra() -> None:
     drawing = {name for name, package in needs.items() if package in ("matplotlib", "PIL")}
     assert all(name.rsplit(".", 1)[-1].startswith(DRAW) for name in drawing), drawing
     replaying = {name for name in set(needs) - drawing if needs[name] == "rerun"}
-    assert {name.rsplit(".", 1)[0] for name in replaying} == {"mocobot_view.joints", "mocobot_view.replay"}
+    assert replaying == {f"mocobot_view.{name}" for name in ("blueprint", "joint_replay", "stream")}
     assert set(needs) == drawing | replaying

@@ -12,7 +12,7 @@ from effect_cases import example
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot_inspect.findings import findings
-from mocobot_inspect.inspection import Inspection, inspect_log
+from mocobot_inspect.team import Inspection, inspect_log
 from mocobot_logs.open_log import open_log
 from mocobot_sim.effects import apply_effects
 from mocobot_sim.scene.scene import build_team
@@ -35,8 +35,7 @@ def inspected(recording: Recording, folder: Path) -> Inspection:
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", ["nominal", "uncalibrated"])
 @pytest.mark.parametrize(
-    ("payload", "trial"),
-    [("a", "random"), ("b", "static"), ("c", "periodic"), ("d", "random")],
+    ("payload", "trial"), [("a", "random"), ("b", "static"), ("c", "periodic"), ("d", "random")]
 )
 def test_trials_of_all_payloads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, payload: str, trial: str, preset: str

@@ -1,4 +1,4 @@
-"""Mistakes in the log of a simulated arm whose masses are off by 30 %: each is named, and nothing else."""
+"""Logs of a simulated arm whose masses are off by 30 %: each mistake is named, healthy oddities are not."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ import pytest
 from joint_logs import write_csv
 from made_arm import JOINTS, MAP, RATE_HZ, made, write_log, write_map, write_model
 from mocobot import serial
+from mocobot_inspect.findings import percent
+from mocobot_inspect.report import later
+
+COMMANDED = 'command = { column = "{joint} goal", unit = "rad" }\n[control]\ncommand = "position"\n'
 
 
 @pytest.fixture(scope="module")
@@ -201,7 +205,7 @@ def test_a_duty_that_lost_its_sign(tmp_path, healthy) -> None:
 
 def test_commands_that_are_exchanged_or_reversed(tmp_path, healthy) -> None:
     late = round(0.02 * RATE_HZ)
-    text = MAP + 'command = { column = "{joint} goal", unit = "rad" }\n[control]\ncommand = "position"\n'
+    text = MAP + COMMANDED
     values = healthy | {f"{joint} goal": np.roll(healthy[f"{joint} q"], -late) for joint in JOINTS}
     found = inspected(tmp_path, values, text)
     assert sentences(found) == []
@@ -267,3 +271,166 @@ def test_a_torque_that_oscillates(tmp_path, healthy) -> None:
     assert line.frequency_hz == pytest.approx(20.0, abs=0.3)
     assert line.amplitude == pytest.approx(2.0, rel=0.1)
     assert line.duration_s == pytest.approx(7.5)
+
+
+@pytest.mark.parametrize("value", [1e300, -1e99, 1e6, np.inf])
+@pytest.mark.parametrize("column", ["turret q", "elbow dq", "shoulder torque"])
+def test_one_absurd_value_is_named_and_does_no_harm(tmp_path, healthy, column: str, value: float) -> None:
+    values = healthy | {column: healthy[column].copy()}
+    values[column][700] = value
+    found = inspected(tmp_path, values)
+    (said,) = sentences(found)
+    joint, quantity = column.split()
+    what = "infinite" if np.isinf(value) else "absurd"
+    assert said.startswith(f"{quantity} of {joint}: 1 {what} of 2000 samples")
+    assert found.ready_for == (
+        "ready for: nothing as it is; with the absurd values left out of the log: a diagnosis from torques of 3 joints"
+    )
+    values[column][700] = np.nan  # the advice
+    assert inspected(tmp_path, values).ready_for == (
+        "ready for: a diagnosis from torques of 3 joints; rows that lack a value are left out"
+    )
+
+
+@pytest.mark.parametrize("payload_kg", [2.0, 6.0])
+def test_a_payload_that_the_model_lacks_is_no_mistake(tmp_path, payload_kg: float) -> None:
+    values = made(payload_kg=payload_kg, heavier=1.0)
+    found = inspected(tmp_path, values)
+    assert sentences(found) == []
+    assert found.ready_for == "ready for: a diagnosis from torques of 3 joints"
+    assert found.wiring is not None
+    assert (found.wiring.payload is not None) == ("carry something" in str(found))
+
+
+def test_a_payload_hides_no_mistake_and_no_wrong_unit(tmp_path) -> None:
+    values = made(payload_kg=3.0, heavier=1.0)
+    turned = values | {"shoulder torque": -values["shoulder torque"]}
+    assert [s.partition(":")[0].partition(" (")[0] for s in sentences(inspected(tmp_path, turned))] == [
+        "torque of shoulder has the wrong sign"
+    ]
+    scaled = values | {"shoulder torque": 1e3 * values["shoulder torque"]}
+    assert any("times what the model asks for" in s for s in sentences(inspected(tmp_path, scaled)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-5, 5e-5, 2e-4])
+def test_a_joint_that_only_hums_is_neither_stuck_nor_cut_off(tmp_path, healthy, noise: float) -> None:
+    rng, step = np.random.default_rng(2), 2.0 * np.pi / 2**17
+    hums = 0.5 + noise * rng.standard_normal(2000)
+    values = healthy | {
+        "turret q": step * np.round(hums / step),
+        "turret dq": 1e-3 * rng.standard_normal(2000),
+    }
+    found = inspected(tmp_path, values)
+    assert not found.moves[0]
+    assert sentences(found) == []
+
+
+def dwelling(healthy: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The turret runs at one speed and stops within a sample for the last two seconds."""
+    time = healthy["time"]
+    q = 0.3 * np.minimum(time, 6.0) - 0.9
+    values = healthy | {"turret q": 1e-5 * np.round(q / 1e-5), "turret dq": np.where(time < 6.0, 0.3, 0.0)}
+    return values | {f"{joint} goal": values[f"{joint} q"] for joint in JOINTS}
+
+
+def test_a_joint_that_dwells_is_not_stuck(tmp_path, healthy) -> None:
+    values = dwelling(healthy)
+    assert not [s for s in sentences(inspected(tmp_path, values, MAP + COMMANDED)) if "stuck" in s]
+    values["turret goal"] = 0.3 * values["time"] - 0.9
+    said = sentences(inspected(tmp_path, values, MAP + COMMANDED))
+    assert any(s.startswith("q of turret is stuck from 6") for s in said)
+
+
+def test_a_latency_that_all_joints_share(tmp_path, healthy) -> None:
+    """Joints that are slow or noisy do not know it, and say so."""
+    late, rng = round(0.012 * RATE_HZ), np.random.default_rng(1)
+    values = dict(healthy)
+    values["turret q"] = 0.02 * values["turret q"] + 1e-4 * rng.standard_normal(2000)
+    values["turret dq"] = 0.02 * values["turret dq"]
+    for joint in JOINTS:
+        noise = 0.3 if joint == "turret" else 0.01
+        values[f"{joint} dq"] = np.roll(values[f"{joint} dq"], late) + noise * rng.standard_normal(2000)
+    found = inspected(tmp_path, values)
+    delays = {JOINTS[one.joint]: (one.delay_s, one.delay_se_s) for one in found.velocities}
+    assert np.isnan(delays["turret"][0])
+    for joint in ("shoulder", "elbow"):
+        delay, se = delays[joint]
+        assert se < 1e-3
+        assert abs(delay - 0.012) < 4.0 * se
+    said = [s for s in sentences(found) if "dq" in s]
+    assert len(said) == 1
+    assert said[0].startswith("dq of every joint is 1")
+    assert "turret: dq follows q" in str(found)
+    assert "by a delay that noise hides" in str(found)
+
+
+def sticking(dq: np.ndarray, over_rad: float) -> np.ndarray:
+    """Direction of dry friction that gives way by an angle before it slips (Dahl), in [-1, 1], shape (Q,)."""
+    out = np.zeros(len(dq))
+    for k in range(1, len(dq)):
+        step = dq[k] / RATE_HZ / over_rad
+        out[k] = np.clip(out[k - 1] + step - out[k - 1] * abs(step), -1.0, 1.0)
+    return out
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
+def test_a_robot_that_rests_does_not_move_however_its_encoders_hum(tmp_path, noise: float) -> None:
+    rng, count = np.random.default_rng(0), 2000
+    values = {"time": np.arange(count) / RATE_HZ}
+    for joint in JOINTS:
+        values[f"{joint} q"] = 0.3 + noise * rng.standard_normal(count)
+        values[f"{joint} dq"] = 1e-3 * rng.standard_normal(count)
+        values[f"{joint} torque"] = 5.0 + 0.05 * rng.standard_normal(count)
+    found = inspected(tmp_path, values)
+    assert not found.moves.any()
+    assert found.ready_for == "ready for: nothing (no joint that moves has a torque, a command or a duty)"
+    assert not [f.sentence for f in found.findings if "sign" in f.sentence or "follow" in f.sentence]
+    assert "signs and order are not compared with the model" in str(found)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.008])
+def test_friction_at_reversals_is_no_delay_and_hides_none(tmp_path, late_s: float) -> None:
+    values = made(seconds=12.0)
+    for joint, size in zip(JOINTS, (3.0, 9.0, 4.5), strict=True):
+        name = f"{joint} torque"
+        values[name] = values[name] + size * sticking(values[f"{joint} dq"], 0.001)
+        values[name] = np.roll(values[name], round(late_s * RATE_HZ))
+    found = inspected(tmp_path, values)
+    assert found.delay is not None
+    assert found.delay.delay_s == pytest.approx(late_s, abs=2e-3)
+    assert bool([f for f in found.findings if f.sentence.startswith("torques run")]) == (late_s > 0)
+
+
+def test_a_log_whose_torques_are_in_a_wrong_unit_is_not_ready(tmp_path) -> None:
+    values = made()
+    values |= {f"{joint} torque": 1e3 * values[f"{joint} torque"] for joint in JOINTS}
+    found = inspected(tmp_path, values)
+    assert found.ready_for.startswith(
+        "ready for: nothing as it is; with the mistake above undone in the map: "
+    )
+    assert any("% of the samples" in f.sentence and "e+" not in f.sentence for f in found.findings)
+
+
+def test_shares_and_delays() -> None:
+    assert [percent(x) for x in (0.0, 0.00123, 0.0449, 0.994, 0.996, 1.0, 12.34)] == [
+        "0", "0.12", "4.5", "99", "100", "100", "1234"
+    ]  # fmt: skip
+    assert [later(*x) for x in ((0.0123, 0.00021), (-0.0031, 0.0012), (np.nan, 0.1))] == [
+        "12.30 +- 0.21 ms later", "3.1 +- 1.2 ms earlier", "by a delay that noise hides",
+    ]  # fmt: skip
+
+
+def test_a_slide_in_millimetres_may_be_the_mistake_behind_a_force(tmp_path) -> None:
+    model = '<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0"/><geom size=".1" mass="10"/></body>'
+    (tmp_path / "axis.xml").write_text(f"{model}</worldbody></mujoco>")
+    time = np.arange(2000) / RATE_HZ
+    position = 0.3 * np.sin(2.0 * time) + 0.1 * np.sin(5.0 * time)
+    force = 10.0 * (-1.2 * np.sin(2.0 * time) - 2.5 * np.sin(5.0 * time))
+    log = write_csv(tmp_path / "log.csv", {"time": time, "x": 1e3 * position, "force": force})
+    text = 'joints = ["x"]\ntime = { column = "time", unit = "s" }\n[channels]\nq = { column = "x", unit = "m" }\n'
+    (tmp_path / "log.toml").write_text(f'{text}torque = {{ column = "force", unit = "N" }}\n')
+    (said,) = (f.sentence for f in serial.inspect(log, tmp_path / "axis.xml").findings)
+    assert said.endswith(
+        " times what the model asks for; is it in whole units, taken for thousandths, or its position in thousandths, "
+        "taken for whole units?"
+    )

@@ -10,17 +10,15 @@ import numpy as np
 import pytest
 
 from array_log import ArrayLog, stream
-from estimator.clocks import ClockEstimate
-from estimator.estimate.uncertainty import StepReport, WeakDirection
-from mocobot_inspect.findings import evidence, findings, of_stream, stands
-from mocobot_inspect.inspection import Inspection, Segments, inspect_log
+from estimator.clocks.offsets import ClockEstimate
+from estimator.estimate.identifiability import StepReport, WeakDirection
+from mocobot_inspect.channels import Oscillation, Stretch
+from mocobot_inspect.findings import evidence, findings
+from mocobot_inspect.grasps import Fault
 from mocobot_inspect.readiness import Readiness, idle_axes
-from mocobot_inspect.stream.channels import Channel, Oscillation, Stretch, joined, oscillation
-from mocobot_inspect.stream.timing import Timing
-from mocobot_inspect.text import format_inspection, verdict
-from mocobot_inspect.wiring.check import Wiring
-from mocobot_inspect.wiring.misfit import Misfit
-from mocobot_inspect.wiring.motion import Fault
+from mocobot_inspect.report import format_inspection, verdict
+from mocobot_inspect.team import Inspection, Segments, inspect_log
+from mocobot_inspect.team_wiring import Misfit, Wiring
 from omnid_design import DESIGN
 
 S = 1_000_000_000
@@ -55,16 +53,6 @@ def with_channel(found: Inspection, robot: int, name: str, **change: Any) -> Ins
     k = found.channel_names.index(name)
     channels[robot][k] = replace(channels[robot][k], **change)
     return replace(found, survey=replace(found.survey, channels=tuple(map(tuple, channels))))
-
-
-@pytest.fixture
-def timing(plain: Inspection) -> Timing:
-    return plain.survey.timing[0]
-
-
-@pytest.fixture
-def channel(plain: Inspection) -> Channel:
-    return plain.survey.channels[0][4]
 
 
 def test_nothing_is_said_of_a_plain_log(plain: Inspection) -> None:
@@ -131,9 +119,10 @@ def test_nothing_is_said_of_a_plain_log(plain: Inspection) -> None:
         ),
     ],
 )
-def test_stamps(timing: Timing, change: Mapping[str, Any], said: list[str]) -> None:
-    still = replace(timing, rate_hz=100.0, jitter_rms_s=0.0, jitter_max_s=0.0)
-    assert list(of_stream(replace(still, **change))) == said
+def test_stamps(plain: Inspection, change: Mapping[str, Any], said: list[str]) -> None:
+    still = {"rate_hz": 100.0, "jitter_rms_s": 0.0, "jitter_max_s": 0.0}
+    found = timed(plain, *[still | dict(change)] * 3)
+    assert told(found, "time") == [f"robots 1, 2 and 3: {sentence}" for sentence in said]
 
 
 def test_what_robots_share_is_said_once(plain: Inspection) -> None:
@@ -173,26 +162,26 @@ def test_ends_that_are_far_apart(plain: Inspection) -> None:
     ("stuck", "said"),
     [
         ([], []),
-        ([(1.0, 2.0)], ["c is stuck from 1.00 s for 2.00 s while others move"]),
-        ([(1.0, 2.0), (4.0, 2.9)], ["c is stuck 2 times, longest from 4.00 s for 2.90 s while others move"]),
-        ([(1.0, 2.0), (4.0, 3.1)], ["c stands at 0.25 for 5.1 of 10 s while others move: stuck"]),
+        ([(1.0, 2.0)], [" is stuck from 1.00 s for 2.00 s while others move"]),
+        ([(1.0, 2.0), (4.0, 2.9)], [" is stuck 2 times, longest from 4.00 s for 2.90 s while others move"]),
+        ([(1.0, 2.0), (4.0, 3.1)], [" stands at 0.25 for 5.1 of 10 s while others move: stuck"]),
     ],
 )
-def test_channels_that_stand(channel: Channel, stuck: list[tuple[float, float]], said: list[str]) -> None:
+def test_channels_that_stand(plain: Inspection, stuck: list[tuple[float, float]], said: list[str]) -> None:
     stretches = tuple(_stretch(start, duration) for start, duration in stuck)
-    assert list(stands("c", replace(channel, stuck=stretches, stuck_count=len(stuck)), 10.0)) == said
+    found = timed(plain, {"first_ns": 0, "last_ns": 10 * S})
+    found = with_channel(found, 0, "theta_y", stuck=stretches, stuck_count=len(stuck))
+    assert told(found, "samples") == [f"omnid1.theta_y{sentence}" for sentence in said]
 
 
 def _stretch(start_s: float, duration_s: float) -> Stretch:
-    rest = {
-        name: False for name in Stretch.__dataclass_fields__ if name not in ("start_s", "duration_s", "value")
-    }
-    return Stretch(start_s=start_s, duration_s=duration_s, value=0.25, **rest)
+    return Stretch(start_s, duration_s, value=0.25, jumps=False)
 
 
-def test_a_channel_that_is_cut_off(channel: Channel) -> None:
-    (said,) = stands("c", replace(channel, clipped=(_stretch(1.0, 0.5),), clipped_count=7), 10.0)
-    assert said == "c is cut off at 0.25: it stays there 7 times, longest from 1.00 s for 0.50 s"
+def test_a_channel_that_is_cut_off(plain: Inspection) -> None:
+    found = with_channel(plain, 0, "theta_y", clipped=(_stretch(1.0, 0.5),), clipped_count=7)
+    (said,) = told(found, "samples")
+    assert said == "omnid1.theta_y is cut off at 0.25: it stays there 7 times, longest from 1.00 s for 0.50 s"
 
 
 def test_which_channels_stand(plain: Inspection) -> None:
@@ -420,39 +409,6 @@ def test_how_streams_and_channels_are_shown(plain: Inspection) -> None:
     assert "still 1.0 s, moving 2.0 s\n" in once
 
 
-# Oscillation
-
-
-def test_which_lines_are_oscillations() -> None:
-    rng = np.random.default_rng(2)
-    time, noise = np.arange(1000) / 200.0, 0.01
-    white = noise * rng.standard_normal(1000)
-    in_window = np.sqrt(2.0) * noise  # amplitude of a line as strong as all of the noise
-
-    def line(hz: float, size: float) -> np.ndarray:
-        return size * np.sin(2 * np.pi * hz * time)
-
-    found = oscillation(white + line(24.0, 0.3), 200.0)
-    assert found is not None
-    assert found.frequency_hz == pytest.approx(24.0, abs=0.2)
-    assert found.amplitude == pytest.approx(0.3, rel=0.05)
-    assert found.duration_s == pytest.approx(5.0)
-    assert oscillation(white + line(8.0, 0.3), 200.0) is None  # as slow as motion
-    assert oscillation(white + line(24.0, 5.0 * in_window), 200.0) is None
-    assert oscillation(white + line(24.0, 0.3), 39.0) is None
-    assert oscillation((white + line(24.0, 0.3))[:499], 200.0) is None
-    half = oscillation(white + np.where(time < 2.5, line(24.0, 0.3), 0.0), 200.0)
-    assert half is not None
-    assert half.duration_s == pytest.approx(2.5)
-    assert oscillation(line(24.0, 0.3) + line(33.0, 0.25), 200.0) is None  # no line is most of it
-
-
-def test_oscillations_of_parts_are_one() -> None:
-    assert joined([]) is None
-    parts = [Oscillation(20.0, 0.1, 2.5), Oscillation(21.0, 0.3, 5.0), Oscillation(22.0, 0.2, 2.5)]
-    assert joined(parts) == Oscillation(21.0, 0.3, 10.0)
-
-
 def test_a_missing_robot_is_suspected_where_only_forces_do_not_fit(plain: Inspection) -> None:
     hint = ": they move together, so does the log lack a robot, or does something else carry or push?"
     said = {}
@@ -490,14 +446,8 @@ def test_excitation_is_shown(plain: Inspection) -> None:
 class Hidden(NamedTuple):
     """As much of a mistake as its words need."""
 
-    what: str
-    robots: str
-
-    def subject(self) -> str:
-        return self.what
-
-    def who(self) -> str:
-        return self.robots
+    subject: str
+    who: str
 
 
 def test_mistakes_that_would_not_show(plain: Inspection) -> None:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import json
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from array_log import ArrayLog, stream
 from estimator.quantisation import quantisation_step
-from mocobot_inspect.inspection import clean_stream, inspect_log, stretches
-from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.stream import survey as survey_module
-from mocobot_inspect.stream.channels import Channel, frozen
-from mocobot_inspect.stream.noise import noise_level
-from mocobot_inspect.stream.survey import Survey, survey
-from mocobot_inspect.text import format_inspection
+from mocobot_inspect import survey as survey_module
+from mocobot_inspect.channels import Channel, clipped, noise_level, oscillation, stuck
+from mocobot_inspect.findings import findings
+from mocobot_inspect.report import format_inspection, inspection_dict
+from mocobot_inspect.survey import Survey, survey
+from mocobot_inspect.team import clean_stream, inspect_log, stretches
 from mocobot_logs.log import CHANNELS, Level, Samples
 from omnid_design import DESIGN
 
@@ -113,13 +114,8 @@ def test_the_quantisation_step_is_recovered(bits: int) -> None:
     assert quantisation_step(values) == pytest.approx(step, rel=1e-6)
     # In degrees, with the other sign, as a 32-bit float.
     assert quantisation_step(-np.rad2deg(values)) == pytest.approx(np.rad2deg(step), rel=1e-6)
-
-
-def test_what_has_no_step() -> None:
-    rng = np.random.default_rng(3)
-    assert quantisation_step(rng.standard_normal(5000)) is None
-    assert quantisation_step(motion(60.0, noise=0.0)[:, 0]) is None
-    assert quantisation_step(np.full(100, 0.3)) is None
+    assert quantisation_step(smooth) is None
+    assert quantisation_step(np.random.default_rng(bits).standard_normal(5000)) is None
     assert quantisation_step(np.array([0.0, 1.0, 2.0])) is None
 
 
@@ -138,6 +134,21 @@ def test_rounding_and_noise_together_as_a_torque_sensor_has_them() -> None:
 
 
 # Stuck and clipped
+
+
+class Run(NamedTuple):
+    """Rows in which a channel stands."""
+
+    kind: str
+    channel: int
+    start: int
+    stop: int
+    value: float
+
+
+def frozen(values: np.ndarray, rate_hz: float) -> list[Run]:
+    runs = [("stuck", run) for run in stuck(values, rate_hz)] + [("clipped", run) for run in clipped(values)]
+    return [Run(kind, k, start, stop, values[start, k]) for kind, (k, start, stop, _) in runs]
 
 
 @pytest.mark.parametrize("step", [0.0, 1e-4, 3e-3])
@@ -170,12 +181,18 @@ def test_a_dead_channel_is_stuck_all_the_time() -> None:
     assert (found.kind, found.channel, found.start, found.stop, found.value) == ("stuck", 7, 0, 3000, 0.25)
 
 
-def test_rest_is_not_stuck() -> None:
-    """Everything stands for a while, as in a static trial; encoders do not even flicker."""
+def comes_to_rest() -> np.ndarray:
+    """A minute of motion that slows down and rests from its 40th second on."""
     values = motion(60.0, noise=0.0)
     blend = np.clip((np.arange(6000) - 2000) / 500, 0, 1)[:, None]
     values = values * (1 - blend) + values[2000] * blend
     values[4000:] = values[4000]
+    return values
+
+
+def test_rest_is_not_stuck() -> None:
+    """Everything stands for a while, as in a static trial; encoders do not even flicker."""
+    values = comes_to_rest()
     assert frozen(np.round(values / 1e-4) * 1e-4, RATE) == []
     exact = motion(60.0, noise=0.0)  # sensors without noise and steps
     exact[5000:] = exact[5000]
@@ -184,10 +201,7 @@ def test_rest_is_not_stuck() -> None:
 
 def test_rest_after_interpolation_is_not_stuck() -> None:
     """Rounded encoders of a hold, on another grid: no step tells rest, and only noise moves the torques."""
-    values = motion(60.0, noise=0.0)
-    blend = np.clip((np.arange(6000) - 2000) / 500, 0, 1)[:, None]
-    values = values * (1 - blend) + values[2000] * blend
-    values[4000:] = values[4000]
+    values = comes_to_rest()
     values[:, :6] = np.round(values[:, :6] / 1e-4) * 1e-4
     values[:, 6:] += 0.005 * np.random.default_rng(2).standard_normal((6000, 3))
     time = np.arange(6000) / RATE
@@ -261,10 +275,7 @@ def test_stretches_are_what_all_robots_have() -> None:
     gap = np.ones(3000, bool)
     gap[2000:2050] = False
     time = np.arange(3000) / RATE
-    streams = [
-        clean_stream(stream(time, a), 0),
-        clean_stream(stream(time[gap], b[gap]), 0),
-    ]
+    streams = [clean_stream(stream(time, a), 0), clean_stream(stream(time[gap], b[gap]), 0)]
     found = stretches(streams)
     assert [start for start, _ in found] == pytest.approx([0.0, 20.5])
     assert [len(part) for _, part in found] == [2000, 950]
@@ -341,3 +352,120 @@ def test_a_rare_movement_to_a_round_peak_is_not_clipped(cut: bool) -> None:
     values[:, 8] = x
     found = [one for one in frozen(values, RATE) if one.kind == "clipped" and one.channel == 8]
     assert [one.value for one in found] == ([-5.5] * 3 + [5.5] * 3) * cut
+
+
+# Oscillations
+
+TIME = np.arange(3000) / RATE
+
+
+def read(
+    extra: np.ndarray | float = 0.0, step: float = 0.01, sigma: float = 0.01, seed: int = 0
+) -> np.ndarray:
+    """A torque sensor on a slow motion of 3 N m."""
+    rng = np.random.default_rng(seed)
+    smooth = 4.0 + 3.0 * np.sin(2 * np.pi * 0.4 * TIME + 1.0) + extra
+    noisy = smooth + sigma * rng.standard_normal(len(TIME))
+    return np.round(noisy / step) * step
+
+
+def sine(hz: float, amplitude: float) -> np.ndarray:
+    return amplitude * np.sin(2 * np.pi * hz * TIME + 0.3)
+
+
+@pytest.mark.parametrize("hz", [12.0, 29.7, 43.0])
+@pytest.mark.parametrize("amplitude", [0.3, 5.0])
+def test_frequency_and_amplitude(hz: float, amplitude: float) -> None:
+    found = oscillation(read(sine(hz, amplitude)), RATE)
+    assert found is not None
+    assert found.frequency_hz == pytest.approx(hz, abs=0.25)
+    assert found.amplitude == pytest.approx(amplitude, rel=0.03)
+    assert found.duration_s == pytest.approx(30.0)
+
+
+def test_what_is_faster_than_half_the_rate_is_folded() -> None:
+    found = oscillation(read(sine(70.3, 2.0)), RATE)
+    assert found is not None
+    assert found.frequency_hz == pytest.approx(29.7, abs=0.25)
+
+
+def test_a_part_of_the_trial() -> None:
+    found = oscillation(read(sine(30.0, 1.0) * (TIME > 20.0)), RATE)
+    assert found is not None
+    assert found.duration_s == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        0.0,
+        sine(30.0, 0.03),  # a small hum: three times the noise
+        sine(3.0, 2.0),  # an arm that shakes
+        2.0 * np.exp(-np.square((TIME - 15.0) / 0.02)),  # a bump
+        np.where(TIME > 12.0, 2.0, 0.0),
+    ],
+    ids=["nothing", "hum", "shaking", "bump", "step"],
+)
+def test_no_line(extra: np.ndarray | float) -> None:
+    assert oscillation(read(extra), RATE) is None
+
+
+def test_a_hum_of_five_times_the_noise_of_a_fine_sensor() -> None:
+    assert oscillation(read(sine(30.0, 0.05), step=1e-6), RATE) is None
+    assert oscillation(read(sine(30.0, 0.2), step=1e-6), RATE) is not None
+
+
+def test_shaking_over_many_frequencies_is_no_line() -> None:
+    band = butter(12, (13.0, 24.0), btype="band", fs=RATE, output="sos")
+    shaking = sosfilt(band, np.random.default_rng(8).standard_normal(len(TIME)))
+    assert oscillation(read(3.0 * shaking), RATE) is None
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.03, 0.07])
+def test_stairs_of_a_slow_encoder_are_no_line(rate: float) -> None:
+    """A joint that creeps evenly: its steps come at 10 Hz and more."""
+    step = 1.5e-3
+    assert oscillation(np.round(rate * TIME / step) * step, RATE) is None
+
+
+@pytest.mark.parametrize(("size", "rate_hz"), [(0, RATE), (249, RATE), (3000, 39.0)])
+def test_too_short_and_too_slow(size: int, rate_hz: float) -> None:
+    assert oscillation(read(sine(12.0, 5.0))[:size], rate_hz) is None
+
+
+def test_a_fast_log_is_looked_at_in_shorter_windows() -> None:
+    """Rows come 20,000 at a time: two seconds of 10 kHz."""
+    time = np.arange(20_000) / 10_000.0
+    hum = 0.5 * np.sin(2 * np.pi * 50.0 * time) + 0.01 * np.random.default_rng(2).standard_normal(len(time))
+    found = oscillation(hum, 10_000.0)
+    assert found is not None
+    assert found.frequency_hz == pytest.approx(50.0, abs=0.5)
+    assert found.amplitude == pytest.approx(0.5, rel=0.02)
+    assert found.duration_s == pytest.approx(2.0)
+
+
+def log(lines: dict[tuple[int, int], np.ndarray]) -> ArrayLog:
+    rng = np.random.default_rng(3)
+    robots = []
+    for robot in (1, 2):
+        slow = 0.3 * np.sin(2 * np.pi * rng.uniform(0.2, 0.5, 9) * TIME[:, None] + rng.uniform(0, 6, 9))
+        values = slow + 1e-4 * rng.standard_normal(slow.shape)
+        for (of, column), line in lines.items():
+            if of == robot:
+                values[:, column] += line
+        robots.append(stream(TIME, values))
+    return ArrayLog(robots)
+
+
+def test_the_torque_that_oscillates_most_is_said_with_what_shakes_along() -> None:
+    found = inspect_log(
+        log({(2, 7): sine(29.6, 0.5), (2, 6): sine(29.6, 0.1), (1, 1): sine(29.6, 0.7)}), DESIGN
+    )
+    said = [f.sentence for f in findings(found) if "oscillates" in f.sentence]
+    assert said == [
+        "omnid2.tau2 oscillates at 29.6 Hz, or what folds to that, by up to +-0.5 N m for 30 s, and omnid2.tau1 and "
+        "omnid1.phi2 with it: is a control loop unstable?"
+    ]
+    told = inspection_dict(found)["channels"]
+    assert told[1]["tau2"]["oscillation"]["amplitude"] == pytest.approx(0.5, rel=0.02)
+    assert told[0]["tau2"]["oscillation"] is None

@@ -7,12 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimator.arm.delta import wrist_of
+from estimator.arm.arms import Arms
+from estimator.arm.wrist_level import wrist_of
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
+from mocobot_inspect.readiness import readiness
 from mocobot_inspect.signals import Signals, signals_of
-from mocobot_inspect.wiring.check import Wiring, check_wiring, shows
-from mocobot_inspect.wiring.misfit import SUSPICIOUS
+from mocobot_inspect.team_wiring import SUSPICIOUS, Misfit, Team, Wiring, check_wiring, shows
 from mocobot_logs.log import Level
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, measure
@@ -20,6 +21,7 @@ from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.trial_log import TrialLog
 from omnid_design import DESIGN
+from uncalibrated_team import uncalibrated
 
 ENCODER = 2 * np.pi / 2**16 / np.sqrt(12)
 TORQUE = 0.01 * np.sqrt(1 + 1 / 12)
@@ -34,15 +36,18 @@ def trials(random_a: TrialLog) -> dict[str, Recording]:
     return {name: measure(log, PRESETS["nominal"], rng) for name, log in logs.items()}
 
 
-def signals(recording: Recording, level: Level = "joint") -> Signals:
-    """What is judged of a recording whose sensors' noise is known."""
+def samples(recording: Recording, level: Level) -> np.ndarray:
+    """As a log tells them: wrists and forces are worked out by robots' own controllers, which know the design."""
     position, effort = recording.phi, recording.tau
-    noise = [ENCODER, ENCODER, TORQUE]
     if level == "wrist":
         position, effort = wrist_of(position, effort, DESIGN)
-        noise = [0.2 * ENCODER, ENCODER, 5 * TORQUE]
-    samples = np.concatenate([position, recording.theta, effort], axis=2)
-    return signals_of(level, [samples], np.tile(np.repeat(noise, 3), (samples.shape[1], 1)))
+    return np.concatenate([position, recording.theta, effort], axis=2)
+
+
+def signals(recording: Recording, level: Level = "joint") -> Signals:
+    """What is judged of a recording whose sensors' noise is known."""
+    noise = [0.2 * ENCODER, ENCODER, 5 * TORQUE] if level == "wrist" else [ENCODER, ENCODER, TORQUE]
+    return signals_of(level, [samples(recording, level)], np.tile(np.repeat(noise, 3), (3, 1)))
 
 
 def look(found: Signals) -> Wiring:
@@ -57,7 +62,7 @@ def test_a_mistake_is_named(trials: dict[str, Recording], payload: str, mistake:
     assert found.mistake.kind == mistake.kind
     assert sorted(robot + 1 for robot in found.mistake.robots) == list(mistake.robots)
     assert set(found.mistake.channels) == set(mistake.channels)
-    assert mistake.words in found.mistake.sentence()
+    assert mistake.words in found.mistake.sentence
     assert found.before > 15 * found.after
     assert wiring.undone.total < 0.05
 
@@ -114,7 +119,7 @@ def test_two_mistakes_are_both_named(trials: dict[str, Recording]) -> None:
         tau[:, 2] *= -1
 
     wiring = look(signals(miswire(trials["a"], edit)))
-    sentences = {found.mistake.sentence() for found in wiring.found}
+    sentences = {found.mistake.sentence for found in wiring.found}
     assert sentences == {"all robots: theta is in degrees, not radians", "robot 3: tau has the wrong sign"}
     assert wiring.undone.total < 0.05
 
@@ -137,7 +142,7 @@ def test_a_mirror_image_is_not_told_apart(trials: dict[str, Recording]) -> None:
         tau[..., [1, 2]] = tau[..., [2, 1]]
 
     (found,) = look(signals(miswire(trials["a"], edit))).found
-    either = {m.sentence() for m in (found.mistake, *found.alternatives)}
+    either = {m.sentence for m in (found.mistake, *found.alternatives)}
     assert either == {
         "all robots: phi2 and phi3 are exchanged and tau2 and tau3 are exchanged",
         "all robots: theta_z and theta_x have the wrong sign",
@@ -187,10 +192,7 @@ def wrist_edits(name: str, found: Signals) -> Signals:
     [
         ("mm", "all robots: h is in millimetres, not metres"),
         ("force sign", "robot 2: force has the wrong sign"),
-        (
-            "h and force axes",
-            "robot 3: h_x and h_y are exchanged and force_x and force_y are exchanged",
-        ),
+        ("h and force axes", "robot 3: h_x and h_y are exchanged and force_x and force_y are exchanged"),
         ("from home", "all robots: h is measured from the home posture at (0, 0, 0.355) m"),
         ("force axes", "robot 1: force_x and force_z are exchanged"),
     ],
@@ -200,7 +202,7 @@ def test_mistakes_at_wrist_level(
 ) -> None:
     wiring = look(wrist_edits(name, signals(trials[payload], "wrist")))
     (found,) = wiring.found
-    assert sentence in {m.sentence() for m in (found.mistake, *found.alternatives)}
+    assert sentence in {m.sentence for m in (found.mistake, *found.alternatives)}
     assert wiring.undone.total < 0.05
 
 
@@ -214,7 +216,7 @@ def test_mistakes_that_would_not_show_are_said(trials: dict[str, Recording]) -> 
         tau[:, 0] = tau[:, 0].mean(axis=-1, keepdims=True)
 
     wiring = check_wiring(signals(miswire(trials["a"], edit)), DESIGN)
-    sentences = {mistake.sentence() for mistake in wiring.hidden}
+    sentences = {mistake.sentence for mistake in wiring.hidden}
     assert "robot 1: tau2 and tau3 are exchanged" in sentences
     assert "robot 2: tau2 and tau3 are exchanged" not in sentences
 
@@ -236,7 +238,7 @@ def test_without_rotation_nothing_is_claimed(trials: dict[str, Recording]) -> No
     (found,) = look(
         signals(dataclasses.replace(whole, time=time, ref=None, **still | {"tau": -still["tau"]}))
     ).found
-    assert found.mistake.sentence() == "all robots: tau has the wrong sign"
+    assert found.mistake.sentence == "all robots: tau has the wrong sign"
 
 
 @pytest.mark.parametrize("robot", [0, 2])
@@ -249,3 +251,30 @@ def test_the_noisiest_robot_says_what_noise_explains(trials: dict[str, Recording
     assert found.relative == pytest.approx(plain.relative)
     for name in ("rotation", "velocity", "force", "moment"):
         assert found.scaled[name] < 0.7 * plain.scaled[name]
+
+
+# Robots as a calibration has them
+
+
+def misfit(recording: Recording, level: Level, arms: Arms) -> Misfit:
+    found = signals_of(level, [samples(recording, level)], np.full((3, 9), 1e-9))
+    return Team(found, arms).misfit
+
+
+@pytest.mark.parametrize("level", ["joint", "wrist"])
+def test_robots_as_they_are_fit_together(level: Level) -> None:
+    carried, units = uncalibrated()
+    as_they_are = misfit(carried.recording, level, units)
+    as_designed = misfit(carried.recording, level, DESIGN)
+    assert max(as_they_are.relative.values()) < 1e-3  # forces lack the gimbals' own moments, some mN m
+    assert max(as_they_are.relative[name] for name in ("rotation", "velocity", "tilt")) < 1e-4
+    assert max(as_designed.relative.values()) > 5e-3
+
+
+@pytest.mark.parametrize("level", ["joint", "wrist"])
+def test_readiness_of_robots_as_they_are(level: Level) -> None:
+    carried, units = uncalibrated()
+    part = samples(carried.recording, level)
+    known, unknown = (readiness("log", level, [(0.0, part)], arms) for arms in (units, DESIGN))
+    assert set(known.reasons.values()) == {None}
+    assert known.steps[0].noise < 1e-6 < unknown.steps[0].noise

@@ -5,21 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from estimator.estimate.grasps import GraspEstimate
+from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import PAYLOAD_PREFIX
 from mocobot_sim.trial import trial as trial_module
+from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.trial_log import Rows, TrialLog
+from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_view.camera import Camera
+from mocobot_view.render import Picture, render
 
 BODIES = {
     **{f"proximal{k}": f"base/leg{k}/proximal" for k in (1, 2, 3)},
@@ -145,3 +149,14 @@ def payload_body(placed: Placed) -> RigidTransform:
 
 def robot_body(placed: Placed, robot: int, body: str) -> RigidTransform:
     return placed.bodies[f"omnid{robot}/{body}"]
+
+
+def made(pictures: list[Picture] | str) -> list[np.ndarray]:
+    """Pictures as whole numbers; skips where not even an empty room can be rendered, and fails where it can."""
+    if not isinstance(pictures, str):
+        return [picture.astype(int) for picture in pictures]
+    room = mujoco.MjModel.from_xml_string("<mujoco/>")
+    words = render(room, [np.zeros(0)], Camera((0.0, 0.0, 0.0), 1.0, 0.0, 0.0), width=32, height=32)
+    if isinstance(words, str):
+        pytest.skip(words)
+    raise AssertionError(pictures)

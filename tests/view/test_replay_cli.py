@@ -103,7 +103,7 @@ def test_existing_targets_are_replaced_whole(
         raise OSError(28, "No space left on device")
 
     before = target.read_bytes()
-    monkeypatch.setattr("mocobot_view.replay.stream.log_replay", broken)
+    monkeypatch.setattr("mocobot_view.stream.log_replay", broken)
     message = refused(capsys, folder / "rec.parquet", "--save", target, "--force")
     assert f"{target}: cannot be written (No space left on device)" in message
     assert target.read_bytes() == before
@@ -113,7 +113,7 @@ def test_existing_targets_are_replaced_whole(
 def test_a_file_that_arrived_in_part_is_not_kept(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mocobot_view.replay import outputs
+    from mocobot_view import stream as outputs
 
     check = outputs._check_complete
 

@@ -17,10 +17,9 @@ from estimator.signals import process_recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
-from mocobot_view.facts.body_facts import BodyFacts, facts_of
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.outputs import save_replay
-from mocobot_view.replay.replay_trial import ReplayTrial, balance, replay_trial
+from mocobot_view.payload import BodyFacts, Grasps, facts_of
+from mocobot_view.replay_trial import ReplayTrial, balance, replay_trial
+from mocobot_view.stream import save_replay
 from replay_case import Replayed
 
 

@@ -96,6 +96,6 @@ def read_estimate(path: Path | str) -> Estimate:
     Raises:
         InputError: the file cannot be read, or is not a whole estimate.
     """
-    from mocobot_view.facts.fact_files import read_estimate as read  # needs MuJoCo; an estimate does not
+    from mocobot_view.payload import read_estimate as read  # needs MuJoCo; an estimate does not
 
     return public(Estimate, read(Path(path)))

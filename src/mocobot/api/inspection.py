@@ -79,7 +79,7 @@ class Look:
 class Inspection(Look, inspection.Inspection):
     """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
 
-    The attributes are those of ``mocobot_inspect.inspection.Inspection``; ``mocobot_inspect.json`` has the JSON's keys.
+    The attributes are those of ``mocobot_inspect.team.Inspection``; ``mocobot_inspect.report`` has the JSON's keys.
     """
 
     _findings, _ready_line = findings, ready_line

@@ -13,7 +13,7 @@ from joint_spring_cause import JointSpring as Trace
 from joint_spring_effect import JointSpring
 from mocobot_sim.effects import EFFECTS, make_effect
 from mocobot_sim.extended.extended import load_extended
-from mocobot_view.facts.cause_body import body_of
+from mocobot_view.robot import body_of
 
 STIFFNESS = 0.3
 

@@ -1,0 +1,408 @@
+"""Channels of a log: range, values that are no readings, resolution, noise, and where they stand or oscillate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import spectrogram
+from scipy.special import erf
+
+from estimator.arrays import Array
+from estimator.quantisation import quantisation_step
+from estimator.recording.sampling import SENSORS
+from mocobot_logs.log import NS, Stamps
+
+UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}
+"""Units of a team's channels, by the first letters of their names."""
+LISTED = 100
+"""Stuck and clipped stretches of a channel that are kept; all are counted."""
+
+ABSURD = 1e9
+"""No angle, length, torque or force in any unit is as large [SI]."""
+_FAR = 1000.0  # times what the other samples span, and no less in SI units
+_FEW = 0.02  # share of the samples on either side that may be far away
+_LAG_GAIN = 70.0  # variance of a fourth difference over that of white noise: 1 + 16 + 36 + 16 + 1
+_MAD = 0.6744897501960817  # median of |x| of a standard normal distribution
+
+STUCK_S = 0.2
+"""Shortest time for which a channel must stand to be stuck. Measured on trials of 25 s: 0.1 s moves an estimate by up
+to 3 of its standard errors, 0.2 s by up to 16 (inertia 2 %, grasps 4 mm), 2 s spoils it (mass 1 %, grasps 10 cm)."""
+CLIPPED_SAMPLES = 5
+"""Shortest run at an extreme to be clipped."""
+_MOVES = 0.05  # others move: by this share of their range
+_JUMP = 4.0  # times the usual large step from sample to sample
+_CORNER = 0.3  # of the same
+_NOISY = 0.5  # of the quantisation step; rounding alone looks like 0.3
+_CHANCE = 1e-3  # a run that noise makes by chance in so many logs is no sign
+_CLEAR = 1.5  # steps of the resolution; what approaches an end one by one may just be slow
+_SPEED_S, _AT_SPEED = 0.1, 0.5  # time over which speed is taken; share of the usual high speed
+
+ABOVE_HZ = 10.0
+"""No motion of an Omnid is that fast."""
+NOISES = 10.0
+"""Least amplitude of an oscillation over the channel's noise; a sensor's own line is below."""
+STEPS = 10.0
+"""Least amplitude of an oscillation over the quantisation step: a slow joint climbs stairs of one."""
+SHARE = 0.7
+"""Least share of one line in all that is fast: a bump has none."""
+WINDOW_S, WINDOW_ROWS = 2.5, 10_000
+"""Length of a window, and its largest number of rows: half of what is looked at together."""
+_WIDTH = 3  # frequencies on either side of a line that are its own, in a Hann window
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stuck or clipped stretch.
+
+    Attributes:
+        start_s: when it begins after the robot's first stamp [s].
+        duration_s: how long it lasts [s].
+        value: where the channel stands [SI].
+        jumps: whether it jumps there or from there.
+    """
+
+    start_s: float
+    duration_s: float
+    value: float
+    jumps: bool
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """A line in a channel's spectrum.
+
+    Attributes:
+        frequency_hz: where it is largest [Hz]; folded if it is above half the rate.
+        amplitude: its largest [SI].
+        duration_s: for how long it is there, in whole windows [s].
+    """
+
+    frequency_hz: float
+    amplitude: float
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of one robot; SI units.
+
+    Attributes:
+        name: of the channel.
+        lowest, highest: extremes of its finite samples, None without any.
+        nans, infinities: samples that are not finite.
+        wild: finite samples that no sensor reads (``wild``).
+        step: quantisation step, or None where there is none.
+        noise: white noise of a sample; 0 where it is below the step.
+        stuck, clipped: stretches in which it stands while others move, the first ``LISTED``.
+        stuck_count, clipped_count: how many there are.
+        oscillation: the line that stands out of its noise, or None.
+    """
+
+    name: str
+    lowest: float | None
+    highest: float | None
+    nans: int
+    infinities: int
+    wild: int
+    step: float | None
+    noise: float
+    stuck: tuple[Stretch, ...] = ()
+    clipped: tuple[Stretch, ...] = ()
+    stuck_count: int = 0
+    clipped_count: int = 0
+    oscillation: Oscillation | None = None
+
+    @property
+    def white_noise(self) -> float:
+        """Noise of a sample, that of rounding included."""
+        return max(self.noise, 0.0 if self.step is None else self.step / np.sqrt(12.0))
+
+
+class ChannelTally:
+    """Channels of one robot, looked at block by block."""
+
+    def __init__(self, names: Sequence[str], sensors: int = SENSORS) -> None:
+        """Start without samples.
+
+        Args:
+            names: of the channels.
+            sensors: only so many, the first ones, are looked at for standing: commands stand when they please.
+        """
+        self._names, self._sensors = names, sensors
+        self._parts: list[list[Channel]] = [[] for _ in names]
+        self._stuck: list[list[Stretch]] = [[] for _ in names]
+        self._clipped: list[list[Stretch]] = [[] for _ in names]
+
+    def add(self, time_s: Array, values: Array) -> None:
+        """Look at consecutive samples.
+
+        Args:
+            time_s: times after the robot's first stamp [s], shape (q,).
+            values: samples [SI], shape (q, C).
+        """
+        forward = np.diff(time_s)
+        forward = forward[forward > 0]
+        rate_hz = 1.0 / float(np.median(forward)) if len(forward) else None
+        with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
+            good = np.isfinite(values) & ~wild(values)
+            for k, name in enumerate(self._names):
+                line = rate_hz if k < self._sensors else None
+                self._parts[k].append(_part(name, values[:, k], good[:, k], line))
+            whole = good.all(axis=1)
+            if rate_hz is not None and whole.any():
+                time_s, values = time_s[whole], values[whole][:, : self._sensors]
+                self._keep(self._stuck, stuck(values, rate_hz), time_s, values, rate_hz)
+                self._keep(self._clipped, clipped(values), time_s, values, rate_hz)
+
+    @staticmethod
+    def _keep(
+        all_of: list[list[Stretch]], found: Iterator[Run], time_s: Array, values: Array, rate_hz: float
+    ) -> None:
+        """Add runs to the stretches; one that goes on from the last, perhaps of the block before, is one with it."""
+        for k, start, stop, jumps in found:
+            start_s, value = float(time_s[start]), float(values[start, k])
+            duration_s = float(time_s[stop - 1]) - start_s + 1.0 / rate_hz
+            last = all_of[k][-1] if all_of[k] else None
+            if (
+                last is not None
+                and last.value == value
+                and start_s <= last.start_s + last.duration_s + 2 / rate_hz
+            ):
+                all_of[k].pop()
+                start_s, duration_s = last.start_s, start_s + duration_s - last.start_s
+            all_of[k].append(Stretch(start_s, duration_s, value, jumps))
+
+    def finish(self) -> tuple[Channel, ...]:
+        """What was found, channel by channel."""
+        channels = []
+        for name, parts, stuck_all, clipped_all in zip(
+            self._names, self._parts, self._stuck, self._clipped, strict=True
+        ):
+            steps = [part.step for part in parts if part.step is not None]
+            channels.append(
+                Channel(
+                    name=name,
+                    lowest=min((part.lowest for part in parts if part.lowest is not None), default=None),
+                    highest=max((part.highest for part in parts if part.highest is not None), default=None),
+                    nans=sum(part.nans for part in parts),
+                    infinities=sum(part.infinities for part in parts),
+                    wild=sum(part.wild for part in parts),
+                    step=float(np.median(steps)) if 2 * len(steps) > len(parts) else None,
+                    noise=float(np.median([part.noise for part in parts])) if parts else 0.0,
+                    stuck=tuple(stuck_all[:LISTED]),
+                    clipped=tuple(clipped_all[:LISTED]),
+                    stuck_count=len(stuck_all),
+                    clipped_count=len(clipped_all),
+                    oscillation=joined([part.oscillation for part in parts if part.oscillation is not None]),
+                )
+            )
+        return tuple(channels)
+
+
+def _part(name: str, x: Array, good: NDArray[np.bool_], rate_hz: float | None) -> Channel:
+    """One block of a channel, without what stands; oscillations are looked for where a rate is given."""
+    finite, readings = x[np.isfinite(x)], x[good]
+    return Channel(
+        name=name,
+        lowest=float(finite.min() + 0.0) if len(finite) else None,
+        highest=float(finite.max() + 0.0) if len(finite) else None,
+        nans=int(np.isnan(x).sum()),
+        infinities=int(np.isinf(x).sum()),
+        wild=len(finite) - len(readings),
+        step=quantisation_step(readings) if len(readings) else None,
+        noise=noise_level(readings),
+        oscillation=None if rate_hz is None else oscillation(readings, rate_hz),
+    )
+
+
+def noise_level(values: Array) -> float:
+    """Standard deviation of white noise on a smooth signal: fourth differences, by their median.
+
+    Noise well below the quantisation step shows as 0.
+
+    Args:
+        values: samples in order, finite, shape (q,).
+    """
+    if len(values) < 5:
+        return 0.0
+    fourth = np.diff(values, 4)
+    return float(np.median(np.abs(fourth)) / _MAD / np.sqrt(_LAG_GAIN))
+
+
+def wild(values: Array) -> NDArray[np.bool_]:
+    """Samples that no sensor of a robot reads: infinite, absurd, or a thousand times farther away than the others.
+
+    Args:
+        values: samples, shape (q,) or (q, C); NaN is not wild.
+    """
+    if values.ndim == 2:
+        return np.stack([wild(x) for x in values.T], axis=1)
+    with np.errstate(invalid="ignore"):
+        absurd = np.abs(values) >= ABSURD
+    rest = values[np.isfinite(values) & ~absurd]
+    if not len(rest):
+        return absurd
+    low, middle, high = np.quantile(rest, [_FEW, 0.5, 1.0 - _FEW])
+    return absurd | (
+        np.abs(np.where(np.isnan(values) | absurd, middle, values) - middle) > _FAR * max(high - low, 1.0)
+    )
+
+
+Run = tuple[int, int, int, bool]
+"""Channel, first row, row after the last, and whether the channel jumps there or from there."""
+
+
+def stuck(values: Array, rate_hz: float) -> Iterator[Run]:
+    """Runs in which a channel of a robot is stuck.
+
+    A channel that stands because nothing moves is not stuck; nor is one that rests while others move. A stuck one jumps
+    when it comes back, stops dead before the log ends, or repeats itself although it has no steps or more noise than
+    steps.
+
+    Args:
+        values: samples of the robot's channels, finite, shape (q, C).
+        rate_hz: their rate [Hz].
+    """
+    least = _least_travel(values)
+    for channel, x in enumerate(values.T):
+        steps = np.abs(np.diff(x))
+        if not steps.any():
+            if len(x) and _others_move(values, least, channel, 0, len(x), rate_hz):
+                yield channel, 0, len(x), False
+            continue
+        usual = _usual(steps)
+        repeats = _longest_by_chance(x) if np.mean(steps == 0) < 0.5 else np.inf
+        shortest = max(STUCK_S * rate_hz, CLIPPED_SAMPLES)
+        for start, stop in _runs(x):
+            if stop - start < shortest or not _others_move(values, least, channel, start, stop, rate_hz):
+                continue
+            back = steps[stop - 1] if stop < len(x) else 0.0
+            into = steps[start - 1] if start else 0.0
+            jumps = bool(max(back, into) > _JUMP * usual)
+            if jumps or stop - start > repeats or _stops_dead(x, steps, start, stop, rate_hz):
+                yield channel, start, stop, jumps
+
+
+def clipped(values: Array) -> Iterator[Run]:
+    """Runs in which a channel is cut off at one of its extremes, at least twice; ``values`` as of ``stuck``."""
+    for channel, x in enumerate(values.T):
+        steps = np.abs(np.diff(x))
+        if not steps.any():
+            continue
+        least = max(_CORNER * _usual(steps), _CLEAR * (quantisation_step(x, levels=2) or 0.0))
+        for extreme in (x.min(), x.max()):
+            # A peak is round; a clipped one has corners: speed up to the limit, and none from there on.
+            corners = [
+                (a, b)
+                for a, b in _runs(x)
+                if x[a] == extreme
+                and b - a >= CLIPPED_SAMPLES
+                and ((a >= 2 and steps[a - 2] > least) or (b + 1 < len(x) and steps[b] > least))
+            ]
+            if len(corners) >= 2:
+                yield from ((channel, a, b, False) for a, b in corners)
+
+
+def _usual(steps: Array) -> float:
+    """A large step from one sample to the next, as is usual."""
+    return float(np.quantile(steps[steps > 0], 0.95))
+
+
+def _longest_by_chance(x: Array) -> float:
+    """Samples for which noise alone repeats a rounded value at rest; infinite where rounding covers the noise."""
+    resolution, noise = quantisation_step(x), noise_level(x)
+    if resolution is None:
+        return 1.0
+    if noise <= _NOISY * resolution:
+        return np.inf
+    same = float(erf(resolution / np.sqrt(8.0 * (noise**2 - resolution**2 / 12.0))))
+    return np.log(_CHANCE / len(x)) / np.log(same)
+
+
+def _stops_dead(x: Array, steps: Array, start: int, stop: int, rate_hz: float) -> bool:
+    """Whether a stretch that begins or ends with the log is left or entered at speed."""
+    window = max(2, round(_SPEED_S * rate_hz))
+    if len(x) <= 2 * window or (start > 0) == (stop < len(x)):
+        return False
+    usual = float(np.quantile(np.abs(x[window:] - x[:-window]), 0.95))
+    other = max(start - window, 0) if start else min(stop - 1 + window, len(x) - 1)
+    moved = abs(x[other] - x[start])
+    return moved > max(_AT_SPEED * usual, _JUMP * float(steps[steps > 0].min()))
+
+
+def _runs(x: Array) -> list[tuple[int, int]]:
+    """Runs of equal values (start, stop)."""
+    edges = np.flatnonzero(np.diff(x) != 0) + 1
+    bounds = [0, *edges.tolist(), len(x)]
+    return list(pairwise(bounds))
+
+
+def _others_move(values: Array, least: Array, channel: int, start: int, stop: int, rate_hz: float) -> bool:
+    """Whether at least two other channels move in both halves of a stretch."""
+    middle = (start + stop + 1) // 2
+    halves = [_travel(part, rate_hz) for part in (values[start:middle], values[middle - 1 : stop])]
+    moved = np.minimum(*halves) > least
+    moved[channel] = False
+    return int(np.sum(moved)) >= 2
+
+
+def _least_travel(values: Array) -> Array:
+    """Half of what a channel must travel to move: a share of its range, and more than from one sample to the next."""
+    if len(values) < 2:
+        return np.zeros(values.shape[1])
+    return np.maximum(
+        _MOVES / 2 * np.ptp(values, axis=0), np.quantile(np.abs(np.diff(values, axis=0)), 0.95, axis=0)
+    )
+
+
+def _travel(values: Array, rate_hz: float) -> Array:
+    """Range of means over a tenth of a second: a torque's noise is no motion."""
+    length = max(1, min(round(_SPEED_S * rate_hz), len(values) // 4))
+    starts = np.arange(0, len(values) - length + 1, length)
+    return np.ptp(np.add.reduceat(values[: starts[-1] + length], starts, axis=0) / length, axis=0)
+
+
+def oscillation(x: Array, rate_hz: float) -> Oscillation | None:
+    """The line that stands out of a channel's noise, or None.
+
+    Args:
+        x: consecutive samples, finite, shape (q,).
+        rate_hz: their rate [Hz].
+    """
+    size = min(round(WINDOW_S * rate_hz), WINDOW_ROWS)
+    if len(x) < size or rate_hz < 4.0 * ABOVE_HZ:
+        return None
+    frequency, _, density = spectrogram(x, rate_hz, window="hann", nperseg=size, noverlap=0, detrend="linear")
+    fast = frequency >= ABOVE_HZ
+    frequency, power = frequency[fast], density[fast] * (frequency[1] - frequency[0])
+    total, peak = power.sum(axis=0), power.argmax(axis=0)
+    near = np.abs(np.arange(len(power))[:, None] - peak) <= _WIDTH
+    line = np.where(near, power, 0.0).sum(axis=0)
+    # Powers of white noise are exponentially distributed: ln 2 of their mean is the median.
+    noise = np.sqrt(np.median(power, axis=0) / np.log(2.0) * len(power))
+    amplitude = np.sqrt(2.0 * line)
+    least = np.maximum(NOISES * noise, STEPS * (quantisation_step(x) or 0.0))
+    there = (amplitude > least) & (line > SHARE * total)
+    if not there.any():
+        return None
+    at = int(np.argmax(np.where(there, amplitude, 0.0)))
+    return Oscillation(
+        float(frequency[peak[at]]), float(amplitude[at]), float(np.sum(there) * size / rate_hz)
+    )
+
+
+def joined(found: list[Oscillation]) -> Oscillation | None:
+    """Those of successive parts of a channel in one, or None without any."""
+    if not found:
+        return None
+    largest = max(found, key=lambda one: one.amplitude)
+    return Oscillation(largest.frequency_hz, largest.amplitude, sum(one.duration_s for one in found))
+
+
+def seconds(stamp_ns: Stamps, origin_ns: int) -> Array:
+    """Stamps as seconds after an origin."""
+    return np.asarray((stamp_ns - origin_ns) * NS, dtype=np.float64)

@@ -1,1 +1,0 @@
-"""Whether a joint log's channels are what its map says, judged by the robot's model."""

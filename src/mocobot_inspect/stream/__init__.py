@@ -1,1 +1,0 @@
-"""Stamps and channels of one robot: rates, gaps, frozen sensors, resolution."""

@@ -1,0 +1,401 @@
+"""Inspection of a team's log: everything that can be said about it before anyone trusts a number from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from estimator.arm.arms import Arms
+from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import ArmUnit
+from estimator.arrays import Array
+from estimator.clocks.offsets import ClockEstimate, estimate_clocks
+from estimator.filtering import differentiate, low_pass
+from estimator.recording.metadata import FREE
+from estimator.signals.holds import DURATION_S, STILL_RATE_RADPS, STILL_SPEED_MPS
+from mocobot_inspect.channels import Channel, seconds, wild
+from mocobot_inspect.readiness import Readiness, readiness
+from mocobot_inspect.signals import CUTOFF_HZ, KINDS, RATE_HZ, TRIM_S, of_arrays, signals_of
+from mocobot_inspect.survey import Survey, Timing, survey
+from mocobot_inspect.team_wiring import Wiring, check_wiring
+from mocobot_logs.log import NS, THETA, Level, LogSource, Samples
+
+SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
+"""Rates within which samples are taken for those of a robot."""
+OFFSET_S = 2e-4
+"""Clocks that differ by more than this, and by more than five standard errors, do differ."""
+SIGMAS = 5.0
+MOSTLY = 0.5
+"""A channel that stands for more than this share of its log is wrong as a whole."""
+MAX_GAP_S = 0.05
+SHORTEST_S = 2 * TRIM_S + 2.0
+WINDOW_S = 0.5
+_PERIODS = 3.5  # a gap in a slow log
+_LEAST_NOISE = 1e-9
+"""No channel is known better [rad, m, N m, N]: where nothing moves at all, rounding errors would pass for motion."""
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Rest and motion.
+
+    Attributes:
+        still_s, moving_s: time at rest and in motion [s].
+        rests: stretches of rest (first instant, duration) [s], those long enough for a static hold.
+    """
+
+    still_s: float
+    moving_s: float
+    rests: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A channel that is stuck or clipped at times.
+
+    Attributes:
+        channel: its name, robot included.
+        seconds: for how long in all.
+        mostly: whether for so much of the log that nothing is left without.
+    """
+
+    channel: str
+    seconds: float
+    mostly: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What was found in a log.
+
+    Attributes:
+        name, level, robots, channel_names: the log.
+        assumed_design: whether the robots' numbers are not the log's own.
+        design: the robots' numbers.
+        survey: stamps and channels of every robot.
+        checked: stretches looked at, first instant and duration after the log's first stamp [s].
+        unchecked: why motion and forces could not be looked at, or None.
+        clocks: clocks of the robots, or None.
+        skewed: whether they differ; everything below then holds with that taken out.
+        segments: rest and motion, or None.
+        wiring: suspected mistakes, or None.
+        ready: what the log is good for as it is, or None.
+        ready_undone: the same with all mistakes found undone, or None where there is none.
+        units: the robots as they are, where a calibration says, or None.
+        free: whether the robots hold nothing: there are neither ``clocks`` nor ``wiring`` nor ``ready`` then.
+    """
+
+    name: str
+    level: Level
+    robots: int
+    channel_names: tuple[str, ...]
+    assumed_design: bool
+    design: OmnidDesign
+    survey: Survey
+    checked: tuple[tuple[float, float], ...] = ()
+    unchecked: str | None = None
+    clocks: ClockEstimate | None = None
+    skewed: bool = False
+    segments: Segments | None = None
+    wiring: Wiring | None = None
+    ready: Readiness | None = None
+    ready_undone: Readiness | None = None
+    units: ArmUnit | None = None
+    free: bool = False
+
+    @property
+    def arms(self) -> Arms:
+        """The robots as they are, or as designed."""
+        return self.design if self.units is None else self.units
+
+    @property
+    def standing(self) -> tuple[Standing, ...]:
+        """Channels that are stuck or clipped at times, all of them harmful to an estimate from the log as it is."""
+        found = []
+        for robot, channels in enumerate(self.survey.channels):
+            least_s = MOSTLY * self.survey.timing[robot].duration_s
+            for c in channels:
+                stuck_s, clipped_s = (sum(s.duration_s for s in every) for every in (c.stuck, c.clipped))
+                if stuck_s or clipped_s:
+                    mostly = max(stuck_s, clipped_s) >= least_s
+                    found.append(Standing(f"omnid{robot + 1}.{c.name}", stuck_s + clipped_s, mostly))
+        return tuple(found)
+
+
+def inspect_log(
+    source: LogSource,
+    design: OmnidDesign,
+    advance: Callable[[int], object] = lambda _: None,
+    try_advance: Callable[[int], object] = lambda _: None,
+    trial: str | None = None,
+    units: ArmUnit | None = None,
+) -> Inspection:
+    """Look at a log; whatever is wrong with its samples is reported and not refused.
+
+    Args:
+        source: the log.
+        design: the robots' numbers, where the log does not say.
+        advance: takes the progress made in reading, in the source's units.
+        try_advance: takes the number of wiring mistakes tried.
+        trial: kind of trial, where the log does not say.
+        units: the robots as they are; None for what the log says.
+
+    Raises:
+        InputError: the log cannot be read.
+    """
+    said = source.metadata
+    seen = survey(source, advance)
+    free = (said.trial if said is not None else trial) == FREE
+    if free:
+        # Nothing turns what holds nothing: gimbals that stand while the arms move are no finding.
+        seen = replace(
+            seen,
+            channels=tuple(
+                tuple(replace(c, stuck=(), stuck_count=0) if c.name in THETA else c for c in of_robot)
+                for of_robot in seen.channels
+            ),
+        )
+    result = Inspection(
+        name=source.name,
+        level=source.level,
+        robots=source.robots,
+        channel_names=source.channels,
+        assumed_design=said is None,
+        design=design if said is None else said.design,
+        survey=seen,
+        units=said.units if units is None and said is not None else units,
+        free=free,
+    )
+    for robot, timing in enumerate(seen.timing):
+        if timing.rate_hz is None:
+            return replace(result, unchecked=f"robot {robot + 1} has too few samples")
+        if not SLOWEST_HZ <= timing.rate_hz <= FASTEST_HZ:
+            return replace(result, unchecked=f"robot {robot + 1} is sampled at {timing.rate_hz:.3g} Hz")
+    streams = [
+        clean_stream(samples, seen.origin_ns, _faulty(channels, timing))
+        for samples, channels, timing in zip(seen.excerpt, seen.channels, seen.timing, strict=True)
+    ]
+    return _with_motion(result, streams, try_advance)
+
+
+def _faulty(channels: tuple[Channel, ...], timing: Timing) -> list[tuple[int, int]]:
+    """Stamps between which a channel is stuck or clipped [ns]; not those of one that nearly always is."""
+    assert timing.first_ns is not None
+    found = []
+    for every in (stretches for c in channels for stretches in (c.stuck, c.clipped)):
+        if sum(s.duration_s for s in every) < MOSTLY * timing.duration_s:
+            starts = [timing.first_ns + round(s.start_s / NS) for s in every]
+            found += [(a, a + round(s.duration_s / NS)) for a, s in zip(starts, every, strict=True)]
+    return found
+
+
+def _with_motion(
+    result: Inspection, streams: list[tuple[Array, Array]], advance: Callable[[int], object]
+) -> Inspection:
+    """The inspection with clocks, wiring and readiness, all of uniform stretches."""
+    parts = stretches(streams)
+    clocks = None if result.free else _clocks(parts)
+    skewed = clocks is not None and any(differs(clocks, robot) for robot in range(1, result.robots))
+    if skewed:
+        parts = stretches(streams, clocks) or parts
+    if not parts:
+        return replace(
+            result,
+            unchecked=f"the robots share no {SHORTEST_S:g} s of samples that can be used, without a gap",
+        )
+    result = replace(
+        result,
+        checked=tuple((start, len(part) / RATE_HZ) for start, part in parts),
+        segments=segments(result.level, parts, result.design),
+    )
+    if result.free:
+        return result
+    noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
+    signals = signals_of(result.level, [part for _, part in parts], np.maximum(noise, _LEAST_NOISE))
+    wiring = check_wiring(signals, result.arms, advance)
+    undone = None
+    if wiring.found:
+        right = [(start, _undone(part, wiring, result.level)) for start, part in parts]
+        undone = readiness(result.name, result.level, right, result.arms)
+        if clocks is not None and not clocks.determined:
+            clocks = _known(clocks, _clocks(right))
+    return replace(
+        result,
+        clocks=clocks,
+        skewed=skewed,
+        wiring=wiring,
+        ready=readiness(result.name, result.level, parts, result.arms),
+        ready_undone=undone,
+    )
+
+
+def _undone(part: Array, wiring: Wiring, level: Level) -> Array:
+    """The samples themselves, shape (q, N, 9), with all mistakes undone."""
+    signals = of_arrays(level, part[None], np.zeros(part.shape[1:]))
+    for found in wiring.found:
+        signals = found.mistake.undo(signals)
+    return np.concatenate([signals.group(kind).values[0] for kind in KINDS], axis=2)
+
+
+# Uniform stretches. Unlike resampling for an estimate (``mocobot_logs.resample``) nothing is refused: rows that are not
+# finite or go back in time are left out, gaps split the log, and what is too short is not looked at.
+
+
+def clean_stream(
+    samples: Samples, origin_ns: int, faulty: Sequence[tuple[int, int]] = ()
+) -> tuple[Array, Array]:
+    """One robot's samples, without those that cannot be used; averaged where they come faster than 100 Hz.
+
+    Args:
+        samples: the samples.
+        origin_ns: the stamp from which time counts [ns].
+        faulty: stamps between which samples are not to be used [ns].
+
+    Returns:
+        Increasing times [s], shape (q,), and the nine channels, all finite, shape (q, 9).
+    """
+    time_s, values = seconds(samples.stamp_ns, origin_ns), samples.values[:, :9]
+    good = (np.isfinite(values) & ~wild(values)).all(axis=1)
+    for start_ns, stop_ns in faulty:
+        good &= (samples.stamp_ns < start_ns) | (samples.stamp_ns >= stop_ns)
+    time_s, values = time_s[good], values[good]
+    later = time_s > np.maximum.accumulate(np.concatenate([[-np.inf], time_s[:-1]]))[: len(time_s)]
+    time_s, values = time_s[later], values[later]
+    if len(time_s) < 2:
+        return time_s, values
+    k = round(1.0 / float(np.median(np.diff(time_s))) / RATE_HZ)
+    if 2 <= k <= len(time_s):
+        # Means over the output's period: crude against aliases, but what is looked at ends at 5 Hz.
+        starts = np.arange(0, len(time_s) - k + 1, k)
+        time_s = np.asarray(np.add.reduceat(time_s[: starts[-1] + k], starts) / k, dtype=np.float64)
+        values = np.asarray(np.add.reduceat(values[: starts[-1] + k], starts, axis=0) / k, dtype=np.float64)
+    return time_s, values
+
+
+def stretches(
+    streams: Sequence[tuple[Array, Array]], clocks: ClockEstimate | None = None
+) -> list[tuple[float, Array]]:
+    """Uniform stretches that all robots share.
+
+    Args:
+        streams: times [s] and channels of every robot, see ``clean_stream``.
+        clocks: offsets and drifts to be taken out, where they are known.
+
+    Returns:
+        For each its first instant [s] and samples at ``RATE_HZ``, shape (q, N, 9).
+    """
+    told = []
+    for robot, (time_s, values) in enumerate(streams):
+        if clocks is not None and np.isfinite(clocks.offset_s[robot]):
+            since_s = time_s - clocks.middle_s - clocks.offset_s[robot]
+            time_s = clocks.middle_s + since_s / (1.0 + clocks.drift[robot])
+        told.append((time_s, values))
+    shared = [(-np.inf, np.inf)]
+    for time_s, _ in told:
+        shared = _shared(shared, _whole(time_s))
+    found = []
+    for start, stop in shared:
+        # On the samples of robot 1, so that a log on one grid stays as it is.
+        first_time = told[0][0]
+        start = float(first_time[np.searchsorted(first_time, start - 1e-7)])
+        count = int(np.floor((stop - start) * RATE_HZ + 1e-6)) + 1
+        if count < SHORTEST_S * RATE_HZ:
+            continue
+        grid = start + np.arange(count) / RATE_HZ
+        found.append((start, np.stack([_at(time_s, values, grid) for time_s, values in told], axis=1)))
+    return found
+
+
+def _whole(time_s: Array) -> list[tuple[float, float]]:
+    """Intervals without gaps."""
+    if len(time_s) < 4:
+        return []
+    steps = np.diff(time_s)
+    limit = max(MAX_GAP_S, _PERIODS * float(np.median(steps)))
+    edges = np.flatnonzero(steps > limit)
+    starts, stops = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(time_s) - 1]])
+    return [(float(time_s[a]), float(time_s[b])) for a, b in zip(starts, stops, strict=True) if b - a >= 4]
+
+
+def _shared(a: list[tuple[float, float]], b: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Intersection of two lists of intervals, both in order."""
+    both, i, j = [], 0, 0
+    while i < len(a) and j < len(b):
+        start, stop = max(a[i][0], b[j][0]), min(a[i][1], b[j][1])
+        if stop > start:
+            both.append((start, stop))
+        if a[i][1] < b[j][1]:
+            i += 1
+        else:
+            j += 1
+    return both
+
+
+def _at(time_s: Array, values: Array, grid: Array) -> Array:
+    low = max(0, int(np.searchsorted(time_s, grid[0])) - 8)
+    high = min(len(time_s), int(np.searchsorted(time_s, grid[-1])) + 8)
+    spline = make_interp_spline(time_s[low:high], values[low:high], k=3)
+    return np.asarray(spline(np.clip(grid, time_s[low], time_s[high - 1])), dtype=np.float64)
+
+
+def segments(level: Level, parts: Sequence[tuple[float, Array]], design: OmnidDesign) -> Segments:
+    """Judge windows of half a second by the fastest robot.
+
+    Args:
+        level: what the channels are.
+        parts: uniform stretches: first instant [s] and samples (q, N, 9) at 100 Hz.
+        design: the robots' numbers.
+    """
+    # The wrist's speed in order of magnitude: of a driven rate at joint level.
+    lever = 1.0 if level == "wrist" else design.proximal_length_m
+    window, drop = round(WINDOW_S * RATE_HZ), round(TRIM_S * RATE_HZ)
+    still_s = moving_s = 0.0
+    rests: list[tuple[float, float]] = []
+    for start, part in parts:
+        rate = differentiate(low_pass(part[..., :6], RATE_HZ, CUTOFF_HZ), RATE_HZ)[drop:-drop]
+        count = len(rate) // window
+        square = (rate[: count * window] ** 2).reshape(count, window, -1, 2, 3).sum(axis=-1).mean(axis=1)
+        speed, turning = np.sqrt(square).max(axis=1).T
+        still = (lever * speed < STILL_SPEED_MPS) & (turning < STILL_RATE_RADPS)
+        still_s += float(np.sum(still)) * WINDOW_S
+        moving_s += float(np.sum(~still)) * WINDOW_S
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+        for first, last in edges.reshape(-1, 2):
+            if (last - first) * WINDOW_S >= DURATION_S:
+                rests.append((start + TRIM_S + first * WINDOW_S, float(last - first) * WINDOW_S))
+    return Segments(still_s, moving_s, tuple(rests))
+
+
+def _clocks(parts: list[tuple[float, Array]]) -> ClockEstimate | None:
+    """From the longest stretch, by its own count of time."""
+    if not parts or parts[0][1].shape[1] < 2:
+        return None
+    start, part = max(parts, key=lambda entry: len(entry[1]))
+    theta = [np.ascontiguousarray(part[:, robot, 3:6]) for robot in range(part.shape[1])]
+    return estimate_clocks(theta, np.full(len(theta), start), RATE_HZ)
+
+
+def _known(clocks: ClockEstimate, again: ClockEstimate | None) -> ClockEstimate:
+    """What is known of each clock as it is, and of the others with all mistakes undone."""
+    if again is None:
+        return clocks
+    new = np.array([why is not None for why in clocks.why_not])
+    numbers = {
+        name: np.where(new, getattr(again, name), getattr(clocks, name))
+        for name in ("offset_s", "drift", "mismatch", "repeats_s")
+    }
+    return replace(
+        clocks,
+        covariance=np.where(new[:, None, None], again.covariance, clocks.covariance),
+        why_not=tuple(b if a else None for a, b in zip(clocks.why_not, again.why_not, strict=True)),
+        **numbers,
+    )
+
+
+def differs(clocks: ClockEstimate, robot: int) -> bool:
+    """Whether the clock of a robot (from 0) is known to differ from that of robot 1."""
+    offset, error = clocks.offset_s[robot], clocks.offset_se_s[robot]
+    return bool(np.isfinite(offset) and abs(offset) > max(OFFSET_S, SIGMAS * error))

@@ -1,0 +1,407 @@
+"""Is a team's log wired as it says? Suspected mistakes are undone one by one, and what fits far better is reported.
+
+All robots hold one rigid payload. Five disagreements follow, each over its own signal and none over zero for a true
+recording without noise:
+
+- rotation: the robots' angular velocities, turned into {1} by the rotations R_1i that fit best;
+- velocity: velocities of the origin of {1} by every robot, with the p_1i that fit best;
+- tilt: the robots' directions of gravity in {1} [rad];
+- force, moment: total force and moment in {1} against the ten inertial parameters that fit best, over the forces that
+  the robots exert, and over those times their distance.
+
+Without rotation about at least two axes, grasps are open. What is left then: angular *speeds* and the total vertical
+force against one mass.
+
+Every disagreement is put in units of what a healthy robot may show: its tolerance (``TOLERANCES``) and the noise of its
+channels. The misfit is the mean of their squares: about 1 for poorly calibrated robots, hundreds for swapped channels.
+
+A misfit beyond ``SUSPICIOUS`` is suspicious; a mistake is found when undoing it makes it ``DECISIVE`` times smaller. A
+smaller misfit may still be a mistake in the log of well calibrated robots: then undoing has to make it ``OVERWHELMING``
+times smaller. Several mistakes are found one after the other, the one that helps most first; in the end each is put
+back alone, and dropped if it hardly matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from estimator.arm.arms import Arms, design_of
+from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
+from estimator.so3 import cross
+from estimator.statistics import rms
+from mocobot_inspect.grasps import (
+    FARTHEST_M,
+    Body,
+    Fault,
+    Grasp,
+    arm_motion,
+    gimbal_motion,
+    grasp_motion,
+    rigid_body,
+)
+from mocobot_inspect.mistakes import SUSPICIONS, Mistake, refined, wrong_zero
+from mocobot_inspect.signals import Signals
+
+TOLERANCES = {
+    "rotation": 0.01,
+    "velocity": 0.03,
+    "tilt": 0.02,
+    "force": 0.03,
+    "moment": 0.025,
+    "angular speed": 0.01,
+    "lift": 0.03,
+}
+"""Disagreement of robots with encoder zeros off by 1 deg, springs by 2 %, lengths by 1 mm (rad for the tilt, else over
+the signal): the largest of four payloads in random, periodic and static trials, rounded up."""
+SUSPICIOUS = 2.0
+"""Misfit beyond which something is wrong; poorly calibrated robots stay below 1."""
+FAULT = 1e3
+"""What a fault of all the time adds to the misfit."""
+RIGID = ("rotation", "velocity", "tilt", "force", "moment")
+_LEAST_SPAN_M = 0.3
+_RANK = 1e-12
+
+DECISIVE = 4.0
+"""How many times smaller the misfit must become."""
+WORTH_TRYING = 0.3
+"""Misfit below which there is nothing to be explained."""
+OVERWHELMING = 15.0
+"""How many times smaller a misfit that is not suspicious must become."""
+HELPS = 1.5
+"""How many times smaller one of several mistakes must make it."""
+ALIKE = 1.3
+"""Mistakes whose misfits differ by less than this factor cannot be told apart."""
+MOST = 6
+_REFINED = 6
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How badly channels fit together.
+
+    Attributes:
+        relative: disagreements over their signals (tilt: in rad), by name.
+        scaled: the same over tolerance and noise.
+        faults: why the channels cannot be what they are taken for.
+        determined: whether the payload turns enough to compare grasps.
+        mass_kg: mass that fits best, or None.
+        span_m: largest distance of a grasp from the first one, or None.
+        parts: number of disagreements that there are, those included that were left out.
+    """
+
+    relative: dict[str, float]
+    scaled: dict[str, float]
+    faults: tuple[Fault, ...]
+    determined: bool
+    mass_kg: float | None = None
+    span_m: float | None = None
+    parts: int | None = None
+
+    @property
+    def total(self) -> float:
+        """Mean square of the scaled disagreements, and a large amount for every fault."""
+        squares = [value**2 for value in self.scaled.values()]
+        mean = sum(squares) / (self.parts or len(squares)) if squares else 0.0
+        total = mean + FAULT * sum(f.share for f in self.faults)
+        return total if np.isfinite(total) else np.inf
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether robots that carry one rigid payload cannot look like this."""
+        return self.total > SUSPICIOUS and self.tells
+
+    @property
+    def tells(self) -> bool:
+        """Whether a misfit means anything: next to no rotation leaves noise to be compared."""
+        return self.determined or bool(self.faults)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A mistake that explains the misfit.
+
+    Attributes:
+        mistake: what is wrong.
+        alternatives: others that explain it as well.
+        misfit: with all other mistakes undone and this one not.
+        after: total misfit with this one undone, too.
+    """
+
+    mistake: Mistake
+    alternatives: tuple[Mistake, ...]
+    misfit: Misfit
+    after: float
+
+    @property
+    def before(self) -> float:
+        """Total misfit with all other mistakes undone and this one not."""
+        return self.misfit.total
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What the search found.
+
+    Attributes:
+        as_is: misfit of the log as it is.
+        found: mistakes, the one that matters most first; empty when none is found.
+        undone: misfit with all of them undone.
+        hidden: mistakes that would not show in these data.
+        tried: number of mistakes looked for.
+    """
+
+    as_is: Misfit
+    found: tuple[Found, ...]
+    undone: Misfit
+    hidden: tuple[Mistake, ...]
+    tried: int
+
+
+class Team:
+    """Misfits of one log with mistakes undone.
+
+    Most mistakes leave a robot the arm or the gimbal that another mistake gave it: these are worked out once.
+    """
+
+    def __init__(self, signals: Signals, arms: Arms, known: dict[Any, Any] | None = None) -> None:
+        """Work out every robot's motion.
+
+        Args:
+            signals: the team's channels.
+            arms: the robots as they are, or as designed.
+            known: arms and gimbals that were worked out of the same log.
+        """
+        self.signals, self._arms = signals, arms
+        self._known = {} if known is None else known
+        self._body: Body | None = None
+        with np.errstate(all="ignore"):
+            self._grasps = [self._grasp(signals, robot) for robot in range(signals.robots)]
+            self._body = rigid_body([g for g, _ in self._grasps if g is not None], arms.gravity_mps2)
+        self.misfit = self._judged(self._grasps, self._body)
+
+    def without(self, mistake: Mistake, enough: float = np.inf) -> Misfit:
+        """The misfit with a mistake undone; one beyond ``enough`` need not be exact."""
+        signals, grasps = mistake.undo(self.signals), list(self._grasps)
+        with np.errstate(all="ignore"):  # wrong channels may divide by zero: an infinite misfit
+            for robot in mistake.robots:
+                grasps[robot] = self._grasp(signals, robot)
+        same_motion = signals.position is self.signals.position and signals.theta is self.signals.theta
+        return self._judged(grasps, self._body if same_motion else None, enough)
+
+    def undone(self, mistake: Mistake) -> Team:
+        """The team with a mistake undone."""
+        return Team(mistake.undo(self.signals), self._arms, self._known)
+
+    def _grasp(self, signals: Signals, robot: int) -> tuple[Grasp | None, tuple[Fault, ...]]:
+        arm = self._once(arm_motion, signals, robot, signals.position.values)
+        gimbal = self._once(gimbal_motion, signals, robot, signals.theta.values)
+        return grasp_motion(signals, robot, arm, gimbal, self._arms)
+
+    def _once(
+        self, motion: Callable[[Signals, int, Arms], T], signals: Signals, robot: int, values: Array
+    ) -> T:
+        key = motion, robot, signals.level, values[:, :, robot].tobytes()
+        if key not in self._known:
+            self._known[key] = motion(signals, robot, self._arms)
+        return self._known[key]
+
+    def _judged(
+        self,
+        grasps: Sequence[tuple[Grasp | None, tuple[Fault, ...]]],
+        body: Body | None,
+        enough: float = np.inf,
+    ) -> Misfit:
+        """The misfit of grasps; forces are left out once the motion alone makes it ``enough``.
+
+        What makes noise of the signals explains nothing: noise is bounded by that of the log as it is.
+        """
+        faults = tuple(fault for _, of_robot in grasps for fault in of_robot)
+        told = [grasp for grasp, _ in grasps if grasp is not None]
+        if not told:
+            return Misfit({}, {}, faults, determined=False)
+        gravity = self._arms.gravity_mps2
+        with np.errstate(all="ignore"):  # absurd channels may overflow: an infinite misfit
+            body = body or rigid_body(told, gravity, self._body.noise if self._body is not None else None)
+            if body is None:
+                return Misfit({}, {}, (*faults, Fault(1.0, "the numbers overflow")), determined=False)
+            if len(told) > 1 and not body.turns:
+                return _vertical(told, body, faults)
+            if body.span > FARTHEST_M:
+                faults = (*faults, Fault(1.0, f"the grasps come out {body.span:.3g} m apart"))
+            motion = replace(_misfit(body.spread, faults, determined=True), parts=len(RIGID))
+            return motion if motion.total > enough else _balanced(told, body, faults)
+
+
+def _misfit(
+    apart: dict[str, tuple[float, float, float]],
+    faults: tuple[Fault, ...],
+    mass: float | None = None,
+    span: float | None = None,
+    *,
+    determined: bool,
+) -> Misfit:
+    """From disagreements, each with its signal and its noise."""
+    if mass is not None and mass <= 0:
+        faults = (*faults, Fault(1.0, f"the forces add up to a mass of {mass:.3g} kg"))
+    relative, scaled = {}, {}
+    for name, (value, signal, noise) in apart.items():
+        relative[name] = value / signal if signal > 0 else 0.0
+        scaled[name] = value / max(float(np.hypot(TOLERANCES[name] * signal, noise)), 1e-300)
+    return Misfit(relative, scaled, faults, determined, mass, span)
+
+
+def _balanced(told: list[Grasp], body: Body, faults: tuple[Fault, ...]) -> Misfit:
+    """Motion, and total force and moment in {1} against the ten inertial parameters."""
+    N, Q = len(told), len(told[0].omega)
+    force = np.stack([g.force @ R.T for g, R in zip(told, body.R_1i, strict=True)])
+    moment = cross(body.p_1i[:, None], force)
+    reach = max(min(body.span, FARTHEST_M), _LEAST_SPAN_M)
+    weights = np.repeat([1.0, 1.0 / reach], 3)
+    total = np.concatenate([force.sum(axis=0), moment.sum(axis=0)], axis=1)
+    parameters, residual = _fit(body.regressor * weights[:, None], total * weights)
+    left = np.sqrt(np.mean(np.sum(residual.reshape(Q, 2, 3) ** 2, axis=2), axis=0))
+    exerted = float(np.sqrt(np.mean(np.sum(np.sqrt(np.sum(force**2, axis=-1)), axis=0) ** 2)))
+    noise = float(np.sqrt(3 * N) * body.noise[2])
+    apart = body.spread | {
+        "force": (float(left[0]), exerted, noise),
+        "moment": (float(left[1]), exerted, noise),
+    }
+    return _misfit(apart, faults, float(parameters[0]), body.span if N > 1 else None, determined=True)
+
+
+def _vertical(told: list[Grasp], body: Body, faults: tuple[Fault, ...]) -> Misfit:
+    """What can be told without any grasp frame."""
+    speed = np.stack([np.linalg.norm(g.omega, axis=1) for g in told])
+    apart = float(rms(speed - speed.mean(axis=0)) * np.sqrt(len(told) / (len(told) - 1)))
+    lift = np.sum([g.lift for g in told], axis=0)
+    rise = body.gravity_mps2 + np.mean([g.rise for g in told], axis=0)
+    mass = float(lift @ rise / (rise @ rise))
+    exerted = rms(np.sum([np.linalg.norm(g.force, axis=-1) for g in told], axis=0))
+    parts = {
+        "angular speed": (apart, rms(speed), 2.0 * float(body.noise[0])),
+        "lift": (rms(lift - mass * rise), exerted, float(np.sqrt(len(told)) * body.noise[2])),
+    }
+    return _misfit(parts, faults, mass, determined=False)
+
+
+def _fit(Y: Array, y: Array) -> tuple[Array, Array]:
+    """Least squares of (Q, 6, 10) and (Q, 6): parameters and residuals (6 Q,)."""
+    A, b = Y.reshape(-1, Y.shape[-1]), y.ravel()
+    scale = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+    A = A / scale
+    x = np.linalg.lstsq(A.T @ A, A.T @ b, rcond=_RANK)[0]
+    return x / scale, b - A @ x
+
+
+def check_wiring(
+    signals: Signals,
+    arms: Arms,
+    advance: Callable[[int], object] = lambda _: None,
+    *,
+    look_for_hidden: bool = True,
+) -> Wiring:
+    """Look for mistakes.
+
+    Args:
+        signals: the team's channels.
+        arms: the robots as they are, or as designed.
+        advance: takes the number of mistakes tried since the last call.
+        look_for_hidden: whether to find out which mistakes would not show.
+    """
+    design = design_of(arms)
+    first = team = Team(signals, arms)
+    chain: list[tuple[Mistake, tuple[Mistake, ...]]] = []
+    while team.misfit.total > WORTH_TRYING and team.misfit.tells and len(chain) < MOST:
+        best, alike, after = _best(team, design, advance)
+        if after > team.misfit.total / (HELPS if team.misfit.total > SUSPICIOUS else OVERWHELMING):
+            break
+        chain.append((best, alike))
+        team = team.undone(best)
+    if not shows(first.misfit.total, team.misfit.total):
+        chain, team = [], first
+    found, team = _needed(first, team, chain)
+    hidden, tried = _hidden(team, design, advance) if look_for_hidden else ((), 0)
+    return Wiring(first.misfit, found, team.misfit, hidden, tried)
+
+
+def shows(wrong: float, right: float) -> bool:
+    """Whether a mistake is found that makes a misfit out of another."""
+    return wrong > max(SUSPICIOUS, DECISIVE * right) or wrong > max(WORTH_TRYING, OVERWHELMING * right)
+
+
+def _best(
+    team: Team, design: OmnidDesign, advance: Callable[[int], object]
+) -> tuple[Mistake, tuple[Mistake, ...], float]:
+    """The mistake that explains most, those that explain as much, and the misfit that it leaves."""
+    tried: list[tuple[float, int, Mistake]] = []
+    least = np.inf
+    for suspicion in SUSPICIONS:
+        # Single encoders with a wrong zero are many, and looked at only if nothing else will do.
+        if suspicion is wrong_zero and least <= max(WORTH_TRYING, team.misfit.total / OVERWHELMING):
+            break
+        for mistake in suspicion(team.signals, design):
+            total = team.without(mistake, ALIKE * least + 1e-9).total
+            least = min(least, total)
+            tried.append((total, len(tried), mistake))
+            advance(1)
+    tried.sort(key=lambda entry: entry[:2])
+    top = []
+    for total, rank, mistake in tried[:_REFINED]:
+        better = refined(mistake, lambda m: team.without(m).total)
+        top.append((total if better is mistake else team.without(better).total, rank, better))
+    limit = ALIKE * min(entry[0] for entry in top) + 1e-9
+    # Among those that cannot be told apart, the earliest suspicion comes first.
+    alike = sorted((entry for entry in (*top, *tried[_REFINED:]) if entry[0] <= limit), key=lambda e: e[1])
+    # Each encoder's zero counts once, however many offsets were tried.
+    distinct: dict[object, Mistake] = {}
+    for _, _, mistake in alike:
+        one = mistake if mistake.resized is None else (mistake.robots, mistake.channels)
+        distinct.setdefault(one, mistake)
+    first, *others = distinct.values()
+    return first, tuple(others), alike[0][0]
+
+
+def _alike(others: Team, best: Mistake, alike: tuple[Mistake, ...]) -> tuple[Mistake, ...]:
+    """Those that still explain as much once all other mistakes are undone."""
+    limit = ALIKE * others.without(best).total + 1e-9
+    return tuple(mistake for mistake in alike if others.without(mistake).total <= limit)
+
+
+def _needed(
+    first: Team, team: Team, chain: list[tuple[Mistake, tuple[Mistake, ...]]]
+) -> tuple[tuple[Found, ...], Team]:
+    """Each mistake of the chain with what it is worth, without those that hardly matter once all others are undone."""
+    found = []
+    for k in reversed(range(len(chain))):
+        others = first
+        for mistake, _ in (*chain[:k], *chain[k + 1 :]):
+            others = others.undone(mistake)
+        # Where something else is wrong, too, only what is beyond doubt is accused.
+        worth = OVERWHELMING if team.misfit.suspicious else HELPS
+        if others.misfit.total <= worth * team.misfit.total:
+            chain, team = [*chain[:k], *chain[k + 1 :]], others
+        else:
+            found.append(Found(chain[k][0], _alike(others, *chain[k]), others.misfit, team.misfit.total))
+    return tuple(reversed(found)), team
+
+
+def _hidden(
+    team: Team, design: OmnidDesign, advance: Callable[[int], object]
+) -> tuple[tuple[Mistake, ...], int]:
+    """Mistakes that would not have been found, had they been made, and how many were tried; encoders' zeros aside."""
+    enough = max(SUSPICIOUS, DECISIVE * team.misfit.total)
+    every = (mistake for suspicion in SUSPICIONS for mistake in suspicion(team.signals, design))
+    tried = [mistake for mistake in every if mistake.resized is None]
+    hidden = []
+    for mistake in tried:
+        if not shows(team.without(mistake, enough).total, team.misfit.total):
+            hidden.append(mistake)
+        advance(1)
+    return tuple(hidden), len(tried)

@@ -1,0 +1,225 @@
+"""A log of joints in Rerun: the robot moving, and every joint's position, command, torque and the model's torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.model import SerialModel
+from estimator.arrays import Array
+from estimator.filtering import differentiate, low_pass
+from mocobot_logs.joints.joint_log import JointLog
+from mocobot_view import colours
+from mocobot_view.blueprint import playing, plot_view, world_view
+from mocobot_view.colours import Colour
+from mocobot_view.shapes import Shape, Triangles, body_shape, capsule, join
+from mocobot_view.stream import begin, log_lines, log_shape, send_poses
+
+POSE_HZ, SERIES_HZ = 60.0, 500.0
+"""Poses and samples a second that are drawn, at most."""
+SMOOTH_HZ, SMOOTH_SHARE = 20.0, 0.1
+"""Low-pass of the positions that the model's torques are computed from; a share of the rate where that is less."""
+BONE_M, BONE_RGBA = 0.02, (0.75, 0.77, 0.80, 1.0)
+"""What is drawn between the joints of a model that shows nothing."""
+_POINT = 1e-6  # shorter bones are none [m]
+_TURN = [1, 2, 3, 0]  # MuJoCo's quaternions are (w, x, y, z), the viewer's (x, y, z, w)
+
+
+@dataclass(frozen=True, eq=False)
+class JointReplay:
+    """All that is drawn of one log.
+
+    Attributes:
+        name: root of its entities, unique among the logs shown together.
+        log: the samples.
+        joints: names of the joints.
+        units: of their positions and of their torques.
+        shapes: of every body that shows something, in its frame.
+        time: of the poses [s], shape (P,).
+        position, quaternion: of those bodies in the world, by name, shape (P, 3) and (P, 4), (x, y, z, w).
+        reach: centre [m], (3,), and radius [m] of a ball around the robot in all poses.
+        series_time: of the series [s], shape (S,).
+        asked: torques that the model asks for without friction, shape (S, J).
+        every: samples of the log from one of the series to the next.
+    """
+
+    name: str
+    log: JointLog
+    joints: tuple[str, ...]
+    units: tuple[tuple[str, str], ...]
+    shapes: Mapping[str, Shape]
+    time: Array
+    position: Mapping[str, Array]
+    quaternion: Mapping[str, Array]
+    reach: tuple[Array, float]
+    series_time: Array
+    asked: Array
+    every: int
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a viewer should know, sentences."""
+        return self.log.notes
+
+
+def joint_replay(model: SerialModel, log: JointLog, name: str) -> JointReplay:
+    """Work out everything that is drawn of a log.
+
+    Args:
+        model: the robot.
+        log: of its joints.
+        name: what to call it.
+    """
+    shapes = _shapes(model.model)
+    step = max(1, round(log.rate_hz / POSE_HZ))
+    names = {b: model.model.body(b).name or f"body{b}" for b in shapes}
+    position, quaternion, reach = _poses(model.model, log.q[::step])
+    every = max(1, round(log.rate_hz / SERIES_HZ))
+    q = low_pass(log.q, log.rate_hz, min(SMOOTH_HZ, SMOOTH_SHARE * log.rate_hz))
+    dq = differentiate(q, log.rate_hz)
+    ddq = differentiate(dq, log.rate_hz)
+    return JointReplay(
+        name=name,
+        log=log,
+        joints=model.joints,
+        units=tuple(("m", "N") if slides else ("rad", "N m") for slides in model.slides),
+        shapes={names[b]: shape for b, shape in shapes.items()},
+        time=log.time[::step],
+        position={name: position[:, b] for b, name in names.items()},
+        quaternion={name: quaternion[:, b] for b, name in names.items()},
+        reach=reach,
+        series_time=log.time[::every],
+        asked=inverse_torque(model.model, q[::every], dq[::every], ddq[::every]),
+        every=every,
+    )
+
+
+def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, float]]:
+    """Positions and quaternions (x, y, z, w) of all bodies, shape (P, B, 3) and (P, B, 4), and what they reach."""
+    data = mujoco.MjData(model)
+    position = np.empty((len(q), model.nbody, 3))
+    quaternion = np.empty((len(q), model.nbody, 4))
+    for k, pose in enumerate(q):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        position[k], quaternion[k] = data.xpos, data.xquat
+    low, high = position[:, 1:].min(axis=(0, 1)), position[:, 1:].max(axis=(0, 1))
+    reach = (low + high) / 2.0, float(max(np.linalg.norm(high - low) / 2.0, 0.1))
+    return position, quaternion[..., _TURN], reach
+
+
+def _shapes(model: mujoco.MjModel) -> dict[int, Shape]:
+    """By body; bones where nothing that moves shows anything."""
+    shapes = {b: shape for b in range(model.nbody) if (shape := body_shape(model, [b])) is not None}
+    return shapes if {int(b) for b in model.jnt_bodyid} & set(shapes) else shapes | _bones(model)
+
+
+def _bones(model: mujoco.MjModel) -> dict[int, Shape]:
+    """A rod from every body to each of its children, or to its centre of mass where it is the last."""
+    bones = {}
+    for b in range(1, model.nbody):
+        children = model.body_pos[np.flatnonzero(model.body_parentid == b)]
+        ends = [end for end in children if np.linalg.norm(end) > _POINT] or [model.body_ipos[b]]
+        rods = [_rod(end) for end in ends if np.linalg.norm(end) > _POINT]
+        if rods:
+            bones[b] = Shape.of(join(rods), BONE_RGBA)
+    return bones
+
+
+def _rod(end: Array) -> Triangles:
+    """A capsule from the origin to a point."""
+    length = float(np.linalg.norm(end))
+    z = end / length
+    x = np.linalg.svd(z[None])[2][1]
+    R = np.column_stack([x, np.cross(z, x), z])
+    return capsule(min(BONE_M, 0.2 * length), length / 2.0).moved(end / 2.0, R)
+
+
+MEASURED, ASKED, COMMANDED = colours.of_robot(1), colours.of_robot(2), colours.COMMAND
+SHOWN = 4
+"""Joints whose plots stand below each other in a tab."""
+
+
+def log_joint_replay(
+    stream: rr.RecordingStream,
+    replays: Sequence[JointReplay],
+    progress: Callable[[int], object] | None = None,
+) -> None:
+    """Log replays side by side, each below the root of its name, all on one timeline that starts at 0.
+
+    Args:
+        stream: where to.
+        replays: what is shown.
+        progress: called with 1 after each.
+    """
+    columns = [_column(replay) for replay in replays]
+    layout = playing(columns[0] if len(columns) == 1 else rrb.Horizontal(*columns))
+    begin(stream, layout, [replay.name for replay in replays])
+    for replay in replays:
+        for body, shape in replay.shapes.items():
+            path = f"{replay.name}/robot/{rr.escape_entity_path_part(body)}"
+            send_poses(stream, path, replay.time, replay.position[body], replay.quaternion[body])
+            log_shape(stream, f"{path}/shape", shape)
+        _log_series(stream, replay)
+        if progress:
+            progress(1)
+
+
+def _log_series(stream: rr.RecordingStream, replay: JointReplay) -> None:
+    log, every = replay.log, slice(None, None, replay.every)
+    for j in range(len(replay.joints)):
+        root = _series(replay, j)
+        lines: list[tuple[str, str, Array | None, Colour]] = [
+            ("position", "measured", log.q[every, j], MEASURED),
+            ("torque", "measured", None if log.torque is None else log.torque[every, j], MEASURED),
+            ("torque", "model, without friction", replay.asked[:, j], ASKED),
+        ]
+        if log.command is not None and log.drive.command == "position":
+            lines.append(("position", "commanded", log.command[every, j], COMMANDED))
+        if log.drive.duty is not None:
+            lines.append(("duty", "measured", log.drive.duty[every, j], MEASURED))
+        for quantity, name, values, colour in lines:
+            if values is None or not np.isfinite(values).any():
+                continue
+            path = f"{root}/{quantity}/{name.split(',')[0]}"
+            log_lines(stream, path, replay.series_time, values[:, None], [name], [colour])
+
+
+def _series(replay: JointReplay, j: int) -> str:
+    return f"{replay.name}/series/{rr.escape_entity_path_part(replay.joints[j])}"
+
+
+def _column(replay: JointReplay) -> rrb.Horizontal:
+    tabs = []
+    for first in range(0, len(replay.joints), SHOWN):
+        shown = range(first, min(first + SHOWN, len(replay.joints)))
+        name = replay.joints[shown[0]] + (f" to {replay.joints[shown[-1]]}" if len(shown) > 1 else "")
+        plots = [_plots(replay, j) for j in shown]
+        tabs.append(rrb.Vertical(*plots, name=name))
+    return rrb.Horizontal(_scene(replay), rrb.Tabs(*tabs), column_shares=[1.0, 1.4])
+
+
+def _plots(replay: JointReplay, j: int) -> rrb.Horizontal:
+    log, (length, force) = replay.log, replay.units[j]
+    quantities = {
+        "position": f"position [{length}]" + ("" if log.command is None else " (white: command)"),
+        "torque": f"torque [{force}] (orange: model)",
+    }
+    if log.drive.duty is not None:
+        quantities["duty"] = "duty"
+    root, joint = _series(replay, j), replay.joints[j]
+    views = [plot_view(f"/{root}/{name}", f"{joint}: {title}") for name, title in quantities.items()]
+    return rrb.Horizontal(*views)
+
+
+def _scene(replay: JointReplay) -> rrb.Spatial3DView:
+    centre, radius = replay.reach
+    eye = centre + 2.6 * radius * np.array([0.75, -0.85, 0.45]) / np.linalg.norm([0.75, -0.85, 0.45])
+    controls = rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, 1.0))
+    return world_view(replay.name, ["$origin/robot/**"], controls)

@@ -1,1 +1,0 @@
-"""Replays of logs of one robot's joints."""

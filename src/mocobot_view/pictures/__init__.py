@@ -1,1 +1,0 @@
-"""Pictures of models, rendered by MuJoCo without a screen: teams, estimates and diagnoses."""

@@ -1,0 +1,273 @@
+"""One recording made ready to be shown: poses, signals, and what an estimate, the truth and a diagnosis say."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from discrepancy.result.read import WrittenDiagnosis
+from estimator.arm.dynamics import rotation
+from estimator.arm.unit import levelled, true_joints
+from estimator.arrays import Array
+from estimator.errors import InputError
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.metadata import FREE
+from estimator.recording.model import Recording
+from estimator.rigid_team import fuse
+from estimator.signals import GraspData, process_recording
+from estimator.statistics import rms
+from mocobot_view.payload import (
+    Bases,
+    BodyFacts,
+    Grasps,
+    PayloadMotion,
+    as_estimated,
+    bars,
+    cad_shape,
+    check_robots,
+    drawn_payload,
+    facts_of,
+    held,
+    placed,
+)
+from mocobot_view.robot import BodyMotion, body_motion, robot_shapes
+from mocobot_view.shapes import Shape
+
+CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
+"""Cut-off of the filter, and the rate at which its output is kept."""
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What the robots' wrenches leave of Newton and Euler, in {1}.
+
+    Attributes:
+        force: sum of the forces minus m (a_c + g) [N], shape (P, 3).
+        moment: sum of the moments about the centre of mass minus I alpha + omega x I omega [N m], shape (P, 3), or
+            None without an inertia.
+    """
+
+    force: Array
+    moment: Array | None
+
+
+def filtered(recording: Recording, notes: list[str]) -> GraspData | None:
+    """Twists and wrenches as the estimator sees them, times from the recording's first sample on.
+
+    Thinned to ``FILTERED_HZ``: the filter leaves 1e-4 of what that cannot carry.
+
+    Returns:
+        The data points, or None (and why, in ``notes``) if the recording is too short.
+    """
+    try:
+        data = process_recording(recording, CUTOFF_HZ)
+    except InputError as error:
+        notes.append(f"No twists and no wrenches: {error}.")
+        return None
+    step = max(1, int(data.rate_hz / FILTERED_HZ))
+    arrays = {name: getattr(data, name)[::step] for name in ("R_bi", "p_bi", "twist", "twist_dot", "wrench")}
+    return replace(data, time=data.time[::step] - recording.time[0], rate_hz=data.rate_hz / step, **arrays)
+
+
+def balance(data: GraspData, estimate: PayloadEstimate) -> Balance | None:
+    """Residual of the payload's motion, or None where grasps, mass or centre of mass are not known."""
+    grasps, mass, p_1c = estimate.grasps, estimate.mass, estimate.p_1c
+    if grasps is None or mass is None or p_1c is None:
+        return None
+    motion = fuse(data, grasps)
+    lever = np.cross(motion.alpha, p_1c) + np.cross(motion.omega, np.cross(motion.omega, p_1c))
+    weight = data.gravity_mps2 * motion.up
+    force = motion.force - mass.mass * (motion.acceleration + lever + weight)
+    if estimate.inertia is None:
+        return Balance(force, None)
+    inertia = estimate.inertia.inertia
+    spin = motion.omega @ inertia
+    euler = motion.alpha @ inertia + np.cross(motion.omega, spin)
+    return Balance(force, motion.moment - np.cross(p_1c, motion.force) - euler)
+
+
+MISFIT_M, MISFIT_RAD = 0.01, 0.03
+"""Gaps between flanges and grasps (rms) above which something is wrong; robots that were never calibrated show 6 mm
+and 10 mrad."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayTrial:
+    """All that is drawn of one recording.
+
+    Attributes:
+        name: root of its entities, unique among the recordings shown together.
+        recording: the samples.
+        time: since the first sample [s], shape (Q,).
+        bodies: motion of the robots' bodies.
+        bases: where the robots stand.
+        motion: that of the payload, or None where its grasps are not known.
+        shape: the payload's, in {1}, or None.
+        data: filtered twists and wrenches, or None.
+        balance: residual of Newton and Euler, or None.
+        estimate: the payload's, or None.
+        facts: the drawable part of the estimate, or None.
+        truth: the payload's, or None.
+        diagnosis: what is wrong with the team, or None.
+        notes: what a viewer should know, sentences.
+    """
+
+    name: str
+    recording: Recording
+    time: Array
+    bodies: BodyMotion
+    bases: Bases
+    motion: PayloadMotion | None
+    shape: Shape | None
+    data: GraspData | None
+    balance: Balance | None
+    estimate: PayloadEstimate | None
+    facts: BodyFacts | None
+    truth: BodyFacts | None
+    diagnosis: WrittenDiagnosis | None
+    notes: tuple[str, ...]
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return self.recording.metadata.robots
+
+
+def replay_trial(
+    recording: Recording,
+    name: str,
+    estimate: PayloadEstimate | None = None,
+    truth: BodyFacts | None = None,
+    diagnosis: WrittenDiagnosis | None = None,
+    payload: str | Path | None = None,
+) -> ReplayTrial:
+    """Work out everything that is drawn of a recording.
+
+    Args:
+        recording: one trial.
+        name: what to call it.
+        estimate: of the payload; None to estimate from this recording, as far as it goes.
+        truth: of the payload.
+        diagnosis: of these robots.
+        payload: name or MJCF of the payload's geometry; None for what the recording's label names.
+
+    Raises:
+        InputError: estimate or diagnosis are of another number of robots, or ``payload`` is not a payload for them.
+    """
+    recording = as_estimated(recording, estimate)
+    meta = recording.metadata
+    notes: list[str] = []
+    if meta.trial == FREE:
+        notes.append(
+            "The robots hold nothing: they are drawn in a row, without a payload, an estimate or forces on one."
+        )
+        estimate = truth = None
+    else:
+        estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes)
+    if diagnosis is not None:
+        _check_diagnosis(diagnosis, recording, notes)
+    phi, theta, _ = true_joints(meta.arms, recording.phi, recording.theta, recording.tau)
+    bodies = body_motion(phi, theta, meta.arms)
+    R_bi, wrist = levelled(meta.arms, rotation(theta), bodies.wrist)
+    height = robot_shapes(meta.design).base_height_m
+    facts = None if estimate is None else facts_of(estimate)
+    grasps = held(facts, meta.robots)
+    bases, motion = placed(R_bi, wrist, grasps, height, meta.arms)
+    if motion is None and meta.trial != FREE:
+        notes.append(
+            "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
+            "payload. Give an estimate from recordings with motion (--estimate)."
+        )
+    elif motion is not None:
+        gap, turn = rms(motion.gap_position_m), rms(motion.gap_rotation_rad)
+        if gap > MISFIT_M or turn > MISFIT_RAD:
+            notes.append(
+                f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
+                f"{1e3 * turn:.0f} mrad apart (rms)."
+            )
+    data = None if meta.trial == FREE else filtered(recording, notes)
+    return ReplayTrial(
+        name=name,
+        recording=recording,
+        time=recording.time - recording.time[0],
+        bodies=bodies,
+        bases=bases,
+        motion=motion,
+        shape=_shape(recording, payload, facts, grasps, notes),
+        data=data,
+        balance=None if data is None or estimate is None else balance(data, estimate),
+        estimate=estimate,
+        facts=facts,
+        truth=truth,
+        diagnosis=diagnosis,
+        notes=tuple(notes),
+    )
+
+
+def distinct_names(recordings: Sequence[Path]) -> list[str]:
+    """File names without their ending, with a running number where two are alike.
+
+    What is not a letter, a digit, a dot or a hyphen becomes an underscore: names are parts of entity paths.
+    """
+    names: list[str] = []
+    for path in recordings:
+        stem = re.sub(r"[^A-Za-z0-9.-]", "_", path.stem)
+        stem = re.sub(r"^_+(?=_)", "", stem)  # two underscores in front are Rerun's own
+        name, k = stem, 1
+        while name in names:
+            k += 1
+            name = f"{stem}-{k}"
+        names.append(name)
+    return names
+
+
+def _given(estimate: PayloadEstimate, recording: Recording, notes: list[str]) -> PayloadEstimate:
+    label = recording.metadata.payload
+    check_robots(estimate, recording)
+    if None not in (estimate.payload, label) and estimate.payload != label:
+        notes.append(f"The estimate is of payload {estimate.payload!r}; this recording is of {label!r}.")
+    return estimate
+
+
+def _estimated(recording: Recording, notes: list[str]) -> PayloadEstimate | None:
+    try:
+        return estimate_payload([recording])
+    except InputError as error:
+        notes.append(f"Nothing could be estimated from this recording: {error}.")
+        return None
+
+
+def _check_diagnosis(diagnosis: WrittenDiagnosis, recording: Recording, notes: list[str]) -> None:
+    if diagnosis.of_joints:
+        raise InputError(f"the diagnosis is of one robot's joints; {recording.name} is of a team")
+    if diagnosis.robots() > recording.metadata.robots:
+        raise InputError(
+            f"the diagnosis names robot {diagnosis.robots()}; {recording.name} is of "
+            f"{recording.metadata.robots} robots"
+        )
+    if not diagnosis.is_of(recording.name):
+        notes.append(
+            f"The diagnosis was made from other recordings ({', '.join(diagnosis.recordings)}), not from this one."
+        )
+
+
+def _shape(
+    recording: Recording,
+    payload: str | Path | None,
+    facts: BodyFacts | None,
+    grasps: Grasps | None,
+    notes: list[str],
+) -> Shape | None:
+    """The payload's geometry: by CAD if that fits the grasps, else bars."""
+    meta = recording.metadata
+    if grasps is None:
+        if payload is not None:
+            cad_shape(payload, meta.robots)  # refuse what cannot be drawn even where nothing is
+        return None
+    drawn = drawn_payload(payload, meta.payload, grasps, notes)
+    if drawn is not None:
+        return cad_shape(drawn, meta.robots)[0]
+    return bars(facts or BodyFacts(grasps, None, None, None, None))

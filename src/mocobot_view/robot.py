@@ -1,0 +1,194 @@
+"""One Omnid to look at: shapes of its bodies by its design, their motion from joint angles, and where causes sit."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from discrepancy.result.read import NamedCause
+from discrepancy.team.causes import CAUSES
+from estimator.arm.arms import Arms
+from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
+from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
+from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design, posed
+from mocobot_view.shapes import Shape, body_shape
+
+LEGS = (1, 2, 3)
+GIMBAL = ("yoke", "ring", "flange")
+TINTED = ("proximal1", "proximal2", "proximal3")
+"""Bodies drawn in their robot's colour, which its series have, too."""
+PATHS: dict[str, str] = {
+    **{f"proximal{k}": f"base/leg{k}/proximal" for k in LEGS},
+    **{f"rod{k}": f"base/leg{k}/proximal/knee/rod" for k in LEGS},
+    "platform": "base/platform",
+    "yoke": "base/platform/yoke",
+    "ring": "base/platform/yoke/ring",
+    "flange": "base/platform/yoke/ring/flange",
+}
+"""Where each moving body of the MJCF is below its robot. The rest stands on the floor with the base. Links and rods
+turn in frames of their own: ``leg`` at the driven axis with x outward, ``knee`` at the link's end."""
+
+
+@dataclass(frozen=True)
+class RobotShapes:
+    """Shapes of one robot's bodies.
+
+    Attributes:
+        standing: chassis, wheels and base, in {b}.
+        moving: shapes of the bodies in ``PATHS``, in their body frames.
+        base_height_m: height of {b} over the floor [m].
+    """
+
+    standing: Shape
+    moving: dict[str, Shape]
+    base_height_m: float
+
+
+@cache
+def robot_shapes(design: OmnidDesign) -> RobotShapes:
+    """The Omnid with a design's lengths."""
+    model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
+    fit_design(model, design)
+    data = posed(model)
+    base = model.body("base").id
+    moving = {name: model.body(name).id for name in PATHS}
+    standing = [b for b in range(1, model.nbody) if b not in moving.values()]
+    frame = data.xpos[base].copy(), data.xmat[base].reshape(3, 3).copy()
+    shapes = {name: body_shape(model, [body]) for name, body in moving.items()}
+    stand = body_shape(model, standing, frame)
+    assert stand is not None
+    return RobotShapes(
+        stand, {name: shape for name, shape in shapes.items() if shape is not None}, base_height_m()
+    )
+
+
+def fit_design(model: mujoco.MjModel, design: OmnidDesign, prefix: str = "") -> None:
+    """Stretch links, plates and driven axes of the shipped Omnid to another design, for the eye: no mass changes.
+
+    Args:
+        model: a model that holds the shipped Omnid.
+        design: the lengths it shall have.
+        prefix: of the Omnid's names in the model.
+    """
+    shipped = omnid_design()
+    wider = design.base_radius_m - shipped.base_radius_m
+    for k, u in zip(LEGS, LEG_DIRECTIONS, strict=True):
+        model.body_pos[model.body(f"{prefix}proximal{k}").id] = design.base_radius_m * u
+        model.body_pos[model.body(f"{prefix}rod{k}").id] = [design.proximal_length_m, 0.0, 0.0]
+        model.geom_pos[model.geom(f"{prefix}actuator{k}").id] += wider * u
+        for name, length in (
+            (f"{prefix}proximal{k}", design.proximal_length_m),
+            (f"{prefix}rod{k}", design.rod_length_m),
+        ):
+            geom = model.geom(name).id
+            model.geom_pos[geom, 0] = model.geom_size[geom, 1] = 0.5 * length
+    model.geom_size[model.geom(f"{prefix}base_plate").id, 0] += wider
+    model.geom_size[model.geom(f"{prefix}platform").id, 0] += (
+        design.platform_radius_m - shipped.platform_radius_m
+    )
+
+
+def fixed_frames(design: OmnidDesign) -> dict[str, tuple[Array, Array]]:
+    """Frames of ``PATHS`` that do not move in their parents: position [m] (3,) and quaternion (x, y, z, w), by path."""
+    frames = {}
+    for k, u in zip(LEGS, LEG_DIRECTIONS, strict=True):
+        azimuth = 2.0 * np.pi * (k - 1) / 3.0
+        outward = np.array([0.0, 0.0, np.sin(0.5 * azimuth), np.cos(0.5 * azimuth)])
+        frames[f"base/leg{k}"] = design.base_radius_m * u, outward
+        frames[f"base/leg{k}/proximal/knee"] = (
+            np.array([design.proximal_length_m, 0.0, 0.0]),
+            np.array([0.0, 0.0, 0.0, 1.0]),
+        )
+    return frames
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """How the bodies of N robots move at Q samples.
+
+    Attributes:
+        wrist: positions of the platform in the arm's own frame [m], which is {b} where that stands level, (Q, N, 3).
+        turns: quaternions (x, y, z, w) of the links, rods and gimbal bodies in their fixed frames, by name,
+            shape (Q, N, 4).
+    """
+
+    wrist: Array
+    turns: dict[str, Array]
+
+
+def body_motion(phi: Array, theta: Array, arms: Arms) -> BodyMotion:
+    """Solve the arms and gimbals of all robots.
+
+    A link turns by phi about minus its driven axis, the rod by Ry(swing) Rz(tilt) against the link.
+
+    Args:
+        phi: true driven angles [rad], shape (Q, N, 3).
+        theta: true gimbal angles (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
+        arms: the robots as they are, or as designed.
+
+    Raises:
+        InputError: the rods do not meet at some sample.
+    """
+    wrist, swing, tilt = rod_angles(phi, arms)
+    turns = {}
+    for leg in LEGS:
+        turns[f"proximal{leg}"] = _turned("Y", -phi[..., leg - 1])
+        turns[f"rod{leg}"] = _turned("YZ", swing[..., leg - 1], tilt[..., leg - 1])
+    for column, (name, axis) in enumerate(zip(GIMBAL, "ZYX", strict=True)):
+        turns[name] = _turned(axis, theta[..., column])
+    return BodyMotion(wrist, turns)
+
+
+def rod_angles(phi: Array, arms: Arms) -> tuple[Array, Array, Array]:
+    """Where the arms are, from the driven angles alone.
+
+    Seen from the knee, the rod's direction (x, y, z) in the link is
+    Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt, -sin swing cos tilt).
+
+    Args:
+        phi: true driven angles [rad], shape (..., N, 3).
+        arms: the robots as they are, or as designed.
+
+    Returns:
+        Wrist positions in the arms' own frames [m], and swing and tilt of each leg's rod against its link [rad]; shapes
+        (..., 3).
+
+    Raises:
+        InputError: the rods do not meet at some sample.
+    """
+    legs = leg_geometry(phi, arms)
+    length = np.broadcast_to(np.asarray(arms.rod_length_m), legs.h.shape)[..., None]
+    swing, tilt = np.empty_like(legs.h), np.empty_like(legs.h)
+    for k, u in enumerate(LEG_DIRECTIONS):
+        angle, rod = phi[..., k], legs.rod[..., k, :] / length[..., k, :]
+        outward, aside, up = rod @ u, rod @ [-u[1], u[0], 0.0], rod[..., 2]
+        x = np.cos(angle) * outward + np.sin(angle) * up
+        z = np.cos(angle) * up - np.sin(angle) * outward
+        swing[..., k], tilt[..., k] = np.arctan2(-z, x), np.arcsin(np.clip(aside, -1.0, 1.0))
+    return legs.h, swing, tilt
+
+
+def _turned(axes: str, *angles: Array) -> Array:
+    """Quaternions of turns about coordinate axes that turn along, one after the other; shape (..., 4)."""
+    rows = np.stack(angles, axis=-1)
+    return Rotation.from_euler(axes, rows.reshape(-1, len(axes))).as_quat().reshape(*rows.shape[:-1], 4)
+
+
+def by_place(causes: Iterable[NamedCause]) -> dict[tuple[int | None, str | None], list[NamedCause]]:
+    """Causes by robot (None for the payload) and its body as ``body_of`` has it."""
+    places: dict[tuple[int | None, str | None], list[NamedCause]] = {}
+    for cause in causes:
+        places.setdefault((cause.robot, body_of(cause)), []).append(cause)
+    return places
+
+
+def body_of(cause: NamedCause) -> str | None:
+    """The robot's body, such as ``proximal1``; None for the base, or the payload."""
+    at = CAUSES[cause.name].at if cause.name in CAUSES else None
+    if cause.robot is not None and cause.joint is not None:
+        return GIMBAL[cause.joint - 1] if at == "gimbal joint" else f"proximal{cause.joint}"
+    return "flange" if cause.robot is not None and at == "grasp" else None
