@@ -188,6 +188,8 @@ def load_extended(folder: Path) -> TeamScene:
         effects = tuple(effect_from_dict(entry) for entry in listed)
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
+    wrist, theta = (read.array(key, (robots, 3)) for key in ("wrist_home_b_m", "theta_home_rad"))
+    grasps = read_poses(read, "grasps", robots)
     required = [name for name in AS_BUILT if name not in MASSES]
     entries = enumerate(read.list("as_built", robots), start=1)
     units = [Fields(entry, required, f"{where}: as_built[{i}]", MASSES) for i, entry in entries]
@@ -208,9 +210,9 @@ def load_extended(folder: Path) -> TeamScene:
     scene = TeamScene(
         root=None,
         robots=robots,
-        wrist_home_b=read.array("wrist_home_b_m", (robots, 3)),
-        theta_home=read.array("theta_home_rad", (robots, 3)),
-        X_1i=read_poses(read, "grasps", robots),
+        wrist_home_b=wrist,
+        theta_home=theta,
+        X_1i=grasps,
         units=tuple(unit_in(unit) for unit in units),
         mounts=read_poses(read, "mounts", robots),
         initial=initial,
