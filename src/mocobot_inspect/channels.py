@@ -13,7 +13,7 @@ from scipy.special import erf
 
 from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
-from estimator.recording.sampling import SENSORS
+from estimator.recording.metadata import SENSORS
 from mocobot_logs.log import NS, Stamps
 
 UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}

@@ -20,8 +20,7 @@ from mocobot_inspect.survey import Timing
 from mocobot_inspect.team import FASTEST_HZ, MOSTLY, SIGMAS, SLOWEST_HZ, Inspection, differs
 from mocobot_inspect.team_wiring import SUSPICIOUS, Found, Misfit
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.log import NS
-from mocobot_logs.readings import repeated
+from mocobot_logs.log import NS, repeated
 
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]
 

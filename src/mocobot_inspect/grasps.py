@@ -22,9 +22,9 @@ from estimator.arm.dynamics import angular_motion, arm_torque, rotation
 from estimator.arm.unit import Arms, ArmUnit, arm_of, design_of
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.identifiability import FACTOR, cross_information
-from estimator.estimate.joint import newton_euler_regressor
+from estimator.estimate.uncertainty import FACTOR, cross_information
 from estimator.recording.checks import TORQUE_FACTOR
+from estimator.rigid_team import newton_euler_regressor
 from estimator.so3 import chordal_mean, cross
 from estimator.statistics import rms
 from mocobot_inspect.signals import Signals, noise_gains

@@ -51,7 +51,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from estimator.clocks.offsets import ClockEstimate
+from estimator.clocks import ClockEstimate
 from mocobot_inspect.channels import UNITS, Channel
 from mocobot_inspect.findings import evidence, findings, milliseconds, mistake_words, percent, wrong_scales
 from mocobot_inspect.joint_motion import Follows, pooled
@@ -61,9 +61,8 @@ from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.survey import Timing
 from mocobot_inspect.team import Inspection, differs
 from mocobot_inspect.team_wiring import Misfit, Wiring
-from mocobot_logs.joints.quantities import COMMANDS, QUANTITIES
-from mocobot_logs.resample.log import MAX_GAP_S
-from mocobot_logs.resample.tally import MOST_MISSING
+from mocobot_logs.joints.joint_map import COMMANDS, QUANTITIES
+from mocobot_logs.resample import MAX_GAP_S, MOST_MISSING
 
 _HIDDEN = 6
 _AS_IT_IS = "nothing as it is; with "

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from estimator.arm.arms import Arms
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import Arms, ArmUnit
 from estimator.arrays import Array
-from estimator.clocks.offsets import ClockEstimate, estimate_clocks
+from estimator.clocks import ClockEstimate, estimate_clocks
 from estimator.filtering import differentiate, low_pass
 from estimator.recording.metadata import FREE
-from estimator.signals.holds import DURATION_S, STILL_RATE_RADPS, STILL_SPEED_MPS
+from estimator.signals import DURATION_S, STILL_RATE_RADPS, STILL_SPEED_MPS
 from mocobot_inspect.channels import Channel, seconds, wild
 from mocobot_inspect.readiness import Readiness, readiness
 from mocobot_inspect.signals import CUTOFF_HZ, KINDS, RATE_HZ, TRIM_S, of_arrays, signals_of

@@ -29,8 +29,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from estimator.arm.arms import Arms, design_of
 from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import Arms, design_of
 from estimator.arrays import Array
 from estimator.so3 import cross
 from estimator.statistics import rms

@@ -63,7 +63,7 @@ from mocobot_report.tables import (
     sentence_of,
     value,
 )
-from mocobot_view.pictures.shots import diagnosis_shot
+from mocobot_view.pictures import diagnosis_shot
 
 Values = Mapping[str, Any]
 Rows = list[list[Entry]]

@@ -47,10 +47,9 @@ from mocobot_report.tables import (
     vector,
 )
 from mocobot_sim.paper.scoring import rotation_error_deg
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.fact_files import read_truth
-from mocobot_view.pictures.shots import estimate_shot
-from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
+from mocobot_view.payload import BodyFacts, read_truth
+from mocobot_view.pictures import estimate_shot
+from mocobot_view.replay_trial import ReplayTrial, replay_trial
 
 METHODS = {
     "fit": "in one fit of closed loops and balance of wrenches",

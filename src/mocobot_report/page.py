@@ -26,7 +26,7 @@ from mocobot_report.folder import Result, complete, read_folder
 from mocobot_report.numbers import counted, size
 from mocobot_report.palette import DARK, LIGHT, template
 from mocobot_report.tables import Entry, Num, templates
-from mocobot_view.pictures.render import Shot, render_shots
+from mocobot_view.render import Shot, render_shots
 
 Say = Callable[[str], object]
 Context = dict[str, Any]

@@ -25,7 +25,7 @@ from mocobot_sim.paper.tables import (
     summary_table,
 )
 from mocobot_sim.trial.trial_log import ROD_LIMIT_M, WELD_LIMIT_M, WELD_LIMIT_RAD
-from mocobot_view.pictures.shots import team_shot
+from mocobot_view.pictures import team_shot
 
 COLUMNS = {
     "paper": ("paper", "diamond"), "ideal": ("ideal", "triangle-down"), "nominal": ("nominal", "circle"),

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from discrepancy.joints.mechanics.nominal import inverse_torque
+from discrepancy.joints.mechanics import inverse_torque
 from discrepancy.joints.model import SerialModel
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass

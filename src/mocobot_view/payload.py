@@ -13,17 +13,14 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator import so3
-from estimator.arm.arms import Arms
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import Arms, ArmUnit, seen_by_encoders
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.frames import seen_by_encoders
-from estimator.estimate.grasp_estimate import single_robot
+from estimator.estimate.grasps import single_robot
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.strict import Fields, read_json
-from mocobot_sim.scene.as_built import theta_x_zeros
-from mocobot_sim.scene.as_built_file import read_units
+from mocobot_sim.scene.as_built import read_units, theta_x_zeros
 from mocobot_sim.scene.models import payload_names
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.pymjcf import compiled

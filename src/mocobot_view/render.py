@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from estimator.extras import NO_PLOTS, has_plots
-from estimator.processes import scratch_folder
+from estimator.files import scratch_folder
 from mocobot_view.camera import Camera, Marks, pixels
 
 Picture = NDArray[np.uint8]

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import NamedCause
 from discrepancy.team.causes import CAUSES
-from estimator.arm.arms import Arms
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
 from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import Arms
 from estimator.arrays import Array
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design, posed
 from mocobot_view.shapes import Shape, body_shape

@@ -17,9 +17,9 @@ from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
+from estimator.arm.unit import frames_said
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.estimate.frames import frames_said
 from estimator.files import whole_file
 from estimator.statistics import rms, rms_length
 from mocobot_view import colours

@@ -28,7 +28,7 @@ from mocobot.api.watch import payload_line as _payload
 from mocobot.cli import main
 from mocobot_report.folder import Estimated
 from mocobot_sim.extended.extended import load_extended
-from mocobot_view.facts.fact_files import read_truth
+from mocobot_view.payload import read_truth
 from recorded_team import COM, GRASPS, INERTIA, MASS
 from recordings import small_recording
 from uncalibrated_team import DEFAULT, uncalibrated

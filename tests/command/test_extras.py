@@ -21,8 +21,8 @@ from mocobot.results import public
 from mocobot_sim.paper import experiment
 from mocobot_sim.paper.experiment import PaperPlan, run_paper
 from mocobot_sim.paper.store import FOLDER, Store
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.render import Shot, render_shots
+from mocobot_view.camera import Camera
+from mocobot_view.render import Shot, render_shots
 
 OPTIONAL = ("numba", "matplotlib", "PIL", "rerun", "distributed", "dask")
 BLOCK = f"import sys\nfor name in {OPTIONAL!r}: sys.modules[name] = None\n"

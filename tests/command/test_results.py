@@ -20,7 +20,7 @@ from estimator.files import LIST, check_target, holds, make_folder, whole_file, 
 from mocobot.checks import check_folder
 from mocobot.cli import main
 from mocobot.results import commit_of, file_facts, folder_provenance, provenance
-from mocobot_view.facts.fact_files import read_estimate
+from mocobot_view.payload import read_estimate
 
 
 def test_a_folder_appears_when_all_is_written(tmp_path):

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from array_log import ArrayLog, stream
-from estimator.clocks.offsets import ClockEstimate
-from estimator.estimate.identifiability import StepReport, WeakDirection
+from estimator.clocks import ClockEstimate
+from estimator.estimate.uncertainty import StepReport, WeakDirection
 from mocobot_inspect.channels import Oscillation, Stretch
 from mocobot_inspect.findings import evidence, findings
 from mocobot_inspect.grasps import Fault

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimator.arm.arms import Arms
-from estimator.arm.wrist_level import wrist_of
+from estimator.arm.delta import wrist_of
+from estimator.arm.unit import Arms
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
 from mocobot_inspect.readiness import readiness

@@ -11,17 +11,16 @@ import pytest
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import PAYLOAD_PREFIX
 from mocobot_sim.trial import trial as trial_module
-from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_sim.trial.trial_log import Rows, TrialLog
 from mocobot_view.camera import Camera
 from mocobot_view.render import Picture, render
 

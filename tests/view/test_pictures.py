@@ -20,7 +20,7 @@ from discrepancy.result.read import NamedCause
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import MassEstimate
-from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.base.drive import build_solo, compile_solo
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view import colours

@@ -8,6 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from mocobot_inspect.joints.findings import joint_findings
+from mocobot_inspect.joints.json import joint_inspection_dict
+from mocobot_inspect.joints.text import format_joint_inspection, joint_ready_line
+
 from estimator.arm.design import load_design
 from estimator.files import write_json
 from mocobot.api.recordings import Robots, quiet
@@ -15,13 +19,9 @@ from mocobot.options import InspectOptions, made
 from mocobot.results import public
 from mocobot_inspect import inspection
 from mocobot_inspect.findings import Finding, findings
+from mocobot_inspect.joint_wiring import Robot
 from mocobot_inspect.joints import inspection as joint_inspection
-from mocobot_inspect.joints.findings import joint_findings
-from mocobot_inspect.joints.json import joint_inspection_dict
-from mocobot_inspect.joints.robot import Robot
-from mocobot_inspect.joints.text import format_joint_inspection, joint_ready_line
-from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.text import format_inspection, ready_line
+from mocobot_inspect.report import format_inspection, inspection_dict, ready_line
 from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design

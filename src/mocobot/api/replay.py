@@ -20,14 +20,12 @@ from mocobot.api.recordings import Given, Robots, Say, quiet, read
 from mocobot.options import ReplayOptions, made
 from mocobot_sim.scene.as_built import theta_x_zeros
 from mocobot_sim.trial.truth import GroundTruth
-from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.fact_files import read_estimate, read_truth
-from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
+from mocobot_view.payload import BodyFacts, Grasps, read_estimate, read_truth
+from mocobot_view.replay_trial import ReplayTrial, distinct_names, replay_trial
 
 if TYPE_CHECKING:
     from mocobot.api.joints import GivenModel
-    from mocobot_view.joints.joint_replay import JointReplay
+    from mocobot_view.joint_replay import JointReplay
 
 INSTALL = "pip install 'mocobot[replay]'"
 SUFFIX = ".rrd"
@@ -117,7 +115,7 @@ def _joint_replays(
     logs: list[Any], names: list[str], model: GivenModel, chosen: ReplayOptions
 ) -> list[JointReplay]:
     from mocobot.api.joints import read_logs, read_model
-    from mocobot_view.joints.joint_replay import joint_replay
+    from mocobot_view.joint_replay import joint_replay
 
     robot, replays = read_model(model), []
     for log, name in zip(logs, names, strict=True):
@@ -130,9 +128,8 @@ def _joint_replays(
 def _log(
     trials: list[ReplayTrial] | list[JointReplay], advance: Callable[[int], object], stream: Any
 ) -> None:
-    from mocobot_view.joints.joint_replay import JointReplay
-    from mocobot_view.joints.log_joints import log_joint_replay
-    from mocobot_view.replay.stream import log_replay
+    from mocobot_view.joint_replay import JointReplay, log_joint_replay
+    from mocobot_view.stream import log_replay
 
     joints = [trial for trial in trials if isinstance(trial, JointReplay)]
     if joints:

@@ -35,7 +35,7 @@ from joint_verdicts import (
     offset_or_spring,
 )  # fmt: skip
 from mocobot.api.diagnosis import Diagnosis
-from mocobot_view.replay.replay_trial import replay_trial
+from mocobot_view.replay_trial import replay_trial
 from recordings import small_recording
 
 

@@ -13,7 +13,7 @@ from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
 from estimator.estimate.leftover import steps_of
 from estimator.recording.metadata import RecordingMetadata, Sampling
-from mocobot_inspect.stream.survey import survey
+from mocobot_inspect.survey import survey
 from mocobot_logs.log import CHANNELS, REF, Samples
 from mocobot_logs.one_clock import to_recording
 from mocobot_logs.resample import resample

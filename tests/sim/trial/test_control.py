@@ -22,7 +22,7 @@ from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_free_team, build_team
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
-from mocobot_view.facts.fact_files import read_truth
+from mocobot_view.payload import read_truth
 from payload_mjcf import ONE, Grasp, Payload
 
 REACH, PROXIMAL, ROD = 0.18 - 0.062, 0.200, 0.368
