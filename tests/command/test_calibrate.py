@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import tomllib
@@ -10,12 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mocobot_report.blocks.html import words
 from scipy.spatial.transform import Rotation
 
 import mocobot
 from command import refused, run
-from discrepancy.result.tables import answer
 from discrepancy.team.estimates import errors, seen_by
 from estimator.arm.unit import COUNT
 from estimator.calibrate.calibrate import calibrate
@@ -26,7 +25,7 @@ from invented_calibration import invented_calibration
 from mocobot.api.calibration import Calibration, read_calibration, write_calibration
 from mocobot.api.watch import payload_line as _payload
 from mocobot.cli import main
-from mocobot_report.folder import Estimated
+from mocobot_report.page import write_report
 from mocobot_sim.extended.extended import load_extended
 from mocobot_view.payload import read_truth
 from recorded_team import COM, GRASPS, INERTIA, MASS
@@ -200,7 +199,7 @@ def test_self_calibrate(folder, tmp_path, capsys):
     found = mocobot.read_estimate(target)
     assert found.method == "calibrated"
     assert found.p_1c == pytest.approx(COM, abs=3e-4)
-    told = words(answer(Estimated(target, found, None))[0])
+    told = html.unescape(write_report(tmp_path).read_text(encoding="utf-8"))
     assert "in one least squares with the robots' own calibration" in told
 
 
@@ -318,7 +317,7 @@ def test_text_json_page_notebook_and_first_look_say_which_frames(turned, found, 
     }  # fmt: skip
     again = mocobot.read_estimate(target)
     assert again.zero_sd_rad == pytest.approx(np.deg2rad(1.0))
-    page = "".join(answer(Estimated(target, again, None))[0].itertext())
+    page = html.unescape(write_report(tmp_path).read_text(encoding="utf-8"))
     for text in (page, again._repr_html_(), _payload(again)):
         assert SAID in text
     plain = mocobot.estimate(files[0])

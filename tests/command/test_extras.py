@@ -90,7 +90,7 @@ def test_a_trial_has_the_same_bits_without_numba():
 
 
 def test_drives_have_the_same_bits_without_numba(monkeypatch):
-    from mocobot_sim import compiled
+    from mocobot_sim import kernels
     from mocobot_sim.kernels import update_drives
 
     rng = np.random.default_rng(4)
@@ -106,8 +106,8 @@ def test_drives_have_the_same_bits_without_numba(monkeypatch):
         return [ctrl, *others]
 
     machine = after(update_drives)
-    monkeypatch.setattr(compiled, "njit", None)
-    plain = after(compiled.entry(update_drives.py_func))
+    monkeypatch.setattr(kernels, "njit", None)
+    plain = after(kernels.entry(update_drives.py_func))
     for one, other, before in zip(machine, plain, changed, strict=True):
         assert not np.array_equal(one, before)
         np.testing.assert_array_equal(one, other)

@@ -213,8 +213,7 @@ def _diagnosed_joints(
 
 def _joint_tolerances(path: Path | str | None) -> dict[str, dict[str, float]] | None:
     """Tolerances of the causes that a file names; the others keep their own."""
-    from discrepancy.tolerances_file import read_tolerances as read
-
+    from discrepancy.cause_names import read_tolerances as read
     from discrepancy.joints.effects import NAMES
 
     if path is None:

@@ -6,21 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
-
-from mocobot_inspect.joints.findings import joint_findings
-from mocobot_inspect.joints.json import joint_inspection_dict
-from mocobot_inspect.joints.text import format_joint_inspection, joint_ready_line
+from typing import TYPE_CHECKING, Any
 
 from estimator.arm.design import load_design
 from estimator.files import write_json
 from mocobot.api.recordings import Robots, quiet
 from mocobot.options import InspectOptions, made
 from mocobot.results import public
-from mocobot_inspect import inspection
+from mocobot_inspect import joints, team
 from mocobot_inspect.findings import Finding, findings
 from mocobot_inspect.joint_wiring import Robot
-from mocobot_inspect.joints import inspection as joint_inspection
 from mocobot_inspect.report import format_inspection, inspection_dict, ready_line
 from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
@@ -31,23 +26,19 @@ if TYPE_CHECKING:
 
 
 class Look:
-    """Printable, in a terminal and as JSON; a class of looks says by which functions, each of which gets the look."""
+    """Printable, in a terminal and as JSON."""
 
     name: str
-    _findings: ClassVar[Callable[..., list[Finding]]]
-    _ready_line: ClassVar[Callable[..., str]]
-    _text: ClassVar[Callable[..., str]]
-    _dict: ClassVar[Callable[..., dict[str, Any]]]
 
     @property
     def findings(self) -> list[Finding]:
         """All that is wrong: ``topic`` and ``sentence`` each."""
-        return type(self)._findings(self)
+        return findings(self)
 
     @property
     def ready_for(self) -> str:
         """What the log can be used for, one line."""
-        return type(self)._ready_line(self)
+        return ready_line(self)
 
     @property
     def is_ready(self) -> bool:
@@ -56,7 +47,7 @@ class Look:
 
     def __str__(self) -> str:
         """The text report."""
-        return type(self)._text(self)
+        return format_inspection(self)
 
     def __repr__(self) -> str:
         """One line."""
@@ -64,7 +55,7 @@ class Look:
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON with units in the keys."""
-        return type(self)._dict(self)
+        return inspection_dict(self)
 
     def write(self, path: Path | str) -> None:
         """Write it as JSON.
@@ -76,14 +67,11 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Inspection(Look, inspection.Inspection):
+class Inspection(Look, team.Inspection):
     """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
 
     The attributes are those of ``mocobot_inspect.team.Inspection``; ``mocobot_inspect.report`` has the JSON's keys.
     """
-
-    _findings, _ready_line = findings, ready_line
-    _text, _dict = format_inspection, inspection_dict
 
     @property
     def is_ready(self) -> bool:
@@ -97,15 +85,12 @@ class Inspection(Look, inspection.Inspection):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointInspection(Look, joint_inspection.JointInspection):
+class JointInspection(Look, joints.JointInspection):
     """Stamps, columns, signs, order, units and delays of a joint log, judged by the robot's model: printable.
 
-    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``, the JSON's keys those of
-    ``mocobot_inspect.joints.json``.
+    The attributes are those of ``mocobot_inspect.joints.JointInspection``; ``mocobot_inspect.report`` has the JSON's
+    keys.
     """
-
-    _findings, _ready_line = joint_findings, joint_ready_line
-    _text, _dict = format_joint_inspection, joint_inspection_dict
 
 
 def inspect(
@@ -139,7 +124,7 @@ def inspect(
     source = open_log(Path(log), log_map, chosen.episode)
     units = robots.units(source, design)
     trial = log_map.trial if log_map is not None else None
-    return public(Inspection, inspection.inspect_log(source, design, advance, tried, trial, units))
+    return public(Inspection, team.inspect_log(source, design, advance, tried, trial, units))
 
 
 def _inspect_joints(
@@ -163,4 +148,4 @@ def _inspect_joints(
         lambda *motion: body_regressor(Motion.of(tree, *motion), int(tree.joint_body[tree.last_link])),
         float(tree.mass[tree.links].sum()),
     )  # fmt: skip
-    return public(JointInspection, joint_inspection.inspect_joints(source, log_map, known, advance, tried))
+    return public(JointInspection, joints.inspect_joints(source, log_map, known, advance, tried))

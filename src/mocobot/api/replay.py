@@ -63,7 +63,7 @@ def replay(
     if path is not None:
         check_target(Path(path), SUFFIX)
     check_rerun()
-    from mocobot_view.replay import outputs
+    from mocobot_view import stream as outputs
 
     outputs.check_enabled()
     if path is None and not chosen.web and not outputs.has_display():
