@@ -68,7 +68,7 @@ def test_wheel_simulates_on_its_own(wheel: Path, tmp_path: Path) -> None:
     for package in (ROOT / "src").glob("*/__init__.py"):
         assert (site / package.parent.name / "py.typed").is_file()
     code = (
-        "import mocobot.cli, mocobot.commands.diagnose, mocobot_sim.scene.models as m;"
+        "import mocobot.cli, mocobot.commands, mocobot_sim.scene.models as m;"
         "import mocobot_sim.paper.scoring as t;"
         "print(m.models_dir());"
         "import mocobot_report.page as r; r.page_assets();"
