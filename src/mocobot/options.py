@@ -286,8 +286,7 @@ class Diagnose(Files, DiagnoseOptions):
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
     rec: Logs
-    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
-    named can be validated. Logs of a robot's joints with --model."""
+    """Recordings or logs that ``convert`` reads, all of one payload; with --model, logs of one robot's joints."""
     model: Model = None
     reference: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...")] = ()
     """With --model: logs of the same robot while it was well; what is off there, too, is no news."""
