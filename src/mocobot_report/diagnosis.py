@@ -26,8 +26,8 @@ from discrepancy.result.tables import (
     blocks,
     diverged_sentences,
     floor_words,
-    foretold_torques,
     lost,
+    predicted_torques,
     response_units,
     shown_units,
     something_is_off,
@@ -188,7 +188,7 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
     if gain and gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
         interval = f"95 %: {percent(low)} to {percent(high)}" if low is not None and high is not None else ""
-        of = "predicted torques" if foretold_torques(gain) else "response"
+        of = "predicted torques" if predicted_torques(gain) else "response"
         out.append((f"excess error of the {of} removed", percent(gain["removed"]["share"]), interval))
     elif values["not_simulated"]:
         out.append(("closed loop", "not simulated", tidy(str(values["not_simulated"]))))
@@ -367,7 +367,7 @@ def _closed_loop(gain: Values, short: Mapping[str, str], shown: Mapping[str, Key
     keys = [*(f"{channel}_rms" for channel in gain["units"]), "chi2_per_n"]
     heads = _heads(shown)
     return {
-        "torques": foretold_torques(gain),
+        "torques": predicted_torques(gain),
         "validated": gain["validated"],
         "removed": removed,
         "interval": range_said,
@@ -408,7 +408,7 @@ def _trials_chart(gain: Values, key: str, names: Sequence[str], shown: Mapping[s
     fit = len(names) <= 6 and all(len(name) <= 40 // len(names) for name in names)
     across = column_axis([literal(name) if fit else str(k) for k, name in enumerate(names, start=1)])
     up = log_axis(f"{title} [{unit}]" if unit else title, seen)
-    torques = foretold_torques(gain)
+    torques = predicted_torques(gain)
     of = "predicted torques" if torques else "simulated response"
     said = f"{title} of every trial's {of}, before and after; the means are in the table."
     layout = {"xaxis": across, "yaxis": up, "margin": {"b": 26}, "shapes": [rule(y=floor)]}

@@ -77,7 +77,7 @@ def a_push() -> Finding:
     )  # fmt: skip
 
 
-def foretold(trial: str, better: bool) -> Prediction:
+def prediction(trial: str, better: bool) -> Prediction:
     before = np.array([0.8, 0.5, 9.0])
     noise = np.array([0.02, 0.02, 0.4])
     after = 1.02 * noise if better else before
@@ -112,7 +112,7 @@ def joint_verdict(folder: Path, findings: Sequence[Finding] = (), **more: Any) -
     verdict = JointVerdict(
         model=small_robot(folder), parts=(), trials=TRIALS, motors=(), reference=(),
         verdict="explained" if found else "consistent", findings=found, suspected=(), scatter=(),
-        foretold=tuple(foretold(trial, bool(found)) for trial in TRIALS), validated=True,
+        predictions=tuple(prediction(trial, bool(found)) for trial in TRIALS), validated=True,
         chi2_per_n=(900.0, 700.0, 1.05) if found else (1.2, 1.0, 1.0),
         before=offers, after=(Offer("ripple", "joint2", 2, 0.4),),
         limits=(

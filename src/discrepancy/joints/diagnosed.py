@@ -108,9 +108,9 @@ class JointValues(Told):
 
 def _gain(verdict: JointVerdict) -> Values | None:
     """Torques predicted without and with the findings."""
-    if not verdict.foretold:
+    if not verdict.predictions:
         return None
-    foretold, known = verdict.foretold, _known(verdict)
+    predictions, known = verdict.predictions, _known(verdict)
     names = {j: f"{verdict.model.joints[j]} torque" for j in known}
 
     def errors(one: Prediction, which: str) -> dict[str, float]:
@@ -119,14 +119,14 @@ def _gain(verdict: JointVerdict) -> Values | None:
         sizes |= {f"{name}_nrmse": float(rms[j] / one.torque[j]) for j, name in names.items()}
         return sizes | {"chi2_per_n": float(getattr(one, f"chi2_{which}"))}
 
-    sides = {which: [errors(one, which) for one in foretold] for which in ("before", "after")}
-    both = zip(foretold, sides["before"], sides["after"], strict=True)
-    noise = np.sqrt(np.mean([np.square(one.noise) for one in foretold], axis=0))
+    sides = {which: [errors(one, which) for one in predictions] for which in ("before", "after")}
+    both = zip(predictions, sides["before"], sides["after"], strict=True)
+    noise = np.sqrt(np.mean([np.square(one.noise) for one in predictions], axis=0))
     return {
         "held_out": {which: _means(each) for which, each in sides.items()} | {"as_found": None},
         "units": {name: unit_of(verdict.model, j) for j, name in names.items()},
         "noise": {f"{name}_rms": float(noise[j]) for j, name in names.items()},
-        "removed": excess_removed((one.chi2_before, one.chi2_after) for one in foretold)
+        "removed": excess_removed((one.chi2_before, one.chi2_after) for one in predictions)
         if verdict.findings
         else None,
         "validated": verdict.validated,
@@ -141,7 +141,7 @@ def unit_of(model: SerialModel, joint: int) -> str:
 
 def _known(verdict: JointVerdict) -> list[int]:
     """Joints whose torques were predicted in all trials."""
-    sizes = np.array([[f.before, f.after, f.noise, f.torque] for f in verdict.foretold])
+    sizes = np.array([[f.before, f.after, f.noise, f.torque] for f in verdict.predictions])
     there = np.isfinite(sizes).all(axis=(0, 1)) & (sizes[:, 2:] > 0.0).all(axis=(0, 1))
     return [int(j) for j in np.flatnonzero(there)]
 
@@ -152,13 +152,13 @@ def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 def _signature(verdict: JointVerdict, which: str) -> Values:
     """Where the misfit is, by joint and trial; ``before`` or ``after``."""
-    known, joints = _known(verdict) if verdict.foretold else [], verdict.model.joints
+    known, joints = _known(verdict) if verdict.predictions else [], verdict.model.joints
     squares: list[Array] = [
-        np.square(getattr(f, which) / np.where(f.noise > 0, f.noise, 1.0)) for f in verdict.foretold
+        np.square(getattr(f, which) / np.where(f.noise > 0, f.noise, 1.0)) for f in verdict.predictions
     ]
     channel = {j: float(np.mean([square[j] for square in squares])) for j in known}
     worst = max(known, key=lambda j: channel[j], default=None)
-    said = "No torque was foretold."
+    said = "No torque was predicted."
     if worst is not None:
         place = joint_in_words(worst + 1, joints[worst])
         said = f"The torque of {place} is off most, by chi2/n {three_digits(channel[worst])}."
@@ -166,7 +166,7 @@ def _signature(verdict: JointVerdict, which: str) -> Values:
         "chi2_per_n": verdict.chi2_per_n[0 if which == "before" else 2],
         "kind": {},
         "channel": {f"{joints[j]} torque": size for j, size in channel.items()},
-        "trial": {f.trial: float(getattr(f, f"chi2_{which}")) for f in verdict.foretold},
+        "trial": {f.trial: float(getattr(f, f"chi2_{which}")) for f in verdict.predictions},
         "sentence": said,
     }
 

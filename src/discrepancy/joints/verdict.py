@@ -64,14 +64,14 @@ class JointVerdict(Verdict):
         model: the robot as described.
         parts: the trials: smoothed logs, or parts of one.
         motors: drives that tell no torque, and what they give by what they were given.
-        foretold: one a trial, predicted by the others; by all of them where there is one trial only (``validated``).
+        predictions: one a trial, predicted by the others; by all of them where there is one trial only (``validated``).
         by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
     """
 
     model: SerialModel
     parts: Sequence[Signals]
     motors: tuple[Motor, ...]
-    foretold: tuple[Prediction, ...]
+    predictions: tuple[Prediction, ...]
     by_the_others: Callable[[int], tuple[Finding, ...]]
 
 
@@ -152,7 +152,7 @@ class _JointJudge(Judge):
             model=self.model,
             parts=self.trials.signals,
             motors=self.trials.motors,
-            foretold=tuple(self._predicted([o.chosen for o in self.named])),
+            predictions=tuple(self._predicted([o.chosen for o in self.named])),
             by_the_others=self.by_the_others,
         )
         return with_held(verdict, held_in(self.model, self.trials))

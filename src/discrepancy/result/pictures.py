@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from discrepancy.numbers import fitting
 from discrepancy.result.report import drawn, label, relation
-from discrepancy.result.tables import floor_words, foretold_torques, response_units
+from discrepancy.result.tables import floor_words, predicted_torques, response_units
 from discrepancy.result.traces import Group, Trace, binned, group_units, groups, multiples, spectrum
 from estimator.arrays import Array
 from mocobot_sim.plots_plain import plain_numbers, plain_words
@@ -185,8 +185,8 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
         )
         axis.grid(axis="y", alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()
-    if foretold_torques(gain):
-        title = "Torques, foretold from the recorded motion: error"
+    if predicted_torques(gain):
+        title = "Torques, predicted from the recorded motion: error"
     else:
         title = "Recorded commands, simulated again: error of the response"
     return titled(figure, title, handles, labels)

@@ -29,7 +29,7 @@ def remedy(values: Values) -> str:
     if told is None:
         return what
     return (
-        f"{what} As the other recordings find it, each one is foretold to chi2/n {three_digits(told['as_found'])}, "
+        f"{what} As the other recordings find it, each one is predicted to chi2/n {three_digits(told['as_found'])}, "
         f"as designed to {three_digits(told['as_designed'])}."
     )
 

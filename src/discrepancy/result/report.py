@@ -245,7 +245,7 @@ def _likelier(folds: Sequence[Sequence[float]]) -> Iterable[str]:
         each = [sum(gains) for gains in zip(*folds, strict=True)]
         better = sum(gain > 0.0 for gain in each)
         yield (
-            f"Foretold by the others, {better} of {len(each)} trials are likelier with that, all together by "
+            f"Predicted by the others, {better} of {len(each)} trials are likelier with that, all together by "
             f"{sum(each):.0f} nats."
         )
 

@@ -72,20 +72,20 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
     yield from (f"    chi2/n {found}" for found in all_as_found(gain))
 
 
-def foretold_torques(gain: Values) -> bool:
+def predicted_torques(gain: Values) -> bool:
     """Whether the channels are torques of a robot of joints, predicted from its motion without commands."""
     return all(channel.endswith(" torque") for channel in gain["units"])
 
 
 def floor_words(gain: Values) -> str:
     """What is left at best."""
-    return "noise" if foretold_torques(gain) else "noise and integration error"
+    return "noise" if predicted_torques(gain) else "noise and integration error"
 
 
 def answer(gain: Values) -> str:
     """What is held against the recordings."""
-    if foretold_torques(gain):
-        return "Torques, foretold from the recorded motion"
+    if predicted_torques(gain):
+        return "Torques, predicted from the recorded motion"
     return "Response to the recorded commands, simulated again"
 
 

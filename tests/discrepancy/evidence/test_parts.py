@@ -1,4 +1,4 @@
-"""Parts of logs foretell each other: shared values by the others, each part's own by itself."""
+"""Parts of logs predict each other: shared values by the others, each part's own by itself."""
 
 import numpy as np
 import pytest

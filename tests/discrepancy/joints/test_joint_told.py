@@ -27,12 +27,12 @@ from joint_verdicts import (
     a_payload,
     a_push,
     finding,
-    foretold,
     friction_everywhere,
     joint_verdict,
     member,
     off_everywhere,
     offset_or_spring,
+    prediction,
 )  # fmt: skip
 from mocobot.api.diagnosis import Diagnosis
 from mocobot_view.replay_trial import replay_trial
@@ -186,7 +186,7 @@ CASES: dict[str, dict[str, Any]] = {
     "unexplained": {"verdict": "unexplained", "chi2_per_n": (9.0, 8.0, 7.0)},
     "unfinished": {"findings": [offset_or_spring()], "finished": False},
     "one trial": {"findings": [offset_or_spring()], "trials": TRIALS[:1], "validated": False,
-                  "foretold": (foretold(TRIALS[0], True),)},
+                  "predictions": (prediction(TRIALS[0], True),)},
     "reference": {"findings": [a_payload()], "reference": ("healthy.csv",)},
 }  # fmt: skip
 

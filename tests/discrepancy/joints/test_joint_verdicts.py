@@ -121,14 +121,14 @@ def test_what_has_changed_since_the_reference(bare: SerialModel, case: str) -> N
 # --- logs as they come
 
 
-def test_a_single_log_is_three_parts_that_foretell_each_other(bare: SerialModel, log: JointLog) -> None:
+def test_a_single_log_is_three_parts_that_predict_each_other(bare: SerialModel, log: JointLog) -> None:
     verdict = judged(bare, [log])
     assert verdict.validated
     assert len(verdict.trials) == 3
     assert all(name.startswith("log 21 ") for name in verdict.trials)
     lengths = [len(s.time) for s in verdict.parts]
     assert max(lengths) - min(lengths) <= 1
-    for one in verdict.foretold:
+    for one in verdict.predictions:
         assert np.all(one.after < 0.15 * one.before)
 
 
@@ -160,7 +160,7 @@ def test_a_joint_without_torques_is_left_out(bare: SerialModel, log: JointLog) -
     assert [m.place for m in verdict.findings[0].members] == ["turn", "elbow"]
     for member in verdict.findings[0].members:
         assert member.values["coulomb_Nm"] == pytest.approx(0.5, abs=4.0 * member.errors["coulomb_Nm"])
-    assert all(np.isfinite(one.after).all() for one in verdict.foretold)
+    assert all(np.isfinite(one.after).all() for one in verdict.predictions)
 
 
 def test_logs_that_cannot_be_used(model: SerialModel, log: JointLog) -> None:

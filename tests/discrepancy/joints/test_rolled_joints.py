@@ -177,7 +177,7 @@ def test_before_is_what_plain_mujoco_does(two_links: SerialModel, rubbing: Joint
     np.testing.assert_allclose(error, expected, atol=1e-9)
 
 
-def test_what_is_found_foretells_the_other_trial(two_links: SerialModel, rubbing: JointLog) -> None:
+def test_what_is_found_predicts_the_other_trial(two_links: SerialModel, rubbing: JointLog) -> None:
     """Two trials of one log; each with what the other one gave, and a line of progress for each."""
     asked, said = [], []
 

@@ -52,7 +52,7 @@ def test_rollouts_are_a_table(joints: list[str], called: list[str]) -> None:
         assert all(re.fullmatch(r"[\d.]+ -> [\d.]+ \(\d+ %\)", cell) for cell in cells), row
 
 
-def test_torques_are_foretold_from_the_motion_and_their_columns_stand_under_their_heads() -> None:
+def test_torques_are_predicted_from_the_motion_and_their_columns_stand_under_their_heads() -> None:
     channels = ["shoulder_lift_joint torque", "elbow torque"]
     errors = {f"{c}_{what}": x for c in channels for what, x in (("rms", 1.5), ("nrmse", 0.12))}
     gain = {
@@ -61,7 +61,7 @@ def test_torques_are_foretold_from_the_motion_and_their_columns_stand_under_thei
         "noise": {f"{c}_rms": 0.1 for c in channels},
     }  # fmt: skip
     lines = gain_lines({"gain": gain, "causes": ["one"]})
-    assert lines[1] == "[[Torques, foretold from the recorded motion (on trials left out of the fit)]]"
+    assert lines[1] == "[[Torques, predicted from the recorded motion (on trials left out of the fit)]]"
     ends = {line.index("before") + len("before") for line in lines if "before" in line}
     ends |= {
         re.search(r"(%\]|n)\s+[\d.]+", line).end() for line in lines[3:] if "%" in line or "chi2" in line

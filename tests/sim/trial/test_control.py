@@ -262,7 +262,7 @@ def test_what_is_hardly_damped_is_warned_of(team_a: TeamScene) -> None:
 
 
 @pytest.mark.parametrize(("lag_s", "stable"), [(0.005, True), (0.0055, False)])
-def test_torques_grow_in_the_trial_as_foretold(
+def test_torques_grow_in_the_trial_as_predicted(
     teams: dict[int, TeamScene], lag_s: float, stable: bool
 ) -> None:
     """A torque sensor that lags; a tap of micrometres, and what is left of it after one mode is alone."""
