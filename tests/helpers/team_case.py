@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from discrepancy.team.linear.jacobian import BySignals
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise
-from estimator.arrays import inertia_parameters
+from estimator.arrays import Array, inertia_parameters
 from estimator.estimate.grasps import GraspEstimate
 from estimator.rigid_team import Bases, Shared
 from omnid_design import DESIGN
@@ -97,3 +98,8 @@ def assert_close(got, expected, tolerance):
         size = np.sqrt(np.mean(expected[:, block] ** 2))
         apart = np.sqrt(np.mean((got[:, block] - expected[:, block]) ** 2))
         assert apart <= tolerance * size + floor, (block, apart, size)
+
+
+def every_sample(J: BySignals) -> Array:
+    """The derivative at every sample, shape (N, Q, C, s)."""
+    return np.array([J.at(robot, slice(None), np.arange(J.samples)) for robot in range(len(J.knots))])

@@ -8,9 +8,18 @@ from estimator.recording.parquet import write_recording
 from independent.arm import OUT, Legs, arm_load, driven_angles, legs_of, link_directions, wrist_position
 from independent.bodies import MODELS, draw_as_built, load_payload
 from independent.draw import FORMS, NAMES, PLAIN
-from independent.effects import Pendulum
-from independent.generate import generate
-from independent.numerics import FINE_HZ, derivative
+from independent.effects import Pendulum, Push
+from independent.generate import generate, spring_readings
+from independent.numerics import (
+    FINE_HZ,
+    bristles,
+    coulomb,
+    derivative,
+    lagged,
+    parallel_dahl,
+    play,
+    second_derivative,
+)
 from independent.team import Truth, carry, place_bases, random_motion, scene_of
 
 DESIGN = load_design(MODELS / "omnid" / "design.toml")
@@ -139,6 +148,27 @@ def test_gimbals_are_passive(clean):
     assert np.abs(work - derivative(energy))[INSIDE].max() < 1e-9
 
 
+def test_the_same_seed_gives_the_same_bits():
+    first, again, other = (generate(s, "x1", [("sea_bias", 3.0)], "a", kinds=PAIR)[0] for s in (4, 4, 5))
+    for field in ("time", "phi", "theta", "tau"):
+        assert all((getattr(x, field) == getattr(y, field)).all() for x, y in zip(first, again, strict=True))
+    assert not np.array_equal(first[0].tau, other[0].tau)
+
+
+@pytest.mark.parametrize("payload", ["b", "c"])
+def test_the_estimator_finds_the_payload(payload):
+    """Two derivations that share nothing: it takes both to be right."""
+    import mocobot
+
+    body = load_payload(payload)
+    estimate = mocobot.estimate(generate(2, "none", [], payload, ideal=True)[0])
+    assert estimate.mass.mass == pytest.approx(body.mass_kg, rel=1e-7)
+    assert np.abs(np.asarray(estimate.p_1c) - body.p_1c).max() < 1e-6
+    assert np.abs(np.asarray(estimate.inertia.inertia) - body.inertia).max() < 1e-5
+    assert np.abs(np.asarray(estimate.grasps.p_1i) - body.p_1i).max() < 1e-6
+    assert np.abs(np.asarray(estimate.grasps.R_1i) - body.R_1i).max() < 1e-6
+
+
 def test_zeros_and_biases_are_added_to_the_readings():
     plain, _ = generate(6, "none", [], "b", ideal=True, kinds=PAIR)
     for name, field in (("phi_zero", "phi"), ("theta_zero", "theta"), ("sea_bias", "tau")):
@@ -149,6 +179,25 @@ def test_zeros_and_biases_are_added_to_the_readings():
         expected[answer["robot"] - 1, answer["joint"] - 1] = value
         for a, b in zip(shifted, plain, strict=True):
             assert np.abs(getattr(a, field) - getattr(b, field) - expected).max() < 1e-14
+
+
+def test_springs_are_misread():
+    robots = draw_as_built(np.random.default_rng(0), "none")
+    torque = np.full((5, 3, 3), 8.0)
+    robots["sea_scale"][0, 0], robots["sea_hardening"][0, 1] = 0.03, 50.0
+    read = spring_readings(torque, robots, (), DESIGN)[-1, 0] / DESIGN.sea_stiffness_Nm_per_rad
+    assert read[0] == pytest.approx(8.0 / 103.0, rel=1e-14)
+    assert 100.0 * read[1] + 50.0 * read[1] ** 3 == pytest.approx(8.0, rel=1e-14)
+    assert read[2] == pytest.approx(0.08, rel=1e-14)
+
+
+def test_a_push_takes_load_off_the_robots(clean):
+    push = Push(1, 5.0, 3.0, (1.0, 2.0, 3.0), (0.1, 0.2, 0.0))
+    difference = (carried(push).force - clean.force).sum(axis=1)
+    during = (clean.scene.time > 5.01) & (clean.scene.time < 7.99)
+    expected = -clean.scene.R_Wb[0] @ [1.0, 2.0, 3.0]
+    assert np.abs(difference[during] - expected).max() < 1e-9
+    assert np.abs(difference[clean.scene.time < 4.99]).max() < 1e-9
 
 
 def test_friction_dissipates():
@@ -185,6 +234,26 @@ def test_a_pendulum_pulls_with_its_weight_and_swings_at_its_period(clean):
     assert np.ptp(energy[at]) < 1e-5 * DESIGN.gravity_mps2
     small = np.abs(n_two[at, 0] + DESIGN.gravity_mps2 / 0.25 * n[at, 0]).max()
     assert small < 0.1 * np.abs(n_two[at, 0]).max()
+
+
+def test_operators_with_a_memory():
+    time = np.arange(4000) / FINE_HZ
+    x = np.sin(time)
+    assert np.abs(derivative(x) - np.cos(time))[INSIDE].max() < 1e-11
+    assert np.abs(second_derivative(x) + x)[INSIDE].max() < 1e-8
+    follower = play(x[:, None], np.array([0.1]))[:, 0]
+    assert np.abs(x - follower).max() == pytest.approx(0.1, abs=1e-15)
+    late = lagged(x, 0.05)
+    exact = (np.sin(time) - 0.05 * np.cos(time)) / (1 + 0.05**2)
+    assert np.abs(late - exact)[500:].max() < 1e-6
+    dry = coulomb(x[:, None], np.array([0.2]), 1e-4)[:, 0]
+    soft = bristles(x, np.full(4000, 0.2), 1e-3)
+    rate = np.cos(time)
+    fast = np.abs(rate) > 0.1
+    assert np.abs(dry - 0.2 * np.sign(rate))[fast][20:].max() < 1e-12
+    assert np.abs(soft - 0.2 * np.sign(rate))[fast][20:].max() < 5e-3
+    read = parallel_dahl(10 * x, 0.3, 0.2)
+    assert (10 * x - read)[1:700].max() == pytest.approx(0.3, rel=0.01)
 
 
 def test_everything_can_be_hidden_and_shows():

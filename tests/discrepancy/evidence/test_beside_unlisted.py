@@ -50,4 +50,4 @@ def test_a_part_without_kin_is_usual_where_the_machine_is_as_far_off() -> None:
     groups.append(Group("single", "payload", (4,), (64.0,)))
     search = Search(Tolerated(cells, groups, families=[[0, 1, 2, 3]]), np.full((1, 3), 0.05**2))
     state = search.settled(search.value([Chosen(groups[-1], 1.0)], None))
-    assert search.is_usual(state, state.chosen[0])
+    assert search.is_within_tolerance(state, state.chosen[0])

@@ -61,6 +61,30 @@ def test_the_floor_is_the_noise_however_much_the_dictionary_explains() -> None:
     assert np.sqrt(floor[0]) == pytest.approx(noise, rel=0.2)
 
 
+def test_noise_above_the_bands_stays_out_of_them() -> None:
+    """The second derivative of noise has hardly any power at low frequencies, unless a cut leaks it."""
+    power = []
+    for fade_s in (0.0, 0.5):
+        rng, own = np.random.default_rng(2), []
+        bands = Bands([RATE_HZ], [LENGTH], EDGES_HZ, fade_s)
+        for _ in range(20):
+            noise = np.diff(rng.standard_normal(LENGTH + 2), 2)
+            own.append(Cells.of(bands, [noise[:, None]]).channels[0].squares[0])
+        power.append(np.mean(own))
+    assert power[1] < 0.05 * power[0]
+
+
+def test_scores_of_columns_that_fade() -> None:
+    rng = np.random.default_rng(3)
+    y, x = rng.standard_normal((2, LENGTH))
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ, 0.5), [y[:, None]])
+    cells.add([{0: [x]}])
+    p = Posterior(cells, np.zeros(1), np.array([[0.5, 1.0, 2.0]]))
+    (score,) = cells.weighted_residual(p.mean, p.variance)
+    _, b, _ = cells.weighted(p.variance)
+    assert x @ score[:, 0] == pytest.approx(b[0], rel=1e-9)
+
+
 @pytest.mark.parametrize("other", [0.0, 0.1])
 def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) -> None:
     """Its share is learnt: small where the law is exact, as large as it is where the law has another form."""
@@ -116,6 +140,23 @@ def test_what_is_within_three_of_its_kinds_tolerances_is_no_fault(size: float, u
     (odds,) = odds_of(search, search.settled(search.value([Chosen(shape, 1.0)], None)))
     assert odds.over_nothing > 100.0
     assert odds.probability < 1e-3 if usual else odds.probability > 0.999
+
+
+def test_a_law_that_only_brings_its_errors_is_not_found() -> None:
+    """What a tolerance has in full leaves something else, which a law's errors have, and its law has not."""
+    rng = np.random.default_rng(5)
+    x, other = wave(rng), wave(rng)
+    y = 2.0 * x + 0.4 * other + 0.05 * rng.standard_normal(LENGTH)
+    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ), [y[:, None]])
+    cells.add([{0: [x]}, {0: [x]}])
+
+    class Tolerated(Machine):
+        def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+            return np.array([0.0, 4.0])
+
+    machine = Tolerated(cells, [Group("cause", "joint", (0,), (3.0,))], others=[other])
+    search = Search(machine, np.full((1, 3), 0.05**2))
+    assert search.fixed([Chosen(machine.groups[0], 1.0)]).chosen == ()
 
 
 @pytest.mark.parametrize("large", [0.0, 5.0])

@@ -1,5 +1,7 @@
 """Parts of logs predict each other: shared values by the others, each part's own by itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,25 @@ def test_shared_values_come_from_the_others_and_own_ones_from_the_part(parts: Pa
         assert x[1 + t] == pytest.approx(OWN[t], abs=0.05)
         assert x[2 - t] == pytest.approx(0.0, abs=1e-9)
         assert parts.left(x, t) == pytest.approx(ROWS, rel=0.3)
+
+
+def test_what_a_part_says_itself_does_not_predict_it(parts: Parts) -> None:
+    products = parts.products.copy()
+    products[0, 0] = 0.0
+    spoilt = replace(parts, products=products)
+    assert spoilt.predicted(parts.prior, 0)[0] == pytest.approx(parts.predicted(parts.prior, 0)[0], abs=1e-12)
+    assert abs(spoilt.mean(parts.prior)[0] - SHARED) > 0.1
+
+
+def test_without_the_cause_a_part_is_not_predicted(parts: Parts) -> None:
+    without = np.where(np.arange(3) == 0, 0.0, parts.prior)
+    assert parts.left(parts.predicted(without, 0), 0) > 20.0 * ROWS
+
+
+def test_a_single_part_predicts_itself(parts: Parts) -> None:
+    first = {name: getattr(parts, name)[:1] for name in ("grams", "products", "squares", "rows")}
+    alone = replace(parts, **first)
+    assert alone.predicted(alone.prior, 0) == pytest.approx(alone.mean(alone.prior), rel=1e-6, abs=1e-9)
 
 
 def test_values_shrink_nothing_and_have_errors(parts: Parts) -> None:

@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 from command import refused, run
 from diagnosed import check_finite, small_diagnosis
 from discrepancy.cause_names import JOINTS as EXCLUDABLE
-from discrepancy.evidence.findings import Finding, Offer, Rival
+from discrepancy.evidence.findings import Finding, Limit, Offer, Rival
 from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, Said, parameter_name
 from discrepancy.joints.diagnosed import verdict_to_dict
@@ -34,6 +35,8 @@ from joint_verdicts import (
     offset_or_spring,
     prediction,
 )  # fmt: skip
+from mocobot.api.comparison_groups import diagnosis_changes as changes_of
+from mocobot.api.comparison_groups import diagnosis_groups as groups_of
 from mocobot.api.diagnosis import Diagnosis
 from mocobot_view.replay_trial import replay_trial
 from recordings import small_recording
@@ -117,6 +120,17 @@ def test_sentences(cause: str, slide: bool, numbers: dict[str, float], said: str
     assert sentence(Said(numbers, errors, "joint 4", slide)) == said
 
 
+def test_a_cause_without_a_sentence_lists_its_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bare = replace(
+        CAUSES[0], name="magnet", title="magnet at {joint}", parameters=("pull_Nm",), sentence=None
+    )
+    monkeypatch.setitem(WORDS, "magnet", bare)
+    (cause,) = values(tmp_path, [finding("magnet", member("turn", 1, pull_Nm=0.25))])["causes"]
+    assert cause["sentence"] == "Magnet at joint 1 (turn): pull_Nm 0.25."
+
+
 # --- JSON
 
 
@@ -158,6 +172,32 @@ def test_the_values_are_strict_json_with_all_that_readers_ask_for(tmp_path: Path
     assert told["gain"]["units"] == {"turn torque": "N m", "joint2 torque": "N m", "lift torque": "N"}
 
 
+def test_numbers_of_what_is_foretold(tmp_path: Path) -> None:
+    better = replace(prediction(TRIALS[0], True), chi2_before=5.0, chi2_after=2.0)
+    gain = values(tmp_path, [friction_everywhere()], predictions=(better,), validated=False)["gain"]
+    assert gain["removed"]["share"] == pytest.approx(0.5)  # of an error of 2 beyond noise 1 is left
+    assert gain["held_out"]["before"]["lift torque_nrmse"] == pytest.approx(9.0 / 40.0)
+    assert gain["held_out"]["after"]["chi2_per_n"] == 2.0
+    assert gain["noise"]["turn torque_rms"] == pytest.approx(0.02)
+
+
+def test_a_joint_without_torques_is_left_out(tmp_path: Path) -> None:
+    one = prediction(TRIALS[0], True)
+    one.before[1] = one.torque[1] = float("nan")
+    told = values(tmp_path, [friction_everywhere()], predictions=(one,))
+    assert list(told["gain"]["units"]) == ["turn torque", "lift torque"]
+    check_finite(told)
+
+
+def test_a_candidate_is_listed_once_in_its_likeliest_shape(tmp_path: Path) -> None:
+    offers = [Offer("stribeck", "turn", 1, nats) for nats in (20.0, 31.0, 5.0)]
+    offers.append(Offer("spring", "turn", 1, -2.0))
+    listed = values(tmp_path, before=tuple(offers))["evidence"]["before"]
+    assert [(entry["name"], entry["nats"]) for entry in listed] == [
+        ("Stribeck friction in joint 1 (turn)", 31.0)
+    ]
+
+
 def test_coupled_joints_and_places_of_links(tmp_path: Path) -> None:
     pair = finding("coupled_drive", member("joint2", 2, coulomb_Nm=1.0, viscous_Nms_per_rad=0.1, armature_kgm2=0.0),
                    partner=1, shape={"ratio": -1.0})  # fmt: skip
@@ -170,6 +210,15 @@ def test_coupled_joints_and_places_of_links(tmp_path: Path) -> None:
         values(tmp_path, before=offers)["evidence"]["before"][0]["name"] == "coupled drive of joints 1 and 2"
     )
     assert (second["name"], second["joint"]) == ("mass of link base_link", None)
+
+
+def test_what_logs_say_nothing_of_is_undecidable(tmp_path: Path) -> None:
+    limits = (
+        Limit("link_com", "arm", None, {"x_m": None, "y_m": None}),
+        Limit("ripple", "turn", 1, {"cosine_Nm": 0.1}),
+    )
+    (entry,) = values(tmp_path, limits=limits)["undecidable"]
+    assert entry["what"] == "centre of mass of a link (link arm)"
 
 
 # --- text
@@ -239,6 +288,88 @@ def test_what_is_likelier_than_what_was_fitted_comes_first(tmp_path: Path) -> No
     assert "or payload at link carriage (98 %)" in " ".join(line[15:50].strip() for line in table(text)[3:])
 
 
+def test_one_place_that_was_judged_as_one_of_all_joints_is_no_rival_of_itself(tmp_path: Path) -> None:
+    one = finding("friction", member("turn", 1, coulomb_Nm=0.5, viscous_Nms_per_rad=0.3))
+    one = replace(one, told=(("friction", "all joints"),))
+    text = format_verdict(values(tmp_path, [one]))
+    assert " or " not in text.replace("or repair", "")
+    both = replace(one, rivals=(Rival("friction", "all joints", None, 0.4, 0.5),))
+    assert "or friction in all joints" in format_verdict(values(tmp_path, [both]))
+
+
+def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
+    some = finding("unlisted", place="turn", joint=1, of="position and direction")
+    text = format_verdict(values(tmp_path, [some]))
+    assert "by something unlisted at joint 1 (turn) by its position and direction." in first_part(text)
+    assert "something unlisted by its" in table(text)[2]
+    (cause,) = values(tmp_path, [some])["causes"]
+    assert cause["sentence"].endswith("acts at joint 1 (turn) and goes with its position and direction.")
+    assert " or " not in text.replace("or repair", "")
+
+
+def test_units_of_a_kind_stand_once(tmp_path: Path) -> None:
+    kind = finding("torque_delay", *(member(name, j, delay_s=0.008) for j, name in enumerate(JOINTS, 1)))
+    rows = table(format_verdict(values(tmp_path, [kind])))
+    assert "delay [ms]" in rows[2]
+    assert rows[3].split("  ")[-1].strip() == "8.00 +- 0.16"
+
+
+def test_two_kinds_of_fading_friction_are_told_apart(tmp_path: Path) -> None:
+    fading = finding("warming", member("lift", 3, more_N=2.0, more_Ns_per_m=0.5))
+    rows = table(format_verdict(values(tmp_path, [fading])))
+    assert "Coulomb 2.000 +- 0.040 N" in rows[2]
+    assert "viscous 0.500 +- 0.010 N s/m" in rows[3]
+
+
+def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
+    told = values(tmp_path, [a_payload()])
+    assert "inertia xx" not in format_verdict(told)
+    assert "inertia xx" in format_verdict(told, verbose=True)
+
+
+@pytest.mark.parametrize(
+    ("case", "begins", "says"),
+    [
+        ("consistent", "CONSISTENT: the model explains the 2 trials", "--verbose"),
+        ("no change", "CONSISTENT: nothing but noise has changed in the 2 trials.", "--verbose"),
+        ("miscalibrated", "MISCALIBRATED:", "Correct the model by these values"),
+        (
+            "partly",
+            "PARTLY EXPLAINED: one finding accounts for a part",
+            "something unlisted at joint 1 (turn)",
+        ),
+        (
+            "besides",
+            "EXPLAINED:",
+            "Besides, all places alike are off by more than their tolerances: zero of a joint.",
+        ),
+        ("unexplained", "UNEXPLAINED:", "chi2/n 7 of 9 remains"),
+        ("unfinished", "UNFINISHED, SO FAR EXPLAINED:", "Let the search come to its end"),
+        (
+            "one trial",
+            "EXPLAINED: one finding accounts for what the model gets wrong in the trial.",
+            "not tested",
+        ),
+        (
+            "reference",
+            "EXPLAINED: one finding accounts for what has changed in the 2 trials.",
+            "differs from the reference by payload at link carriage",
+        ),
+        ("many", "EXPLAINED: 12 findings account", "and 8 more"),
+    ],
+)
+def test_first_sentences(tmp_path: Path, case: str, begins: str, says: str) -> None:
+    said = first_part(format_verdict(values(tmp_path, **CASES[case])))
+    assert said.startswith(begins)
+    assert says in said
+
+
+def test_what_helps_nothing_is_not_praised(tmp_path: Path) -> None:
+    same = tuple(replace(prediction(trial, False), chi2_after=901.0) for trial in TRIALS)
+    said = first_part(format_verdict(values(tmp_path, [offset_or_spring()], predictions=same)))
+    assert "In trials left out of the fit the torques' error is no smaller with that." in said
+
+
 # --- folder, page, comparison, Python
 
 
@@ -273,6 +404,50 @@ def test_why_there_is_no_extended_model(tmp_path: Path, monkeypatch: pytest.Monk
     made(tmp_path, [friction_everywhere()]).write(tmp_path / "out")
     said = (tmp_path / "out" / "report.txt").read_text()
     assert "There is no extended model: the friction would be negative." in said
+
+
+def test_causes_in_python(tmp_path: Path) -> None:
+    diagnosis = made(tmp_path, [friction_everywhere(), offset_or_spring()])
+    kind, offset = diagnosis.causes
+    assert [(m.place, m.joint) for m in kind.members] == [
+        ("joint 1 (turn)", 1),
+        ("joint 2", 2),
+        ("joint 3 (lift)", 3),
+    ]
+    assert kind.members[2].parameters == {"coulomb_N": 12.0, "viscous_Ns_per_m": 4.0}
+    assert offset.standard_errors == {"offset_Nm": pytest.approx(0.0042)}
+    assert offset.told == ("offset of the torque of joint 2", "spring at joint 2")
+    assert repr(diagnosis).startswith("<Diagnosis of 2 trials: explained; friction in all joints, offset")
+    assert "[[" not in str(diagnosis)
+
+
+def test_rivals_are_told_on_the_page_and_in_notebooks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], writes_models: list[Path]
+) -> None:
+    diagnosis = made(tmp_path, [offset_or_spring()])
+    assert "It may as well be spring at joint 2." in diagnosis._repr_html_()
+    diagnosis.write(tmp_path / "out")
+    assert run(capsys, "report", tmp_path / "out")[0] == 0
+    assert "It may as well be spring at joint 2." in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_two_days_are_compared_place_by_place(tmp_path: Path) -> None:
+    """All joints rub on one day, one of them on the other; links that have no number are no one place."""
+    kind = values(tmp_path, [friction_everywhere(), finding("link_mass", member("arm", None, excess_kg=0.3))])
+    one = finding("friction", member("joint2", 2, coulomb_Nm=0.9, viscous_Nms_per_rad=0.1))
+    other = values(tmp_path, [one, finding("link_mass", member("carriage", None, excess_kg=0.3))])
+    assert [group.name for group in groups_of(kind, other)] == [
+        "friction in joint 2, coulomb_Nm", "friction in joint 2, viscous_Nms_per_rad"
+    ]  # fmt: skip
+    said = [line.split(", ")[0] for line in changes_of(kind, other)]
+    assert said == [
+        "Named in A alone: friction in joint 1 (turn)", "Named in A alone: friction in joint 3 (lift)",
+        "Named in A alone: mass of link arm", "Named in B alone: mass of link carriage",
+    ]  # fmt: skip
+    alone = changes_of(values(tmp_path, [friction_everywhere()]), values(tmp_path, [a_push()]))
+    assert [line.split(", ")[0] for line in alone] == [
+        "Named in A alone: friction in all joints", "Named in B alone: push on the last link"
+    ]  # fmt: skip
 
 
 def test_a_team_and_a_robot_of_joints_are_not_mixed(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.search import Chosen, Search, floor_of
-from discrepancy.joints.diagnose import Outcome, labels_of
+from discrepancy.joints.diagnose import Outcome, Until, labels_of
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import Given, joint_problem
 from discrepancy.joints.trials import trials_of
@@ -79,6 +79,13 @@ def test_a_search_ends_after_some_seconds(bare: SerialModel, log: JointLog) -> N
     assert judged(bare, [log]).finished
 
 
+def test_time_is_up_for_good() -> None:
+    until = Until(end_s=0.0)
+    assert until()
+    assert until.broken
+    assert not Until()()
+
+
 # --- a reference
 
 
@@ -130,6 +137,12 @@ def test_a_single_log_is_three_parts_that_predict_each_other(bare: SerialModel, 
     assert max(lengths) - min(lengths) <= 1
     for one in verdict.predictions:
         assert np.all(one.after < 0.15 * one.before)
+
+
+def test_a_short_log_is_one_part(model: SerialModel, log: JointLog) -> None:
+    trials = trials_of(model, [part(log, most=round(6.0 * RATE_HZ))])
+    assert trials.names == ("log 21",)
+    assert not judged(model, [part(log, most=round(6.0 * RATE_HZ))]).validated
 
 
 @pytest.mark.parametrize("kind", ["torque", "usable"])
@@ -195,6 +208,15 @@ def test_noise_is_that_of_the_sensors(model: SerialModel) -> None:
     slow = noise[: len(noise) // mean * mean].reshape(-1, mean, 3).mean(axis=1).std(axis=0)
     true = np.hypot(0.3, TORQUE_NOISE_NM) / np.sqrt(0.1 * RATE_HZ)  # of the mean of so many white readings
     np.testing.assert_allclose(slow, true, rtol=0.25)
+
+
+def test_louder_sensors_are_heard(model: SerialModel, log: JointLog) -> None:
+    rng = np.random.default_rng(0)
+    more = 0.2 * rng.standard_normal(len(log.time))
+    loud = replace(log, torque=log.torque + more[:, None] * ELBOW)
+    quiet, louder = (trials_of(model, [x]).noise[0].std(axis=0) for x in (log, loud))
+    np.testing.assert_allclose(louder[:2], quiet[:2], rtol=0.05)
+    assert louder[2] > 4.0 * quiet[2]
 
 
 # --- what is not listed, and what is left out

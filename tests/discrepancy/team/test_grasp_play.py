@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.team.candidates import shape_steps
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.yielding import displaced
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
+from estimator.arrays import inertia_parameters
 from patchwork import dense
 from team_case import DESIGN, exact, residual_of
 
@@ -47,6 +49,38 @@ def test_travel_between_the_ends_is_left_open(robot):
     assert np.abs(values).max() < 2.5 * PLAY_M
 
 
+def test_nothing_is_open_where_the_force_is_large():
+    case = exact()
+    wrench = case.linear.data.wrench.copy()
+    wrench[:, 1, 3:] = 5.0
+    pressed = replace(case.linear, data=replace(case.linear.data, wrench=wrench))
+    assert CAUSES["grasp_play"].unknowns(pressed, 1, 0, {"force_N": FORCE_N}).width == 0
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_a_payload_that_stays_at_one_end_is_held_elsewhere(robot):
+    """Poses and moments are those of a grasp that is off by as much; of robot 1, of all others and the payload."""
+    case, offset = exact(), np.array([3e-6, -5e-6, 4e-6])  # of the payload, in {i}
+    linear, shared = case.linear, case.shared
+    R_1i, p_1i, pi = shared.grasps.R_1i, shared.grasps.p_1i.copy(), shared.pi.copy()
+    wrist = -R_1i[robot] @ offset
+    p_1i[robot] += wrist
+    if robot == 0:
+        p_1i -= wrist
+        m, c = pi[0], pi[1:4] / pi[0]
+        there = c - wrist
+        pi[1:4] = m * there
+        pi[4:] += inertia_parameters(m * (_about(there) - _about(c)))
+    held = replace(shared, grasps=replace(shared.grasps, p_1i=p_1i), pi=pi)
+    # Their motion is that of the wrists, which are not where they are thought to be, either.
+    expected = residual_of(case) - residual_of(case, shared=held)
+    force = linear.data.wrench[:, robot, 3:]
+    rows = displaced(linear, robot, np.tile(offset, (len(force), 1)), force)
+    for channels in (slice(0, 12), slice(12, 15), slice(15, 18)):
+        scale = np.abs(expected[:, channels]).max()
+        np.testing.assert_allclose(rows[:, channels], expected[:, channels], atol=0.02 * scale)
+
+
 def test_what_is_behind_a_play():
     cause = CAUSES["grasp_play"]
     plain, soft = cause.shapes
@@ -59,3 +93,22 @@ def test_what_is_behind_a_play():
     assert more.shape["contact_per_N"] - less.shape["contact_per_N"] == pytest.approx(size)
     assert size > 0.0
     assert shape_steps(cause.candidate({"play_m": 3e-6}, plain, 1)) == []
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_ends_that_give_way_are_a_healthy_grasp_that_does(robot):
+    """Both are the force over a stiffness, so that neither is named for what the other does within its tolerance."""
+    case, play, flex = exact(), CAUSES["grasp_play"], CAUSES["grasp_flex"]
+    plain, behind = (
+        play.columns(case.linear, robot, 0, {"force_N": FORCE_N, "contact_per_N": contact})[..., 0].ravel()
+        for contact in (0.0, 1.0)
+    )
+    gives = flex.columns(case.linear, robot, 0, flex.shapes[0])[..., 0].ravel()
+    ends = behind - plain
+    compliance = gives @ ends / (gives @ gives)
+    assert compliance == pytest.approx(1.0, abs=0.005)
+    assert np.linalg.norm(ends - compliance * gives) < 0.02 * np.linalg.norm(ends)
+
+
+def _about(c):
+    return c @ c * np.eye(3) - np.outer(c, c)

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt, welch
 
 from discrepancy.team.linear.rows import TEAM_ROWS_HZ, Reduction
 from discrepancy.team.linear.signals import TEAM_TRIM_S, Signals
+from estimator.errors import InputError
+from patchwork import dense
 
 QUANTUM = 2 * np.pi / 2**16
 
@@ -44,6 +46,10 @@ def test_map_is_linear_and_the_same_for_every_column(trial, reduction):
     np.testing.assert_allclose(reduction.operator.toarray() @ x[:, 0, 0], reduction(x[:, 0, 0]), atol=1e-12)
 
 
+def test_constant_stays_constant(trial, reduction):
+    np.testing.assert_allclose(reduction(np.full(len(trial.time), 7.0)), 7.0, rtol=1e-12)
+
+
 def test_hold_is_one_row_its_mean(trial, reduction):
     assert len(reduction.time) - reduction.moving == 1
     x = np.random.default_rng(2).standard_normal(len(trial.time))
@@ -74,6 +80,47 @@ def test_moving_rows_come_at_one_rate(rate, step):
     assert reduction.moving == pytest.approx((10.0 - 2 * TEAM_TRIM_S) * rate / step, abs=1)
 
 
+@pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 8.0, 12.0])
+def test_gain_is_that_of_the_filter(frequency):
+    """1 / (1 + (f / 5 Hz)^6): two passes of a third-order Butterworth filter; zero phase."""
+    trial = signals(40.0, 250.0, ())
+    reduction = Reduction.of(trial)
+    for phase in (0.0, np.pi / 2):
+        row = reduction(np.cos(2 * np.pi * frequency * trial.time + phase))
+        expected = np.cos(2 * np.pi * frequency * reduction.time + phase) / (1.0 + (frequency / 5.0) ** 6)
+        np.testing.assert_allclose(row, expected, atol=0.01)
+
+
+def test_little_noise_folds_down():
+    """Of white noise less than a tenth of what rows keep comes from beyond their Nyquist frequency."""
+    trial = signals(400.0, 100.0, ())
+    reduction = Reduction.of(trial)
+    noise = np.random.default_rng(3).standard_normal(len(trial.time))
+    frequency = np.linspace(0.0, 50.0, 5001)
+    gain = 1.0 / (1.0 + (frequency / 5.0) ** 6) ** 2
+    assert np.var(reduction(noise)) == pytest.approx(np.mean(gain), rel=0.05)
+    high = np.sin(2 * np.pi * 11.0 * trial.time) * np.sqrt(2.0)
+    assert np.var(reduction(high)) < 1e-3
+    spectrum = welch(reduction(noise), 12.5, nperseg=256)[1]
+    low = spectrum[2:80].mean()
+    assert spectrum.max() < 2.0 * low  # nearly white up to 4 Hz, falling beyond
+    assert spectrum[-10:].mean() > 0.05 * low
+
+
+def test_rounded_angles_at_rest_still_rest():
+    reduction = Reduction.of(signals(rounded=True))
+    assert len(reduction.time) - reduction.moving == 1
+    assert reduction.time[-1] == pytest.approx(7.5, abs=0.1)
+
+
+def test_one_joint_that_moves_ends_a_hold():
+    trial = signals()
+    theta = trial.theta.copy()
+    theta[:, 1, 2] += 0.01 * np.sin(2.0 * trial.time)
+    moved = Reduction.of(Signals(trial.time, trial.phi, theta, trial.tau, 100.0))
+    assert moved.moving == len(moved.time)
+
+
 def test_nothing_moves():
     reduction = Reduction.of(signals(20.0, holds=((-1.0, 30.0),)))
     # What settles at the ends of a hold counts as motion.
@@ -85,9 +132,59 @@ def test_nothing_moves():
     assert reduction(x)[-1] == pytest.approx(x[used].mean())
 
 
+def test_holds_that_are_too_short_count_as_motion():
+    holds = tuple((s, s + 1.0) for s in (4.0, 7.0, 10.0))
+    reduction = Reduction.of(signals(20.0, holds=holds))
+    assert reduction.moving == len(reduction.time)
+
+
+def test_every_hold_has_its_row():
+    holds = ((3.0, 8.0), (10.0, 15.0), (17.0, 22.0))
+    reduction = Reduction.of(signals(26.0, holds=holds))
+    np.testing.assert_allclose(reduction.time[reduction.moving :], [5.5, 12.5, 19.5], atol=0.1)
+    assert np.all(np.diff(reduction.time[: reduction.moving]) > 0)
+
+
 @pytest.mark.parametrize("duration", [4.2, 4.5, 5.0])
 def test_short_recording(duration):
     reduction = Reduction.of(signals(duration, holds=()))
     assert len(reduction.time) == pytest.approx((duration - 4.0) * 12.5, abs=1.0)
     x = np.random.default_rng(5).standard_normal(round(100 * duration))
     assert np.all(np.isfinite(reduction(x)))
+
+
+def test_recording_without_anything_left():
+    with pytest.raises(InputError, match="too few"):
+        Reduction.of(signals(4.0, holds=()))
+
+
+def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, reduction):
+    """The same as whole columns of samples; those that show in no row are left out."""
+    rng, samples = np.random.default_rng(5), len(trial.time)
+    direction = rng.standard_normal((samples, 2))
+    spans = [slice(0, 1), slice(300, 420), slice(410, 411), slice(samples - 200, samples)]
+    pieces = [(at, rng.standard_normal((at.stop - at.start, 3))) for at in spans]
+    whole = np.zeros((samples, 2, 3 * len(spans)))
+    for k, (at, values) in enumerate(pieces):
+        whole[at, :, 3 * k : 3 * k + 3] = direction[at, :, None] * values[:, None]
+    expected = reduction(whole)
+    shown = expected.any(axis=(0, 1))
+    assert not shown[0]  # before the first row
+    assert shown.sum() >= 9
+    np.testing.assert_allclose(
+        dense(reduction.of_pieces(direction, pieces)), expected[..., shown], atol=1e-12
+    )
+    assert dense(reduction.of_pieces(direction, [])).shape == (len(reduction.time), 2, 0)
+
+
+@pytest.mark.parametrize(
+    "span", [(0, 0), (1, 2), (190, 1400), (700, 761), (1000, 1001), (1640, 1700), (1, 1999)]
+)
+def test_what_is_there_for_a_while_is_reduced_as_a_dense_matrix_does_it(span):
+    """Holds before, in and after it, too; nothing at all is no rows but noughts."""
+    reduction = Reduction.of(signals(20.0, holds=((3.0, 8.0), (10.0, 15.0))))
+    x = np.zeros((2000, 3, 2))
+    x[slice(*span)] = np.random.default_rng(6).standard_normal((span[1] - span[0], 3, 2))
+    expected = np.einsum("nq,qci->nci", reduction.operator.toarray(), x)
+    np.testing.assert_allclose(reduction(x), expected, atol=1e-12)
+    assert len(reduction.time) > reduction.moving

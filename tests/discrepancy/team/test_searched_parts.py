@@ -10,10 +10,16 @@ import pytest
 import mocobot
 from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team import long
+from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
+from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.rows import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.long import Choice, Left, more_left, times_as_much
+from discrepancy.team.linear.start import start_shared, trial_at, without_bases
+from discrepancy.team.long import Choice, Left, more_left, searched_s, times_as_much
+from discrepancy.team.rig import AsFound, TeamRig
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.estimate.payload import estimate_payload
 
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
 PUSH = {
@@ -65,6 +71,30 @@ def test_a_diagnosis_of_parts_is_of_their_recording(recording) -> None:
     assert WrittenDiagnosis("consistent", (), ("logs/rec.parquet",)).is_of("rec.parquet")
 
 
+@pytest.mark.usefixtures("little_is_searched")
+def test_every_recording_has_its_part(recording) -> None:
+    """As many as fit."""
+    many = [replace(recording, name=f"{k}") for k in range(2)]
+    choice = Choice.of(many)
+    assert [choice.parts[k].name.split(",")[0] for k in choice.taken] == ["0", "1"]
+
+
+@pytest.mark.usefixtures("little_is_searched")
+def test_notes_of_recordings_with_one_name(recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each says how many parts it has, of all that are searched, too."""
+    choice = Choice.of([recording, recording])
+    notes = choice.beside(choice.others).notes
+    assert len(notes) == 2
+    assert all("in 5 parts" in note for note in notes)
+    monkeypatch.setattr(long, "PART_S", 30.0)
+    assert all("in 3 parts" in note for note in Choice.of([recording, recording], whole=True).notes)
+
+
+def test_less_of_many_robots() -> None:
+    assert searched_s(3) == long.SEARCHED_S
+    assert searched_s(2) > searched_s(3) > 3.0 * searched_s(10) > 0.0
+
+
 def test_windows(recording) -> None:
     """Means and what is about them, of every ten seconds of motion or a little more."""
     reduction = Reduction.of(Signals.of(recording))
@@ -87,6 +117,45 @@ def test_windows(recording) -> None:
     assert times_as_much([left], [still]) is times_as_much([still], [left]) is None
 
 
+def drawn(rng: np.random.Generator, windows: int = 12, holds: int = 0) -> Left:
+    """Windows of a hundred normal rows of six channels."""
+    rows = rng.standard_normal((windows, 100, 6)) * [1.0, 1e-3, 10.0, 1.0, 1.0, 1.0]
+    return Left(rows.mean(axis=1), rows.std(axis=1), rng.standard_normal((holds, 6)))
+
+
+@pytest.mark.parametrize("parts", [2, 4])
+def test_noise_is_nothing_else(parts: int) -> None:
+    """Of 300 long recordings with nothing in them, none calls for another part."""
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        more = more_left({k: drawn(rng) for k in range(20)}, [drawn(rng, 12) for _ in range(parts)])
+        assert max(more.values()) < 1.0
+
+
+@pytest.mark.parametrize("what", ["push", "noise", "hold"])
+def test_something_else_is_seen(what: str) -> None:
+    """In one window of one part: a mean of 1.2 standard deviations of a row, a noise three times as loud, a hold."""
+    rng = np.random.default_rng(4)
+    others, searched = {k: drawn(rng, holds=3) for k in range(20)}, [drawn(rng, holds=12) for _ in range(4)]
+    assert max(more_left(others, searched).values()) < 1.0
+    left = others[7]
+    if what == "push":
+        left.means[3, 1] += 1.2e-3
+    elif what == "noise":
+        left.rms[3, 2] *= 3.0
+    else:
+        left.holds[1, 4] += 12.0
+    more = more_left(others, searched)
+    assert [k for k, by in more.items() if by > 1.0] == [7]
+
+
+def test_what_cannot_be_compared_is_not() -> None:
+    rng = np.random.default_rng(5)
+    others = {0: drawn(rng, holds=2)}
+    others[0].holds[:] = 1e3
+    assert max(more_left(others, [drawn(rng), drawn(rng)]).values()) < 1.0
+
+
 def test_chance_is_as_stated() -> None:
     """Without the factor: of 600 long recordings with normal windows, means call for a part in one of a hundred."""
     rng = np.random.default_rng(6)
@@ -98,6 +167,54 @@ def test_chance_is_as_stated() -> None:
         ]
         called += max(more_left(dict(enumerate(parts[4:])), parts[:4]).values()) > 1.0 / long.ODD_FACTOR
     assert 0 < called < 14  # 6 are expected; 14 or more have a chance of 0.3 %
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cause", "parameters", "place"),
+    [("drag", {"coefficient_Ns_per_m": 8.0}, (None, None)), ("joint_friction", FRICTION, (2, 1))],
+)
+def test_what_was_found_is_out_of_what_another_part_leaves(cause, parameters, place) -> None:
+    """A cause at the simulator's own size: with it about as little is left as where it is not; without it far more.
+
+    Friction while a joint rests is left open, and remains.
+    """
+    robot, joint = place
+    where = {} if robot is None else {"robot": robot, "joint": joint}
+    effect = mocobot.make_effect(cause, parameters, **where)
+    clean, other = (mocobot.simulate("b", "random", vias=14, seed=7, effects=e) for e in ([], [effect]))
+    rig = TeamRig.of([clean], estimate_payload([clean]), read_tolerances(None))
+    (candidate,) = (c for c in rig.candidates() if c.key == (cause, robot, joint))
+    values = np.array([parameters.get(p.name, 0.0) for p in candidate.parameters])
+    units = ArmUnit(rig.linear[0].design, np.zeros((3, COUNT)))
+    there = units, rig.linear[0].shared
+    healthy = rms_of(rig.left_in(clean, AsFound(*there, [])))
+    with_it = rms_of(rig.left_in(other, AsFound(*there, [(candidate, values)])))
+    without = rms_of(rig.left_in(other, AsFound(*there, [])))
+    assert np.all(with_it < 1.5 * healthy)
+    assert np.any(without > 5.0 * healthy)
+
+
+def rms_of(left) -> np.ndarray:
+    """Of every channel in motion, shape (C,)."""
+    reduction, rows = left
+    return np.sqrt(np.mean(rows[: reduction.moving] ** 2, axis=0))
+
+
+def test_a_rest_too_short_for_a_row(recording) -> None:
+    """Nothing is left of it, and nothing is held against anything."""
+    names = ("phi", "theta", "tau", "ref")
+    fields = {name: np.repeat(getattr(recording, name)[:1], 450, axis=0) for name in names}
+    fields["tau"] += 1e-6 * np.random.default_rng(0).normal(size=fields["tau"].shape)  # or it is one reading
+    still = replace(recording, time=recording.time[:450], **fields)
+    reduction = Reduction.of(Signals.of(still))
+    assert len(reduction.time) == 0
+    noise = Noise.of([Signals.of(recording)])
+    trial = trial_at(still, start_shared(estimate_payload([recording])), noise, full=False)
+    rows = without_bases(trial, trial.residual)
+    left = Left.of(reduction, rows)
+    assert len(left.means) == len(left.holds) == 0
+    assert more_left({0: left}, [left]) == {0: 0.0}
 
 
 @pytest.mark.slow

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.motion import PHI
-from estimator.rigid_team import pose_error, pose_residual
-from team_case import DESIGN, exact, residual_of
+from estimator.rigid_team import balance, grasp_data, pose_error, pose_residual, poses, start_bases
+from recorded_team import GRASPS
+from team_case import DESIGN, every_sample, exact, residual_of, true_bases, true_shared
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +34,12 @@ def test_residual_of_an_ideal_team_is_zero(linear):
     assert np.abs(linear.residual[:, :split]).max() < 2e-7  # rad, m
     assert np.abs(linear.residual[:, split:]).max() < 0.02  # of 115 N and some 60 N m: what the filters bend
     assert np.sqrt(np.mean(linear.residual[:, split:] ** 2)) < 5e-3
+
+
+def test_bases_are_found_from_grasps_and_joints(case):
+    found = start_bases(*poses(case.signals.phi, case.signals.theta, DESIGN), case.shared)
+    np.testing.assert_allclose(found.R, case.bases.R, atol=1e-8)
+    np.testing.assert_allclose(found.p, case.bases.p, atol=1e-8)
 
 
 def test_pose_errors_by_hand(case):
@@ -101,6 +108,42 @@ def test_derivative_by_readings(case, linear, robot, field, kind):
             np.testing.assert_allclose(got[:, part], expected[:, part], atol=6e-3 * scale)
 
 
+def test_errors_of_readings_add_up(linear):
+    rng = np.random.default_rng(3)
+    phi, theta, tau = rng.standard_normal((3, len(linear.signals.time), 3))
+    parts = linear.of_signals(1, phi=phi) + linear.of_signals(1, theta=theta) + linear.of_signals(1, tau=tau)
+    np.testing.assert_allclose(linear.of_signals(1, phi, theta, tau), parts, rtol=1e-9, atol=1e-9)
+
+
+def test_jacobian_is_one_of_filtered_signals(case, linear):
+    """By brute force at single samples: one of the 21 signals moved, all formulas again."""
+
+    def samples(s):
+        data = grasp_data(s, DESIGN, 100.0)
+        pose = pose_error(data.R_bi, data.p_bi, case.shared, case.bases)
+        return np.concatenate([pose, balance(data, case.shared)[0]], axis=1)
+
+    at = np.arange(200, len(linear.s) - 200, 100)  # every one a multiple of 4: no interpolation
+    for robot in range(3):
+        for k, step in zip(range(21), np.repeat([1e-5, 1e-4, 1e-3, 1e-5, 1e-4, 1e-3, 1e-3], 3), strict=True):
+            ends = []
+            for sign in (1.0, -1.0):
+                s = linear.s[at].copy()
+                s[:, robot, k] += sign * step
+                ends.append(samples(s))
+            expected = (ends[0] - ends[1]) / (2 * step)
+            scale = max(np.abs(expected).max(), 1e-9)
+            np.testing.assert_allclose(
+                every_sample(linear.J)[robot, at][:, :, k], expected, atol=2e-4 * scale
+            )
+
+
+def test_signals_are_value_rate_and_acceleration(case, linear):
+    np.testing.assert_array_equal(linear.s[:, 1, 0:3], case.signals.with_rates(case.signals.phi)[0][:, 1])
+    np.testing.assert_array_equal(linear.s[:, 2, 15:18], case.signals.with_rates(case.signals.theta)[2][:, 2])
+    np.testing.assert_array_equal(linear.s[:, 0, 18:21], case.signals.with_rates(case.signals.tau)[0][:, 0])
+
+
 def test_outside_wrench_takes_from_what_robots_exert(case, linear):
     """With a force from outside the robots exert that much less, and their sum says so."""
     samples = len(case.signals.time)
@@ -137,6 +180,16 @@ def test_moved_grasp_frames(case, linear, robot):
         np.testing.assert_allclose(plain[..., 3:], np.tile(shift, (len(x), 2, 1)), atol=1e-9)
         np.testing.assert_array_equal(plain[..., :3], 0.0)
     np.testing.assert_allclose(x[:, 12:], 0.0, atol=1e-12)
+
+
+def test_truth_is_the_truth():
+    """The unknowns of the case are those of the recording: grasps, inertia about {1}."""
+    shared = true_shared()
+    for i, (R_1i, p_1i) in enumerate(GRASPS):
+        np.testing.assert_allclose(shared.grasps.R_1i[i], R_1i)
+        np.testing.assert_allclose(shared.grasps.p_1i[i], p_1i)
+    bases = true_bases()
+    np.testing.assert_allclose(bases.R[2] @ bases.R[2].T, np.eye(3), atol=1e-12)
 
 
 def test_wrists_are_accelerated_as_the_second_derivative_of_where_they_are(case, linear):
