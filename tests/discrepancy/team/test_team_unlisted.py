@@ -19,7 +19,7 @@ TRUE = Law("tau_2_1", "sine", "phi_2_1", amplitude=0.05, number=12.0, phase_rad=
 @pytest.mark.slow
 def test_an_unlisted_law_is_told_and_carried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque sensor that feels where its joint stands."""
-    monkeypatch.setattr(folder, "draw", lambda *given: None)
+    monkeypatch.setattr(folder, "draw", lambda *given, **more: None)
     found = diagnose_team(recorded("b", [TRUE], seed=2), closed_loop=False)
     values = found.to_dict()
     check_finite(values)
