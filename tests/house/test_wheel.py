@@ -71,7 +71,7 @@ def test_wheel_simulates_on_its_own(wheel: Path, tmp_path: Path) -> None:
         "import mocobot.cli, mocobot.commands, mocobot_sim.scene.models as m;"
         "import mocobot_sim.paper.scoring as t;"
         "print(m.models_dir());"
-        "import mocobot_report.page as r; r.page_assets();"
+        "import mocobot_report.page as r; r.terms(); r.templates().get_template('page.html');"
         "import mocobot_logs.maps as l; [l.builtin_map(name) for name in l.MAPS];"
         "t.payload_truth('a'); mocobot.cli.main(['simulate', '--vias', '1', '--out', 'rec.parquet'])"
     )
