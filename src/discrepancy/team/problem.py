@@ -440,8 +440,8 @@ class TeamProblem:
         """Append the derivatives of the rows by those numbers of a shape that the data determine.
 
         Returns:
-            Indices of the new columns, the current numbers, and the prior standard deviations of their steps. All are empty
-            if the shape has no such numbers.
+            Indices of the new columns, the current numbers, and the prior standard deviations of their steps. All are
+            empty if the shape has no such numbers.
         """
         steps = shape_steps(candidate)
         names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]

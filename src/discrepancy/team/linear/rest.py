@@ -1,4 +1,4 @@
-"""Friction at rest and play between its ends, within their tolerances: what they may do to a healthy team's rows."""
+"""Draw the effect of friction at rest and of grasp play, within their tolerances, on the rows of a healthy team."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Resting:
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
 
     def __call__(self, rng: np.random.Generator, draws: int = 1) -> Array:
-        """Draws of it, shape (draws, n, C)."""
+        """Draw residual rows, shape (draws, n, C)."""
         out = []
         most = draws_at_a_time(self._trial)
         for first in range(0, draws, most):
@@ -75,14 +75,14 @@ class Resting:
         return np.concatenate(out)
 
     def _drawn(self, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-        """Torques of joints and of gimbals at rest [N m], and places in the plays [m], shape (Q, N, 3) each."""
+        """Draw torques of driven joints and gimbals at rest [N m] and positions in the play [m], shape (Q, N, 3) each."""
         driven = self._torque("phi", rng) + self._torque("tau", rng)
         gimbal = self._torque("theta", rng)
         places = [self._between(i, rng) for i in range(self._trial.robots if self._play_m else 0)]
         return driven, gimbal, np.stack(places, axis=1) if places else np.zeros_like(driven)
 
     def _rows(self, driven: Array, gimbal: Array, places: Array) -> Array:
-        """What draws (Q, N, 3, D) of them leave, shape (D, n, C)."""
+        """Residual rows of draws of shape (Q, N, 3, D), shape (D, n, C)."""
         trial, (samples, N, _, D) = self._trial, driven.shape
         rows = trial.reduction(np.sum([trial.J(i, TAU, driven[:, i]) for i in range(N)], axis=0))
         moment = self._moments @ gimbal.reshape(samples, 3 * N, D)
@@ -93,7 +93,7 @@ class Resting:
 
     @cached_property
     def _moments(self) -> Array:
-        """Moment on the payload in {1} by all gimbal torques, shape (Q, 3, 3 N)."""
+        """Moment on the payload in {1} per unit of each gimbal torque, shape (Q, 3, 3 N)."""
         axes_T = np.swapaxes(rate_matrix(self._trial.s[..., THETA]), -1, -2)
         by_robot = np.moveaxis(self._trial.shared.grasps.R_1i @ np.linalg.inv(axes_T), 1, 2)
         return np.asarray(by_robot.reshape(len(by_robot), 3, -1), dtype=np.float64)

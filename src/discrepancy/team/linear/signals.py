@@ -1,4 +1,4 @@
-"""One trial's joint signals as the diagnosis uses them: raw, and gently filtered with derivatives."""
+"""Joint signals of one trial: as measured, and low-pass filtered with their derivatives."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ class Signals:
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
-        """The signals of a recording: untouched, or true ones where its metadata know the robots as they are.
+        """Take the signals of a recording, converted to true joint values if the metadata contain the robots' calibration.
 
-        Where an encoder holds its value they are interpolated.
+        Where an encoder holds its value, the signals are interpolated.
         """
         recording, held, doubt = without_held(recording)
         known = recording.metadata
@@ -63,11 +63,11 @@ class Signals:
     def minus(
         self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0
     ) -> Signals:
-        """The signals without an error of the sensors."""
+        """Subtract sensor errors from the signals."""
         return replace(self, phi=self.phi - phi, theta=self.theta - theta, tau=self.tau - tau)
 
     def smooth(self, moves: Literal["phi", "theta", "tau"], robot: int, joint: int) -> Array:
-        """A signal of one joint, filtered so that its rate tells rest from sliding, shape (Q,)."""
+        """Filter one joint's signal so that its rate separates rest from sliding, shape (Q,)."""
         usual, kind = TEAM_SMOOTH_HZ, ("phi", "theta", "tau").index(moves)
         cutoff_hz = usual if self.smooth_hz is None else float(self.smooth_hz[kind, robot, joint])
         which = moves, robot, joint
