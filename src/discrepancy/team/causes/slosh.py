@@ -23,7 +23,7 @@ SWING_MOST, SWING_START, SWING_EASED = 0.95, 0.9, 0.6
 """Largest swing over the length; the same during the iteration; largest relative reduction of the restoring force."""
 
 SWING_CALM, SWING_WEIGHT, SWING_LEAST_WEIGHT = 0.5, 0.7, 0.3
-"""Change over that of the last iteration, from which iterations oscillate; factor that then damps them; least damping."""
+"""Change over the last change from which the iteration counts as oscillating; its step factor then; the least step."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Pendulum:
         return float(2.0 * self.damping_ratio * np.sqrt(self.gravity / self.length_m))
 
     def restored(self, steeper: float) -> Pendulum:
-        """Return a pendulum with a restoring force that is steeper by ``steeper`` [1/s^2], and the same damping force."""
+        """Return a pendulum with a restoring force steeper by ``steeper`` [1/s^2] and the same damping force."""
         stiff = self.gravity / self.length_m + steeper
         ratio = 0.5 * self.damping_per_s / np.sqrt(stiff)
         return Pendulum(self.gravity / stiff, float(ratio), self.gravity, self.rate_hz)

@@ -1,4 +1,4 @@
-"""Resolution of each sensor, estimated from the recording: rounding step, white noise, and chatter of the torque loop."""
+"""Resolution of each sensor, estimated from the recording: rounding step, white noise, and torque chatter."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ NOISE_ABOVE_HZ = 25.0
 """Frequency above which nothing moves, so that signals contain noise only [Hz]. Chosen."""
 
 NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
-"""Noise between spectral lines over total noise, below which the lines count as oscillation; amplitude of such lines over
-the torque's rounding step, from which they count as chatter. Chosen.
-"""
+"""Noise between spectral lines over total noise, below which the lines count as oscillation; amplitude of such lines
+over the torque's noise, from which they count as chatter. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ def _levels(signals: Signals) -> tuple[Array, Array]:
 
 
 def _fast(high: float, x: Array, rate_hz: float) -> tuple[Array, Array]:
-    """Root mean square above a frequency: including lines and robust against short disturbances; and between the lines."""
+    """Root mean square above a frequency: robust and including spectral lines; and between the lines."""
     band = butter(4, high, btype="high", fs=rate_hz, output="sos")
     fast = np.asarray(sosfiltfilt(band, x, axis=0), dtype=np.float64)
     over_time = 1.4826 * np.median(np.abs(fast), axis=0)
@@ -138,9 +137,8 @@ def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
 
 
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
-"""Noise of rates up to which the usual cut-off holds; least cut-off of noisier signals; noise over the rounding step from
-which noise counts. Chosen.
-"""
+"""Noise of rates up to which the usual cut-off holds; least cut-off of noisier signals; noise over the rounding step
+from which noise counts. Chosen."""
 
 PHASE_TRAVEL = 4.0
 """Steps of travel after which a rounding error is drawn again. Chosen."""
@@ -151,9 +149,7 @@ Chosen.
 """
 
 CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
-"""Cut-off over the frequency of chatter, and its limit over the sampling rate. Chosen: the mean of torque times angle must
-pass.
-"""
+"""Cut-off over the frequency of chatter, and its limit over the sampling rate. Chosen: must pass the chatter."""
 
 MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
 """Frequency up to which the model's own error lies, and its share above. Chosen."""

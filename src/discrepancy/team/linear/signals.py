@@ -15,7 +15,7 @@ from estimator.recording.metadata import Sampling
 from estimator.recording.model import Recording
 
 TEAM_SMOOTH_HZ = 12.0
-"""Cut-off of signals before their rounding is drawn again, and of rates that separate rest from sliding [Hz]. Chosen."""
+"""Cut-off of signals whose rounding is drawn again, and of rates that separate rest from sliding [Hz]. Chosen."""
 
 TEAM_TRIM_S = 2.0
 """Time left out at both ends of a recording [s]. Chosen."""
