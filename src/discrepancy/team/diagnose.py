@@ -279,7 +279,7 @@ def search_team(
 
 
 def _beyond(problem: TeamProblem, state: State, new: frozenset[str]) -> bool:
-    """Whether the search must continue in a new problem, because the noise changed or the linearisation is inaccurate."""
+    """Whether the search needs a new problem, because the noise changed or the linearisation is inaccurate."""
     try:
         return not new.isdisjoint(LEAVE_OPEN) or bent(problem, state)
     except InputError:  # impossible robots: a cause that acts on them is still missing

@@ -344,7 +344,7 @@ class TeamRig:
         return scale_of_response(self.sensed.noise, self.linear[trial].signals)
 
     def quantities(self, trial: int) -> dict[str, Array]:
-        """RMS over the robots of grasp speed [m/s], distance from the mean position [m] and load [N m], shape (n,) each."""
+        """RMS over robots and axes of grasp velocity [m/s], displacement [m] and torque [N m], shape (n,) each."""
         linear = self.linear[trial]
         at = linear.reduction.sample
         velocity, h = linear.data.twist[at, :, 3:], linear.data.p_bi[at]

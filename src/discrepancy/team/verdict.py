@@ -205,7 +205,7 @@ class _TeamJudge(Judge):
         return [*problem.shared, *(k for own in problem.local for k in own)]
 
     def before(self) -> Side:
-        """The state without causes. It keeps the noise and spreads found with them, so that these do not absorb the causes."""
+        """The state without causes, with the noise and spreads found with them, so that these absorb no cause."""
         p, prior = self.state.posterior, self.state.posterior.prior.copy()
         nominal = np.append(self.problem.prior((), None), np.zeros(len(prior)))
         own = [k for c in self.state.chosen for k in (*c.group.columns, *c.forms)]

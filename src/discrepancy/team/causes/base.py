@@ -214,7 +214,7 @@ class Cause(ABC):
 
 
 class ReadingError(Cause):
-    """An error of one robot's readings, linear in its parameters. It is removed from the signals, not added to the model."""
+    """An error of one robot's readings, linear in its parameters; it is removed from the signals."""
 
     @abstractmethod
     def errors(

@@ -244,7 +244,7 @@ SLOSH_LENGTHS_M = (0.04, 1.0)
 """Range of lengths. Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones resemble drag or play."""
 
 OFF = ("off_x_m", "off_y_m", "off_z_m")
-"""Shape numbers: from the centre of mass to the pivot at which the columns are computed, in {1}. It may be approximate."""
+"""Shape numbers: from the centre of mass to the approximate pivot at which the columns are computed, in {1}."""
 
 
 class Slosh(Cause):
