@@ -145,7 +145,7 @@ class Choice:
 
 
 def searched_s(robots: int) -> float:
-    """Duration of recordings that is searched [s]. It falls with the number of robots, because each minute costs more."""
+    """Duration of recordings that is searched [s]; it falls with the number of robots, which makes minutes costlier."""
     return SEARCHED_S * (3.0 / robots) ** SEARCHED_POWER
 
 

@@ -13,19 +13,19 @@ from discrepancy.team.causes.base import Cause, Shape
 from estimator.arrays import Array
 
 CABLES, CABLE_LINES = 10_000, 100
-"""Number of distinguishable cables: directions 0.1 rad apart times eight stretches; lines 0.1 m apart at the payload."""
+"""Distinguishable cables: directions 0.1 rad apart times eight stretches; their lines at the payload, 0.1 m apart."""
 
 TETHER_LEVER_M, TETHER_FINER_M, TETHER_STEP_M = 0.4, (0.2, 0.07, 0.025), 0.02
 """Levers of a payload tether [m]: first grid, finer grids, and step of finite differences. Chosen."""
 
 CABLE_STIFFENS_RANGE_PER_M, CABLE_STIFFENS_STEP_PER_M, STRAPS = (-3.0, 1000.0), 20.0, 20
-"""Relative growth of a strap's stiffness per metre: range, step of finite differences, distinguishable values. Chosen."""
+"""Relative growth of a strap's stiffness per metre: range, step of finite differences, distinguishable values."""
 
 CABLE_NEAR_PER_M, CABLE_NEAR_RANGE_PER_M, CABLE_NEAR_STEP_PER_M = 1.0, (0.05, 5.0), 0.4
-"""Inverse distance of the anchor [1/m]: first value, range, and step of finite differences. Chosen: the size of a room."""
+"""Inverse distance of the anchor [1/m]: first value, range, and step of finite differences. Chosen: size of a room."""
 
 CABLE_STRETCHES_M, CABLE_STRETCH_STEP_M = (0.03, 0.0, 0.1), 0.015
-"""Stretch at home [m] tried first (sometimes slack, half of the time, never), and step of finite differences. Chosen."""
+"""Stretch at home [m] tried first (sometimes slack, half of the time, never); step of finite differences. Chosen."""
 
 CABLE_TURNS, CABLE_TURN_STEP = (-0.45, 0.45), 0.15
 """Slopes across each of six axes that give 24 first directions of a cable; step of finite differences. Chosen."""
@@ -221,7 +221,7 @@ class Tether(Cause):
 
 
 SLOSH_REACH_M = 1.5
-"""Largest distance from the centre of mass to the attachment point [m]. Chosen: no payload of three robots is larger."""
+"""Largest distance from centre of mass to attachment point [m]. Chosen: no payload of three robots is larger."""
 
 TETHER_POINTS = 1000
 """Distinguishable points of a payload, 0.1 m apart: prior odds of an attachment at a grasp against any other point."""

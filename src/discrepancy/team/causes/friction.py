@@ -78,13 +78,13 @@ PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 """Factors of a presliding displacement tried next. Chosen."""
 
 PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
-"""Presliding angles tried first, and their range [rad]. Chosen: bristles yield by 0.2 to 2 mrad; a 16-bit step is 0.1 mrad."""
+"""Presliding angles tried first, and their range [rad]. Chosen: bristles yield by 0.2 to 2 mrad."""
 
 REST_KNOTS_S = 0.05
-"""Time between knots of friction at rest, which follows the load [s]. Derived: faster changes do not pass the rows' filter."""
+"""Time between knots of friction at rest, which follows the load [s]. Derived: the rows' filter stops faster changes."""
 
 TURN_RAD_PER_S = 1e-2
-"""Speed below which friction may not have reversed yet after a turn, if it keeps its direction at rest [rad/s]. Chosen."""
+"""Speed below which friction with a kept direction may not have reversed yet after a turn [rad/s]. Chosen."""
 
 KEPT = "kept_below_rad_per_s"
 """Shape number: speed below which friction keeps its direction, with a presliding too stiff for encoders [rad/s]."""

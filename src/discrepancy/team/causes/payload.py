@@ -107,8 +107,8 @@ class Drag(Cause):
     parameters = (
         "coefficient_Ns_per_m", "turning_Nms_per_rad", "quadratic_Ns2_per_m2", "turning_quadratic_Nms2_per_rad2",
     )  # fmt: skip
-    # Second: the first at half a metre. The first covers a plate of 0.4 m^2 in air at 0.2 m/s, a typical carrying speed. The
-    # quadratic ones are equal to these at 1 m/s and 1 rad/s.
+    # The first covers a plate of 0.4 m^2 in air at 0.2 m/s, a typical carrying speed; the second is the first at half
+    # a metre. The quadratic ones are equal to these at 1 m/s and 1 rad/s.
     tolerances = (0.05, 0.01, 0.05, 0.01)
     at = "payload"
     positive: ClassVar = parameters
@@ -155,7 +155,7 @@ def _squared(v: Array) -> Array:
 
 
 MASS_SPANS = 5
-"""Last trial up to which a mass may change in a span of trials. Chosen: every span of five trials, later only a lasting change."""
+"""Number of trials within which every span of trials is a shape. Chosen: a later change of mass can only be lasting."""
 
 MASS_TRIALS = 12
 """Last trial in which a mass change may begin. Chosen: longer series are logs, not experiments."""

@@ -292,7 +292,7 @@ def _phi_error(phi, joint, arm):
 
 
 class BaseTilt(Cause):
-    """{b} is turned by the rotation vector (roll, pitch, 0), in its own axes; yaw is a nuisance parameter of each trial."""
+    """{b} is turned by the rotation vector (roll, pitch, 0) in {b}; yaw is a nuisance parameter of each trial."""
 
     title = "tilt of {base}"
     family = "base_tilt"

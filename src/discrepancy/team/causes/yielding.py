@@ -21,7 +21,7 @@ RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
 """Time constants tried first [s]. Chosen: a factor of about four apart, which Gauss-Newton steps bridge."""
 
 RELAXATION_RANGE_S = (0.001, 0.5)
-"""Range of time constants [s]. Derived: shorter ones shift a motion of 1 Hz by less than 0.6 %; longer ones are creep."""
+"""Range of time constants [s]. Derived: shorter ones shift a 1 Hz motion by less than 0.6 %; longer ones are creep."""
 
 RELAXATION_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 """Factors of a time constant tried next. Chosen."""
@@ -60,7 +60,7 @@ def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
 
 
 BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
-"""Compliance times moving mass over the squared time constant, tried first (1/4: critical damping); finer factors. Chosen."""
+"""Compliance times moving mass over squared time constant, tried first (1/4: critical damping); finer factors."""
 
 
 class BaseCompliance(Yielding):
