@@ -171,7 +171,7 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
     if place.name in ("tau reading", "driven torque"):
         sign = (
             1.0 if place.name == "tau reading" else -1.0
-        )  # the sensor does not read a torque beside the spring
+        )  # the sensor does not read a torque parallel to the spring
         return sign * linear.J.at(robot, TAU, at)[:, None, None, :, joint]
     if place.name == "gimbal torque":
         moment = moment_about_axes(linear.s[at][:, robot, THETA], np.eye(3)[joint])

@@ -145,7 +145,7 @@ class Hypothesis:
         beside = [*self.carried.values(), *(group.columns for group, _ in self.laws)]
         if beside:
             x = np.where(self._is(k for own in beside for k in own), parts.step(x, prior, others), 0.0)
-        # Then fit the causes with these fixed, so that healthy parts take no share of their effect.
+        # Then fit causes and unknowns with these fixed and all other parts as designed.
         causes = (group.columns for _, group in self.causes)
         alone = self._is(k for own in (p.shared, *p.local, *causes) for k in own)
         x = parts.step(x, np.where(alone, prior, 0.0), others)

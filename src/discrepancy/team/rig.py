@@ -159,7 +159,7 @@ class TeamRig:
         return self._each(lambda t: self._columns(t, candidate), len(self.linear))
 
     def _each(self, of: Callable[[int], Array], count: int) -> Sequence[Array]:
-        """Compute several arrays; those of long recordings are computed anew at each access."""
+        """Compute several arrays; those of long recordings are computed at each access."""
         return OneByOne(of, count) if is_filed(self.linear[0]) else list(map(of, range(count)))
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:

@@ -35,8 +35,7 @@ def signature(rig: TeamRig, z: Sequence[Array]) -> dict[str, Any]:
         ``chi2_per_n`` overall and by ``kind`` of channel, ``channel`` and ``trial``; ``moving_share``: share of the
         excess during motion; ``correlation`` of its size with the rig's explanatory quantities; ``worst_channel``;
         ``frequency_hz``: median frequency of that channel; ``along``: shares of the residual along the directions of
-            its
-        likeliest sources; ``sentence``.
+        its likeliest sources; ``sentence``.
     """
     squares = np.concatenate([(x**2) for x in z])
     out: dict[str, Any] = {"chi2_per_n": float(squares.mean())}

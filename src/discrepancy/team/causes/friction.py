@@ -81,7 +81,7 @@ PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
 """Presliding angles tried first, and their range [rad]. Chosen: bristles yield by 0.2 to 2 mrad."""
 
 REST_KNOTS_S = 0.05
-"""Time between knots of friction at rest, which follows the load [s]. Derived: the rows' filter stops faster changes."""
+"""Time between knots of friction at rest, which follows load [s]. Derived: the rows' filter stops faster changes."""
 
 TURN_RAD_PER_S = 1e-2
 """Speed below which friction with a kept direction may not have reversed yet after a turn [rad/s]. Chosen."""

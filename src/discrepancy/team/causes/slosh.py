@@ -217,7 +217,7 @@ def _filters(pendulum: Pendulum) -> tuple[list[Array], Array]:
 
 
 SLOSH_SECONDS = 150
-"""Number of distinguishable second modes. Their prior odds keep a second mode from fitting noise beside the first."""
+"""Number of distinguishable second modes. Their prior odds keep a second mode from fitting noise."""
 
 SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
 """Changes of a heading tried next, and the step of its finite difference. Chosen."""
@@ -252,9 +252,9 @@ class Slosh(Cause):
 
     Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length; large ones
     obey ``swung``. The damper is fixed to the payload; v is the speed of a mass that turns with the payload. The
-    payload feels -mass x'' at the point, and the reaction of raising the mass. The damper also exerts the moment of 2
-    zeta w mass (x' - v) one length below the point. The payload's own parameters include the pendulum's weight and
-    rigid motion.
+    payload feels -mass x'' at the point, and the reaction of raising the mass. The damper acts at the mass, so it also
+    exerts the moment of its force 2 zeta w mass (x' - v), one length below the point. The payload's own parameters
+    include the pendulum's weight and rigid motion.
 
     The mass may have two modes with one damping ratio. With ``across_length_m`` in its shape it is Blackburn's
     pendulum, like a liquid in an oblong box: it swings on ``length_m`` along ``heading_rad`` (from x of {1}, about z)
