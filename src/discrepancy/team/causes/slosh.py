@@ -328,15 +328,7 @@ class Slosh(Cause):
 
     def finer(self, shape):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
-        more = (
-            0.5,
-            0.7,
-            0.85,
-            0.95,
-            1.05,
-            1.2,
-            1.4,
-        )  # more damping reduces the swing, so the mass is estimated larger
+        more = (0.5, 0.7, 0.85, 0.95, 1.05, 1.2, 1.4)  # damping reduces the swing: the mass comes out larger
         length, damping = shape["length_m"], shape["damping_ratio"]
         near = [{"length_m": length * x} for x in longer]
         near += [

@@ -191,9 +191,7 @@ class GraspFlex(Yielding):
     clipped = ("turning_rad_per_N",)
     at = "grasp"
     shapes = (
-        *(
-            {"relaxation_s": time_s} for time_s in sorted(RELAXATIONS_S)
-        ),  # unlike a base, no large mass moves along
+        *({"relaxation_s": time_s} for time_s in sorted(RELAXATIONS_S)),  # no large mass moves along
         *({"relaxation_s": min(RELAXATIONS_S), "offset_m": offset_m} for offset_m in GRASP_TURNS_M),
     )
     determined: ClassVar = {**Yielding.determined, "offset_m": 0.1}
