@@ -177,7 +177,7 @@ def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
 
 
 def latent_whitening(problem: TeamProblem, state: State) -> list[Array] | None:
-    """Whitening against the random states of the chosen causes, shape (n, C, C) a trial; None if they have none."""
+    """Whitening against the latent states of the chosen causes, shape (n, C, C) a trial; None if they have none."""
     rig, covariance = problem.rig, None
     for candidate, values in found_in(problem, state).active:
         if candidate.transient is not None:

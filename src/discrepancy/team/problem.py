@@ -128,8 +128,8 @@ class TeamProblem:
         tolerance: prior standard deviation of every column in a healthy team, shape (K,).
         listed: other shapes of the causes, whose columns are not in the problem.
         shared, local: columns of the unknowns that all trials share, and of each trial's own.
-        opened: for each trial, matrices that whiten the rows against the model discrepancy of the chosen causes,
-            shape (n, C, C); None without model discrepancy.
+        opened: for each trial, matrices that whiten the rows against latent states of the chosen causes, such as
+            friction at rest, shape (n, C, C); None without latent states.
         candidates: candidate of every group, by the group's identity.
         catalogue: columns that stay the same during the search.
         there: parameter values at the linearisation point, shape (K,).
@@ -167,7 +167,7 @@ class TeamProblem:
     # --- columns
 
     def rows_of(self, x: Sequence[Array]) -> list[Array]:
-        """Whiten rows (n, C, ...) of every trial against the model discrepancy of the chosen causes."""
+        """Whiten rows (n, C, ...) of every trial against the latent states of the chosen causes."""
         if self.opened is None:
             return list(x)
         return [
@@ -190,7 +190,7 @@ class TeamProblem:
         return self.cells.add_rows(self.spectra(columns))
 
     def beside(self, X: NDArray[Any]) -> NDArray[Any]:
-        """Whiten rows of the cells, shape (C, n, k), against the model discrepancy of the chosen causes."""
+        """Whiten rows of the cells, shape (C, n, k), against the latent states of the chosen causes."""
         if self.opened is None:
             return X
         out = np.empty_like(X)
@@ -549,7 +549,7 @@ class Catalogue:
         """Compute the catalogue of a rig.
 
         Args:
-            plain: the rig's problem, without columns and without model discrepancy.
+            plain: the rig's problem, without columns and without latent states.
             near: catalogue of a nearby rig with the same whitening. Its other shapes are reused, because they only
                 serve as proposals.
         """
@@ -604,7 +604,7 @@ def team_problem(
 
     Args:
         rig: the linearised recordings.
-        opened: whitening against the model discrepancy of the chosen causes, shape (n, C, C) a trial.
+        opened: whitening against the latent states of the chosen causes, shape (n, C, C) a trial.
         catalogue: columns of this rig, or of a nearby one with the same whitening. None computes them.
     """
     linears = list(zip(rig.linear, rig.whitening, strict=True))

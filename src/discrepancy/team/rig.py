@@ -84,7 +84,7 @@ class TeamRig:
         resting: for each cause that acts as noise at rest, its spread over its tolerance.
         jobs: parallel processes.
         laws: when to search for unlisted laws: ``auto`` (if the noise is excessive), ``always`` or ``never``.
-        kept: cache of the causes' random states.
+        kept: cache of the causes' latent states.
     """
 
     recordings: tuple[Recording, ...]

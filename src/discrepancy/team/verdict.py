@@ -245,7 +245,7 @@ def traces(rig: TeamRig, opened: Sequence[Array] | None, left: Mapping[str, Sequ
 
     Args:
         rig: the recordings.
-        opened: whitening against the random states of the chosen causes, shape (n, C, C) a trial; or None.
+        opened: whitening against the latent states of the chosen causes, shape (n, C, C) a trial; or None.
         left: residual rows after that whitening, ``before`` and ``after``, shape (n, C) a trial.
     """
     out = []

@@ -167,7 +167,7 @@ class Cause(ABC):
         return self.determined[name] * abs(number)
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
-        """Columns of random states that the cause adds to one trial, such as the friction of a joint at rest."""
+        """Columns of latent states that a cause adds to one trial, such as the friction torque of a joint at rest."""
         return Patches(trial.residual.shape)
 
     def place(self, candidate: Candidate) -> str:

@@ -151,7 +151,7 @@ class Friction(Cause):
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
-        """Random states of friction that does not slip: any torque up to its limit, which changes with the load.
+        """Latent states of friction that does not slip: any torque up to its limit, which changes with the load.
 
         With presliding, they include the displacement before the first slip, and a deviation from Prandtl's law until
         friction slips. With a kept direction, they include any value while the joint turns round or moves too slowly to

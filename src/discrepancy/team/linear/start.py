@@ -120,7 +120,7 @@ def _regression(rows: Array, signals: Array) -> Array:
 def with_adjusted_signals(
     linear: TrialLinear, noise: SignalNoise, explained: Array | float = 0.0
 ) -> TrialLinear:
-    """Linearise a trial at its most likely true signals, which leave no residual except what the causes explain.
+    """Linearise a trial at its most likely true signals, whose residual equals the part that causes explain.
 
     Columns of scales, lengths and masses depend on the signals. At measured signals the same noise is in columns and
     residual, which biases the estimate. Adjusted signals avoid that (Deming, Statistical Adjustment of Data, 1943).
@@ -148,7 +148,7 @@ def noise_of(
 ) -> Signals:
     """Estimate the noise in signals from their residual; angles and torques of shape (Q, N, 3).
 
-    The signals contain no other errors.
+    The signals must contain no other errors.
     """
     data = grasp_data(filtered(signals), linear.arms, signals.rate_hz)
     each = _noise_in(data, shared, bases, linear.reduction, noise)
@@ -280,7 +280,7 @@ def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) 
 
 
 def without_bases(trial: TrialLinear, rows: Array) -> Array:
-    """Subtract from rows, shape (n, C), what errors of the bases can explain. Each channel is scaled by its own rms."""
+    """Fit errors of the base poses to rows, shape (n, C), and subtract them. Each channel is scaled by its own rms."""
     if not rows.size:
         return rows
     scale = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
