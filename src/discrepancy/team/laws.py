@@ -482,7 +482,8 @@ class Laws:
     def pieces(self, group: Group, law: Law, mean: Array) -> Iterator[Piece]:
         """Split a law into functions with one amplitude each, as the simulator takes them.
 
-        If the law has no constant of its own, an extra constant removes the mean, which other parameters describe.
+        If the law has no constant of its own, an extra constant removes its mean. Other parameters, such as sensor
+        zeros, already include that mean.
 
         Args:
             group: the law.
