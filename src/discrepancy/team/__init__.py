@@ -1,1 +1,1 @@
-"""The mocobot team as a rig of the diagnosis."""
+"""Diagnosis of a team of mobile robots that carries a payload."""

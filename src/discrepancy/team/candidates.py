@@ -1,4 +1,4 @@
-"""Every cause at every place, in every shape, and what it puts into a trial."""
+"""List every cause at every place and in every shape, and compute the residual that causes explain."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _GROUPS: dict[str, tuple[str, ...]] = {
 
 
 def places_of(candidate: Candidate) -> tuple[int, NDArray[np.intp]] | None:
-    """Where a candidate's parameters are in ``ArmUnit.x`` of a team: the robot's row, columns; None where nowhere."""
+    """Row and columns of a candidate's parameters in ``ArmUnit.x`` of a team; None if they are not part of it."""
     groups = _GROUPS.get(candidate.cause)
     if groups is None or candidate.transient is not None:
         return None
@@ -39,18 +39,18 @@ def places_of(candidate: Candidate) -> tuple[int, NDArray[np.intp]] | None:
 
 
 def origin_of(candidate: Candidate, origin: ArmUnit | None) -> Array | None:
-    """Values of a candidate's parameters where all is linear, shape (k,), in their own units; None where all is 0.
+    """Values of a candidate's parameters at the linearisation point, shape (k,); None if all are zero.
 
     Args:
         candidate: of a team's catalogue.
-        origin: how far the robots are there from where they were believed to be, ``x`` of shape (N, COUNT).
+        origin: linearisation point of the robots minus their assumed parameters, ``x`` of shape (N, COUNT).
     """
     place = places_of(candidate)
     return None if origin is None or place is None else np.asarray(origin.x[place], dtype=np.float64)
 
 
 def beyond(candidate: Candidate, values: Array, origin: ArmUnit | None) -> Array:
-    """Values of a candidate beyond what the robots, as they were found, have already."""
+    """Values of a candidate minus those that the linearisation point of the robots already includes."""
     there = origin_of(candidate, origin)
     return values if there is None else values - there
 
@@ -61,7 +61,7 @@ Tolerances = Mapping[str, float]
 def every_candidate(
     robots: int, tolerances: Mapping[str, Tolerances], excluded: Collection[str]
 ) -> list[Candidate]:
-    """Every cause of the catalogue at every place of N robots, but for transients.
+    """List every cause of the catalogue at every place of N robots, except for transients.
 
     Args:
         robots: N.
@@ -80,7 +80,7 @@ def every_candidate(
 
 
 def in_shapes(candidate: Candidate, shapes: Sequence[Shape], trials: int) -> list[Candidate]:
-    """The candidate in each of some shapes but its own that there can be in so many trials."""
+    """The candidate in each of some other shapes that the number of trials allows."""
     cause = CAUSES[candidate.cause]
     if candidate.transient:
         return [candidate.in_shape(shape) for shape in shapes]
@@ -93,14 +93,14 @@ def in_shapes(candidate: Candidate, shapes: Sequence[Shape], trials: int) -> lis
 
 
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-    """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
+    """Change each shape number that the data determine both ways; also return the total step."""
     steps = []
     cause = CAUSES[candidate.cause]
     for name in (name for name in cause.determined if name in candidate.shape):
         number = candidate.shape[name]
         step = cause.slope_step(name, number)
         ends = number - step, number + step
-        if name == "ramp_s":  # with longer ones it would be smaller, and no other
+        if name == "ramp_s":  # the push would shrink with a longer ramp
             ends = ends[0], min(ends[1], 0.5 * candidate.shape["duration_s"])
         less, more = (candidate.in_shape({**candidate.shape, name: x}) for x in ends)
         steps.append((less, more, ends[1] - ends[0]))
@@ -110,11 +110,12 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
 def explained_by(
     active: Sequence[tuple[Candidate, Array]], origin: ArmUnit
 ) -> Callable[[int, TrialLinear], Array] | None:
-    """What causes put into every sample's residual of a trial, given its number, shape (Q, C); None of none.
+    """Make a function that returns the residual of every sample that causes explain, shape (Q, C); None without causes.
 
     Args:
         active: causes with their values, in their own units.
-        origin: how far the robots are from where they were believed to be: what these are off by is not explained.
+        origin: linearisation point of the robots minus their assumed parameters. Causes that are such parameters are
+            not included.
     """
     others = [(c, beyond(c, values, origin)) for c, values in active if places_of(c) is None]
     if not others:
@@ -132,5 +133,5 @@ def explained_by(
 
 
 def indices(candidate: Candidate) -> tuple[int, int]:
-    """Its robot and joint, from 0 (0 where it has none)."""
+    """Robot and joint of a candidate, from 0 (0 if it has none)."""
     return (candidate.robot or 1) - 1, (candidate.joint or 1) - 1

@@ -1,4 +1,4 @@
-"""Recorded commands simulated again with the estimated team, and how far that is from the recording."""
+"""Simulate recorded commands with the estimated team, and measure the deviation from the recording."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 
 MARGIN_SHARE = 0.02
-"""Simulations whose chi-square differs by less are equally good; so are all within the noise, at 1 and less. Chosen."""
+"""Relative difference of chi-square below which simulations are equally good. Chosen."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """How far one trial's response to its commands is from the simulated one.
+    """Deviation of one trial's recorded response from the simulated one.
 
     Attributes:
         rms: by channel, in the channel's unit.
@@ -48,7 +48,12 @@ class Response:
 
     @classmethod
     def of(cls, errors: Mapping[str, Array], scales: Mapping[str, tuple[Array, Array]]) -> Response:
-        """From recorded minus simulated channels, and standard deviations of the noise and of the motion in each."""
+        """Compute the deviation.
+
+        Args:
+            errors: recorded minus simulated, by channel, shape (Q, N, 3).
+            scales: standard deviations of noise and of motion, by channel, shape (N, 3) each.
+        """
         rms, nrmse, squares = {}, {}, []
         for name, error in errors.items():
             noise, motion = scales[name]
@@ -60,13 +65,13 @@ class Response:
 
 @dataclass(frozen=True)
 class Gain:
-    """Responses of every trial that can be simulated, without and with the causes, by what the other trials say.
+    """Responses of every trial that can be simulated, without and with the causes, fitted to the other trials.
 
     Attributes:
-        before, after: one per trial; None where the simulation failed.
-        held_out: False for a single trial, which predicts itself, and where a cause is there in some trials only, which
-            all have to tell it.
-        as_found: with the causes and every healthy part as far off as it is found, too; empty where that was not asked.
+        before, after: one per trial; None if the simulation failed.
+        held_out: whether trials are predicted from others. False for a single trial, or if a cause acts in some trials
+            only, because all trials then estimate it.
+        as_found: responses with the causes and with all deviations of healthy parts; empty if not requested.
     """
 
     before: tuple[Response | None, ...]
@@ -82,28 +87,28 @@ class Gain:
 
     @property
     def is_better_as_found(self) -> bool:
-        """Whether every trial can be simulated with all as found, and is told better so than with the causes alone."""
+        """Whether the deviations of healthy parts improve the response of all trials further."""
         return bool(self.as_found) and mean_chi2(self.as_found) < mean_chi2([b for _, b in self.pairs])
 
 
 def is_worse(chi2_per_n: float, than: float) -> bool:
-    """Whether simulated responses are worse than others; within the noise (1) none is."""
+    """Whether a mean chi-square is worse than another; values up to 1 are within the noise and equally good."""
     return chi2_per_n > max(than, 1.0) * (1.0 + MARGIN_SHARE)
 
 
 def mean_chi2(trials: Sequence[Response | None]) -> float:
-    """Mean chi-square per number; infinite where a trial could not be simulated."""
+    """Mean chi-square per number; infinite if a trial could not be simulated."""
     return float(np.mean([np.inf if r is None else r.chi2_per_n for r in trials]))
 
 
 LEAST_MOMENT_RATIO = 1e-3
-"""Least principal moment of a simulated payload over the largest: a body needs some. Chosen."""
+"""Least principal moment of a simulated payload over the largest. Chosen: a body needs some inertia."""
 
 TEAM_TIMESTEP_S = 1e-3
-"""Step of the closed loop's simulation: the integrator's error stays below the sensors' noise."""
+"""Step of the closed-loop simulation [s]. Chosen: the integration error stays below the sensor noise."""
 
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
-"""Integration errors of the closed loop, measured at steps of 1 and 0.25 ms."""
+"""Integration errors of the closed loop. Measured: steps of 1 ms against 0.25 ms."""
 
 
 def team_of(
@@ -113,17 +118,17 @@ def team_of(
     initial: tuple[Array, Array] | None = None,
     units: ArmUnit | None = None,
 ) -> TeamScene:
-    """The team that the unknowns describe, effects applied.
+    """Build the team that the unknowns describe, with effects applied.
 
     Args:
         shared: grasps and inertial parameters.
-        bases: where the robots stand, in {b1}.
-        effects: what is off.
+        bases: poses of the bases in {b1}.
+        effects: deviations from the model.
         initial: true posture near which trials start, (phi, theta), (N, 3) each.
         units: the robots as they are; None for robots as designed.
     """
     grasps = shared.grasps
-    # The rows have in the payload, and in the places of the bases, what an effect adds to them.
+    # The estimated payload and base positions include contributions of the effects: subtract them.
     pi = shared.pi - sum((effect.carried() for effect in effects), np.zeros(10))
     shift = np.zeros_like(bases.p)
     for effect in effects:
@@ -145,7 +150,7 @@ def team_of(
 
 
 def effect_of(candidate: Candidate, values: Array, context: Context) -> Effect | None:
-    """The simulator's effect, or None where the values are none that it can have (a negative play)."""
+    """The simulator's effect, or None if it cannot have such values (a negative play)."""
     cause = CAUSES[candidate.cause]
     parameters = cause.physical(values, context)
     for name in cause.clipped:
@@ -157,7 +162,7 @@ def effect_of(candidate: Candidate, values: Array, context: Context) -> Effect |
 
 
 def named_effects(candidate: Candidate, effects: Sequence[Effect] | None) -> Sequence[Effect]:
-    """The effects of a named cause.
+    """Return the effects of a named cause.
 
     Raises:
         InputError: there are none.
@@ -168,7 +173,7 @@ def named_effects(candidate: Candidate, effects: Sequence[Effect] | None) -> Seq
 
 
 def why_not(recording: Recording) -> str | None:
-    """Why a recording cannot be resimulated, or None."""
+    """Reason why a recording cannot be simulated again, or None."""
     if recording.ref is None:
         return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
     if not recording.metadata.control or "feed_forward_N" not in recording.metadata.control:
@@ -179,7 +184,7 @@ def why_not(recording: Recording) -> str | None:
 
 
 def posture(recording: Recording) -> tuple[tuple[Array, Array], ArmUnit | None]:
-    """True (phi, theta) of the first sample, (N, 3) each, and the robots as they are, as far as they are known."""
+    """True (phi, theta) of the first sample, (N, 3) each, and the calibration of the robots if it is known."""
     units = recording.metadata.units
     phi, theta, _ = true_joints(
         recording.metadata.arms, recording.phi[0], recording.theta[0], recording.tau[0]
@@ -198,7 +203,7 @@ def scale_of_response(noise: Noise, signals: Signals) -> dict[str, tuple[Array, 
 
 
 def impossible() -> None:
-    """What comes of a simulation with an effect that cannot be."""
+    """Stand in for a simulation with an impossible effect."""
     return None
 
 
@@ -212,7 +217,7 @@ def resimulation_errors(
 ) -> dict[str, Array] | None:
     """Recorded minus simulated phi, theta [rad] and tau [N m] of one trial, shape (Q, N, 3) each.
 
-    None where the simulation of these effects cannot be trusted or assembled.
+    Returns None if the simulation cannot be built or fails.
     """
     try:
         scene = team_of(shared, bases, effects, *posture(recording))

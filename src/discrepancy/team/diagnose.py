@@ -1,4 +1,4 @@
-"""From recordings of a team to the likeliest causes: the search, and problems linear around what it found."""
+"""Search for the likeliest causes in a team's recordings, and linearise the problem around them."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from estimator.errors import InputError
 from estimator.rigid_team import Shared
 
 STRAIGHT_CHI2_PER_N = 1e-3
-"""What curvature adds to chi-square, from which all is linearised again. Chosen: some ten nats of four trials' rows."""
+"""Error of the linearisation in mean squared whitened residual, above which the problem is linearised again. Chosen."""
 
 NORMAL_MEDIAN = 0.6745
-"""Median of the absolute value of a normal number. Derived."""
+"""Median of the absolute value of a standard normal variable. Derived."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Values of everything in a problem.
+    """Values of all parameters of a problem.
 
     Attributes:
-        shared: displacement of the unknowns of all trials, shape (s,).
-        local: the same of each trial, shape (l,).
-        values: every candidate that has columns, and its values in their own units, shape (k,).
-        active: causes that were chosen, with their values.
+        shared: displacement of the unknowns that all trials share, shape (s,).
+        local: displacement of each trial's own unknowns, shape (l,).
+        values: every candidate with columns, and its values in their own units, shape (k,).
+        active: chosen causes with their values.
     """
 
     shared: Array
@@ -48,7 +48,7 @@ class Found:
 
 
 def found_in(problem: TeamProblem, state: State) -> Found:
-    """Values that a state has."""
+    """Collect the posterior means of a state."""
     x, own = state.posterior.mean, problem.rig.local_unknowns
     values: dict[int, tuple[Candidate, Array]] = {}
     for k, label in enumerate(problem.labels):
@@ -64,10 +64,10 @@ def found_in(problem: TeamProblem, state: State) -> Found:
 
 
 def robots_at(rig: TeamRig, found: Found) -> tuple[ArmUnit, ArmUnit, Shared]:
-    """The robots as they are found, how far that is from where they were believed to be, and the payload.
+    """Return the robots as found, their deviation from the assumed robots, and the payload.
 
     Raises:
-        InputError: there are no such robots.
+        InputError: no such robots can exist.
     """
     first = rig.linear[0]
     at = first.arms.x if isinstance(first.arms, ArmUnit) else np.zeros((first.robots, COUNT))
@@ -92,7 +92,7 @@ def _as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
 
 
 def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, shared: Shared) -> float:
-    """Mean square of what straight columns miss of robots and unknowns, in units of the noise's variance."""
+    """Mean square error of the linearisation in robots and unknowns, in units of the noise variance."""
     x = np.zeros(len(state.posterior.mean))
     moved = [k for k, label in enumerate(problem.labels) if label and places_of(label[0]) is not None]
     moved += [*problem.shared, *(k for own in problem.local for k in own)]
@@ -111,20 +111,20 @@ def curvature(problem: TeamProblem, state: State, found: Found, units: ArmUnit, 
 
 
 def resting_of(found: Found) -> dict[str, float]:
-    """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
+    """Spread over tolerance, at least 1, of each cause that acts as noise at rest."""
     sizes: dict[str, list[float]] = {kind: [] for kind in HEALTHY}
     for candidate, values in found.values:
         if candidate.cause in sizes and candidate.parameters[0].tolerance:
             sizes[candidate.cause].append(abs(float(values[0])) / candidate.parameters[0].tolerance)
-    # By the median, as one of them may be at fault.
+    # The median is robust against a single faulty part.
     return {kind: max(1.0, float(np.median(x)) / NORMAL_MEDIAN) if x else 1.0 for kind, x in sizes.items()}
 
 
 def bent(problem: TeamProblem, state: State) -> bool:
-    """Whether straight columns miss too much where a state finds robots and unknowns.
+    """Whether the linearisation is too inaccurate where a state finds robots and unknowns.
 
     Raises:
-        InputError: there are no such robots.
+        InputError: no such robots can exist.
     """
     found = found_in(problem, state)
     units, _, shared = robots_at(problem.rig, found)
@@ -132,10 +132,10 @@ def bent(problem: TeamProblem, state: State) -> bool:
 
 
 def around(problem: TeamProblem, state: State) -> TeamProblem | None:
-    """The problem around where a state finds the robots; None where columns are straight that far.
+    """Linearise the problem around the robots that a state finds; None if the linearisation is accurate enough.
 
     Raises:
-        InputError: there are no such robots.
+        InputError: no such robots can exist.
     """
     rig, found = problem.rig, found_in(problem, state)
     units, origin, shared = robots_at(rig, found)
@@ -160,9 +160,10 @@ def around(problem: TeamProblem, state: State) -> TeamProblem | None:
 
 
 def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
-    """The same problem with its residual exact where a state finds unknowns and causes, and how far off it was.
+    """Replace the residual with the exact one at a state's unknowns and causes.
 
-    The second is the mean square of what straight columns miss, in units of the noise's variance.
+    Returns:
+        The problem, and the mean square change of the residual in units of the noise variance.
     """
     found, cells = found_in(problem, state), problem.cells
     left = problem.rows_of(problem.rig.residual_there(found.shared, found.local, found.active))
@@ -176,7 +177,7 @@ def exact(problem: TeamProblem, state: State) -> tuple[TeamProblem, float]:
 
 
 def latent_whitening(problem: TeamProblem, state: State) -> list[Array] | None:
-    """What makes rows white beside what chosen causes leave open, shape (n, C, C) a trial; None where nothing is."""
+    """Whitening against the latent states of the chosen causes, shape (n, C, C) a trial; None if they have none."""
     rig, covariance = problem.rig, None
     for candidate, values in found_in(problem, state).active:
         if candidate.transient is not None:
@@ -198,7 +199,7 @@ def latent_whitening(problem: TeamProblem, state: State) -> list[Array] | None:
 
 
 def placed(problem: TeamProblem, other: TeamProblem, chosen: Sequence[Chosen]) -> list[Chosen]:
-    """Causes of another problem in this one."""
+    """Transfer chosen causes from another problem to this one."""
     out = []
     for c in chosen:
         if not c.group.late:
@@ -209,19 +210,19 @@ def placed(problem: TeamProblem, other: TeamProblem, chosen: Sequence[Chosen]) -
 
 
 LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
-"""Causes after which rows have another noise: a search goes on only beside what they leave open."""
+"""Causes that change the noise of the rows. The search must continue with that noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class TeamOutcome:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
-        problem: linear around what was found.
-        search: on it.
-        state: the likeliest set.
-        nothing: the search and the state without causes, around the robots as they are found without.
-        finished: whether the search came to its end.
+        problem: linearised around the result.
+        search: on that problem.
+        state: the likeliest set of causes.
+        nothing: search and state without causes, linearised around the robots found without them.
+        finished: whether the search completed.
     """
 
     problem: TeamProblem
@@ -232,7 +233,7 @@ class TeamOutcome:
 
     @property
     def rig(self) -> TeamRig:
-        """The recordings, linear around what was found, and their simulator."""
+        """The recordings, linearised around the result, and their simulator."""
         return self.problem.rig
 
 
@@ -240,7 +241,14 @@ def search_team(
     rig: TeamRig, settings: Settings = SETTINGS, say: Callable[[str], object] = lambda _: None,
     until: Until | None = None,
 ) -> TeamOutcome:  # fmt: skip
-    """The likeliest causes of what a team's model leaves of its recordings."""
+    """Search for the likeliest causes of the residual that a team's model leaves.
+
+    Args:
+        rig: the linearised recordings.
+        settings: of the search.
+        say: takes the name of each stage.
+        until: when to stop early; None for never.
+    """
     until = until or Until()
     problem = team_problem(rig)
     search = Search(problem, problem.sensors, settings, say, until)
@@ -253,7 +261,7 @@ def search_team(
         there = replace(search, problem=moved)
         found = there.fixed(())
         if found.evidence < state.evidence:
-            break  # something else pulls at the robots: where they are shows beside it only
+            break  # a cause distorts the robots' estimate: their true values only show together with it
         problem, search, state = moved, there, found
     nothing = search, state
     state = until.run(search, state, partial(_beyond, problem))
@@ -271,22 +279,22 @@ def search_team(
 
 
 def _beyond(problem: TeamProblem, state: State, new: frozenset[str]) -> bool:
-    """Whether a search goes on only in another problem: beside what causes leave open, or linear elsewhere."""
+    """Whether the search needs a new problem, because the noise changed or the linearisation is inaccurate."""
     try:
         return not new.isdisjoint(LEAVE_OPEN) or bent(problem, state)
-    except InputError:  # no such robots: what acts on these is not found yet
+    except InputError:  # impossible robots: a cause that acts on them is still missing
         return False
 
 
 def _moved(problem: TeamProblem, state: State) -> TeamProblem | None:
     try:
         return around(problem, state)
-    except InputError:  # no such robots: what acts on these is something else
+    except InputError:  # impossible robots: another cause acts on them
         return None
 
 
 def _beside(old: TeamProblem, search: Search, state: State) -> tuple[TeamProblem, Search, State, bool]:
-    """The same set in a problem that is linear around it, and whether that is the same problem but for little."""
+    """Linearise around a set of causes; also return whether that hardly changed the problem."""
     opened, moved = latent_whitening(old, state), _moved(old, state)
     problem, same = old, True
     if opened is not None or moved is not None or old.opened is not None:

@@ -35,18 +35,18 @@ from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
 
 GOOD_S = 30.0
-"""With which a diagnosis starts to be of use; only said. Chosen."""
+"""Length of motion from which a diagnosis is useful [s]; only quoted in a message. Chosen."""
 
 LEAST_S = 5.0
-"""Least length of all recordings together that is diagnosed [s]."""
+"""Least total length of recordings that is diagnosed [s]. Chosen."""
 
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
-    """Enough of them, and all of one team.
+    """Check that recordings suffice and come from one team.
 
     Raises:
-        InputError: there is none, one is of robots that hold nothing, they have one robot or differ in robots or
-            design, or they are too short.
+        InputError: there is no recording, one has empty grasps or a single robot, robots or design differ, or the
+            recordings are too short.
     """
     if not recordings:
         raise InputError("no recording given; name at least one file")
@@ -82,12 +82,12 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
 
 
 def same_units(a: ArmUnit | None, b: ArmUnit | None) -> bool:
-    """Whether robots are known to be the same: as designed, or as they are."""
+    """Whether two recordings have the same calibration, or both have none."""
     return a is b or (a is not None and b is not None and np.array_equal(a.x, b.x))
 
 
 def check_estimate(estimate: PayloadEstimate) -> None:
-    """Without a payload there is no model; say why, where wrenches that contradict each other are the reason.
+    """Check that the wrenches do not contradict each other, because then there is no payload to model.
 
     Raises:
         InputError: they do.
@@ -104,7 +104,7 @@ KINDS = ("driven joint", "gimbal axis")
 
 
 def held_in(recordings: Sequence[Recording]) -> list[HeldReadings]:
-    """Encoders that hold their last value for a while in any of a team's trials."""
+    """Find encoders that repeat their last value for a while in any of a team's trials."""
     found = []
     for trial, recording in enumerate(recordings):
         rate_hz = recording.metadata.rate_hz
@@ -137,34 +137,33 @@ def diagnose_team(
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
 ) -> TeamDiagnosed:
-    """Check and estimate recordings of one payload, and find out what the simulation gets wrong.
+    """Check recordings of one payload, estimate it, and find what the simulation gets wrong.
 
     Args:
-        recordings: trials of one payload; several, so that what is named can be validated.
+        recordings: trials of one payload; several trials allow cross-validation.
         tolerances: standard deviations by cause and parameter (``read_tolerances``); None for the defaults.
         excluded: causes left out of the catalogue.
-        closed_loop: whether to run the recorded commands again.
-        laws: whether to look for what no table lists: where the noise is louder than the sensors' (``auto``), always,
-            or never.
-        odds: of any cause being there before the data are seen, at all its places together.
-        whole: whether to search all of long recordings, not a choice of their parts.
-        seconds: after which the search ends with what it has.
+        closed_loop: whether to simulate the recorded commands again.
+        laws: when to search for unlisted laws: if the noise exceeds that of the sensors (``auto``), always, or never.
+        odds: prior odds of each kind of cause, over all its places together.
+        whole: whether to search all of long recordings, not a selection of their parts.
+        seconds: time after which the search stops with its current result; None for no limit.
         jobs: parallel processes.
-        say: takes the name of the stage that begins.
+        say: takes the name of each stage.
         simulated: called with 1 for every simulated trial.
 
     Raises:
-        InputError: the recordings do not belong together, are too short, or do not determine the payload, or a
-            cause to be excluded does not exist.
+        InputError: the recordings do not belong together, are too short, or do not determine the payload, or an
+            excluded cause does not exist.
     """
     check_recordings(recordings)
     say("estimate")
-    # Another mass in some trials is a cause of its own, unless it is none to be named.
+    # A payload mass that differs between trials is a cause of its own, unless that cause is excluded.
     estimate = estimate_payload(recordings, compare_masses="payload_mass" in excluded, withhold=False)
     try:
         check_estimate(estimate)
     except InputError:
-        # Where nothing fits, masses that differ are the clearer sentence.
+        # If no model fits, an error about different masses is clearer.
         estimate_payload(recordings, compare_masses=True, withhold=False)
         raise
     known = read_tolerances(None) if tolerances is None else tolerances
@@ -202,11 +201,11 @@ def diagnose_team(
 
 
 def against_truth(found: TeamDiagnosed, truth: Mapping[str, Any]) -> TeamDiagnosed:
-    """The same with the errors of its estimates.
+    """Add the errors of the estimates.
 
     Args:
-        found: of ``diagnose_team``.
-        truth: the payload, in the form of ``GroundTruth.to_dict``; where it is of something else there are no errors.
+        found: result of ``diagnose_team``.
+        truth: the payload, in the form of ``GroundTruth.to_dict``. A truth in another form adds no errors.
     """
     known = found.verdict.estimates
     try:

@@ -1,4 +1,4 @@
-"""What a diagnosis does to the payload's estimate: without and with what is off, and errors where truth is known."""
+"""Payload estimates without and with the causes, and their errors if the truth is known."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,7 +14,7 @@ Estimate = dict[str, Any]
 
 
 def to_dict(shared: Shared) -> Estimate:
-    """Mass, centre of mass, principal moments and grasps of the unknowns, as plain numbers."""
+    """Mass, centre of mass, principal moments and grasps as plain numbers."""
     mass = float(shared.pi[0])
     p_1c = shared.pi[1:4] / mass
     about_c = inertia_matrix(shared.pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
@@ -33,10 +33,10 @@ def to_dict(shared: Shared) -> Estimate:
 
 
 def errors(estimate: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, float]:
-    """Errors of an estimate against a truth of the same form, the largest of several robots or axes each.
+    """Errors of an estimate against a truth of the same form; of several robots or axes the largest.
 
     Raises:
-        ValueError, KeyError, TypeError: the truth lacks something, or is of another number of robots.
+        ValueError, KeyError, TypeError: the truth is incomplete, or has another number of robots.
     """
     moments, true_moments = (_three(x, "principal_inertia_kgm2") for x in (estimate, truth))
     turns, places = [0.0], [0.0]
@@ -54,7 +54,7 @@ def errors(estimate: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, f
 
 
 def seen_by(units: ArmUnit | None, truth: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A truth in the frames of an estimate with these robots; raises as ``errors``."""
+    """Express a truth in the frames of an estimate with these robots; raises like ``errors``."""
     if units is None or not in_encoder_frames(units) or not truth.get("as_built"):
         return truth
     zeros = np.array([_three(unit, "theta_zero_rad")[2] for unit in truth["as_built"]])

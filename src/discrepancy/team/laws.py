@@ -1,4 +1,4 @@
-"""What no table lists of a team: where something may be wrong, of which signal it may be a function, and its rows."""
+"""Errors that no listed cause describes: their place in a team, the signal they depend on, and their columns."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ XYZ = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Variable(Of):
-    """A signal that an error may be a function of; ``kind`` decides which functions make sense."""
+    """A signal that an error may depend on; ``kind`` selects the functions that make sense."""
 
     kind: Kind
 
 
 TIME = Variable("time", "time", "t", "s", "time")
-"""Since the trial began."""
+"""Time since the start of the trial."""
 JOINTS: dict[str, tuple[slice, str, str, str, Kind]] = {
     "phi": (PHI, "angle of driven joint", "phi", "rad", "angle"),
     "phi_rate": (PHI_DOT, "rate of driven joint", "phi'", "rad/s", "other"),
@@ -49,21 +49,21 @@ PAYLOAD: dict[str, tuple[str, str, str, Kind]] = {
     "payload_rate": ("turn rate of the payload about its", "omega", "rad/s", "other"),
     "payload_up": ("tilt of the payload, component of up along its", "up", "1", "other"),
 }
-"""Signals of the payload: words, symbol, unit and kind; position and velocity in {b1}, the others in {1}."""
+"""Signals of the payload: words, symbol, unit and kind. Position and velocity are in {b1}, the others in {1}."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """One error signal, or one for each of some axes.
+    """A place where an error may act: one error signal, or one per axis.
 
     Attributes:
-        name: what is wrong, as in the JSON, such as ``tau reading``.
-        robot, joint: where, from 1, or None.
-        targets: the simulator's name of what each component adds to, such as ``tau_2_1``.
-        axes: names of the components in words; one empty name where there is one.
+        name: kind of error as in the JSON, such as ``tau reading``.
+        robot, joint: numbers from 1, or None.
+        targets: the simulator's names of the quantities that the components add to, such as ``tau_2_1``.
+        axes: names of the components in words; one empty name for a single component.
         units: of each component.
-        title: in words.
-        own: signals of the same joint or robot: those that it most likely depends on.
+        title: description in words.
+        own: signals of the same joint or robot, on which the error most likely depends.
     """
 
     name: str
@@ -77,25 +77,25 @@ class Place:
 
     @property
     def key(self) -> tuple[str, int | None, int | None]:
-        """Which place."""
+        """Identity of the place."""
         return self.name, self.robot, self.joint
 
 
 def joint_variable(name: str, robot: int, joint: int) -> Variable:
-    """A signal of one joint (robot and joint from 1)."""
+    """Return a signal of one joint (robot and joint from 1)."""
     _, words, symbol, unit, kind = JOINTS[name]
     said = f"{words} {joint} of robot {robot}"
     return Variable(f"{name}_{robot}_{joint}", said, f"{symbol}_{robot}{joint}", unit, kind)
 
 
 def payload_variable(name: str, axis: str) -> Variable:
-    """A signal of the payload along one axis."""
+    """Return a signal of the payload along one axis."""
     words, symbol, unit, kind = PAYLOAD[name]
     return Variable(f"{name}_{axis}", f"{words} {axis}", f"{symbol}_{axis}", unit, kind)
 
 
 def places_of(robots: int) -> list[Place]:
-    """Places of N robots and their payload, in the order in which they are tried."""
+    """List the places of N robots and their payload, in the order of the search."""
     out = []
     for i in range(1, robots + 1):
         for j in (1, 2, 3):
@@ -131,7 +131,7 @@ def places_of(robots: int) -> list[Place]:
 
 
 def signals_of(linear: TrialLinear) -> dict[str, Array]:
-    """Values of all of them in one trial, shape (Q,) each."""
+    """Values of all signals in one trial, shape (Q,) each."""
     signals, out = linear.signals, {TIME.name: linear.signals.time - linear.signals.time[0]}
     for name, (slots, *_) in JOINTS.items():
         for i in range(linear.robots):
@@ -154,13 +154,13 @@ def signals_of(linear: TrialLinear) -> dict[str, Array]:
 
 
 def directions_at(linear: TrialLinear, place: Place) -> Array:
-    """Residual per unit of an error, its rate and its acceleration, shape (n, components, 3 or 1, C).
+    """Derivative of the residual by an error, its rate and its acceleration, shape (n, components, 3 or 1, C).
+
+    The derivative is taken at the middle of each row, because it changes more slowly than the error.
 
     Args:
         linear: the trial.
-        place: one of ``places.places_of``.
-
-    The direction at a row is that in its middle: an error changes faster than how it shows.
+        place: one of ``places_of``.
     """
     at = linear.reduction.sample
     robot, joint = (place.robot or 1) - 1, (place.joint or 1) - 1
@@ -169,7 +169,7 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
         J = [linear.J.at(robot, kind, at)[..., joint] for kind in slots]
         return np.stack(J, axis=1)[:, None]
     if place.name in ("tau reading", "driven torque"):
-        sign = 1.0 if place.name == "tau reading" else -1.0  # a torque beside the spring is not read
+        sign = 1.0 if place.name == "tau reading" else -1.0  # a torque parallel to the spring is not read
         return sign * linear.J.at(robot, TAU, at)[:, None, None, :, joint]
     if place.name == "gimbal torque":
         moment = moment_about_axes(linear.s[at][:, robot, THETA], np.eye(3)[joint])
@@ -182,20 +182,20 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
 
 
 def _wrench(linear: TrialLinear, force: Array, moment: Array) -> Array:
-    """Residual of an outside wrench on the payload at the origin of {1}, in {1}, (n, 3) each: shape (n, C)."""
+    """Residual of an external wrench on the payload at the origin of {1}, in {1}: (n, 3) each, to shape (n, C)."""
     out = np.zeros((len(force), linear.channels))
     out[:, -6:-3], out[:, -3:] = -force, -moment
     return out
 
 
 def _moved(linear: TrialLinear, robot: int, axis: Array, base: Array | None) -> Array:
-    """Residual of a displacement of a grasp frame as seen from {b1}, by value, rate and acceleration, (n, 3, C).
+    """Derivative of the residual by value, rate and acceleration of a grasp frame's displacement in {b1}, (n, 3, C).
 
     Args:
         linear: the trial.
-        robot: from 0.
-        axis: along which, shape (3,): of the robot's {b}, or of its grasp frame {i}.
-        base: axes of the robot's base in {b1}; None for an axis of {i}.
+        robot: index from 0.
+        axis: direction in the robot's {b} or in its grasp frame {i}, shape (3,).
+        base: orientation of the robot's {b} in {b1}; None if ``axis`` is in {i}.
     """
     at = linear.reduction.sample
     displacement = (
@@ -215,14 +215,14 @@ def _moved(linear: TrialLinear, robot: int, axis: Array, base: Array | None) -> 
 
 
 def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
-    """Residual of every component of an error of the payload, shape (n, 3 or 1, C) each."""
+    """Derivative of the residual by each component of a payload error, shape (n, 3 or 1, C) each."""
     at = linear.reduction.sample
     motion = linear.motion
     R = linear.data.R_bi[at][:, 0]
     com = linear.shared.pi[1:4] / linear.shared.pi[0]
     none = np.zeros((len(at), 3))
     omega, alpha = motion.omega[at], motion.alpha[at]
-    # Acceleration of the origin of {1} less gravity, in {1}.
+    # Acceleration of the origin of {1} minus gravity, in {1}.
     felt = motion.acceleration[at] + linear.data.gravity_mps2 * motion.up[at]
     if name == "force on payload":
         forces = [R[:, k] for k in range(3)]  # unit vector k of {b1}, in {1}
@@ -230,12 +230,12 @@ def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
             *(_wrench(linear, f, _crossed(com, f))[:, None] for f in forces),
             *(_wrench(linear, none, f)[:, None] for f in forces),
         ]
-    if name == "payload mass":  # a point mass at the centre that is known of
+    if name == "payload mass":  # a point mass at the known centre of mass
         needed = felt + _crossed(alpha, com) + _crossed(omega, _crossed(omega, com))
         return [_wrench(linear, -needed, -_crossed(com, needed))[:, None]]
     axes = [np.tile(axis, (len(at), 1)) for axis in np.eye(3)]
     if name == "payload centre":
-        # d/dt^2 of R c m, and gravity's moment: value, rate and acceleration of the first moment in {1}.
+        # Second derivative of the first moment in the world, and the moment of gravity.
         return [
             np.stack(
                 [
@@ -247,7 +247,7 @@ def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
             )
             for e in axes
         ]  # fmt: skip
-    # Angular momentum fixed in the payload: its change is omega x h.
+    # Angular momentum fixed in the payload: its rate of change is omega x h.
     return [_wrench(linear, none, -_crossed(omega, e))[:, None] for e in axes]
 
 
@@ -256,38 +256,39 @@ def _crossed(a: Array, b: Array) -> Array:
 
 
 TERMS = 7
-"""Cosines of a function: periods down to a quarter of the signal's range."""
+"""Number of cosines of a function. The shortest period is about a quarter of the signal's range."""
 SIZES = {
     "tau reading": 5e-3, "phi reading": 1e-4, "theta reading": 1e-4, "gimbal torque": 2e-3, "base position": 1e-5,
     "grasp position": 1e-5, "force on payload": 0.02, "payload mass": 0.01, "payload centre": 3e-3,
     "payload spin": 0.01,
 }  # fmt: skip
-"""Typical small errors of a place, in its unit: the tolerances of the listed causes there."""
+"""Typical small error at each place, in its unit: the tolerance of the listed causes there."""
 SLAB = 16.0
-"""Largest such error that is expected, in these."""
+"""Prior standard deviation of an unlisted error, in these sizes."""
 UNLISTED_NATS = 5.0
-"""Log odds of a listed cause over something that no table lists."""
+"""Log odds of a listed cause against an unlisted law."""
 OPEN_NATS = 150.0
-"""What the noise must be worth beyond the sensors' before unlisted laws are sought: clean teams leave up to 110."""
+"""Log evidence of excess noise that starts the search for unlisted laws. Measured: clean teams reach 110."""
 LIKELIEST = 8
-"""Places and signals whose exact linear gain is computed."""
+"""Number of laws proposed in each step."""
 OWN_CONSTANT = ("gimbal torque", "force on payload", "payload spin")
 """Places where no listed cause is a constant."""
 HUM_HZ = (0.3, 6.0)
-"""Frequencies of a hum: slower it is a function of time, and rows come 12.5 times a second."""
+"""Frequency range of a hum [Hz]. A slower one is a function of time; rows come at 12.5 Hz."""
 
 
 @dataclass(frozen=True, eq=False)
 class Unlisted:
-    """An error at a place that is a function of a signal.
+    """An error at a place as a function of a signal.
 
     Attributes:
-        place, variable: which.
-        component: of the place.
-        times: a signal that multiplies it, or None.
-        terms: cosines of the function.
-        hz: frequency, of a hum.
-        among: how many laws it is one of that are as likely.
+        place: where the error acts.
+        component: index of the place's component.
+        variable: the signal that it depends on.
+        times: a signal that multiplies the function, or None.
+        terms: number of cosines.
+        hz: frequency of a hum, or None.
+        among: number of equally probable laws.
     """
 
     place: Place
@@ -308,12 +309,12 @@ class Unlisted:
 
     @property
     def first(self) -> int:
-        """Number of the first cosine: a constant is one where nothing listed is."""
+        """Order of the first cosine: 0 if the law needs its own constant, otherwise 1."""
         return 0 if self.place.name in OWN_CONSTANT and self.hz is None else 1
 
     @property
     def group(self) -> Group:
-        """The law as a group of the engine, without columns."""
+        """The law as a group of the search, without columns."""
         k = np.append(np.arange(self.first, self.terms + 1.0), 1.0) if self.hz is None else np.zeros(2)
         falling = 1.0 / (1.0 + k)
         sizes = SLAB * SIZES[self.place.name] * falling / np.sqrt(np.sum(falling**2))
@@ -327,10 +328,10 @@ class Unlisted:
 
 @dataclass(eq=False)
 class Laws:
-    """All that may be wrong of a team's places as functions of their own signals.
+    """All errors at a team's places that are functions of the team's own signals.
 
     Attributes:
-        linear: trials.
+        linear: the linearised trials.
         laws: by the identity of their groups.
     """
 
@@ -345,7 +346,7 @@ class Laws:
                     self.laws[law.group.identity] = law
 
     def of(self, group: Group) -> Unlisted:
-        """The law that is a group."""
+        """Return the law that a group stands for."""
         shape = dict(group.shape)
         plain = tuple(item for item in group.shape if item[0] not in ("terms", "hz"))
         law = self.laws[group.cause, group.place, plain]
@@ -358,7 +359,7 @@ class Laws:
         if place.name == "tau reading" and place.robot and place.joint:
             torques = [joint_variable("tau", place.robot, j) for j in (1, 2, 3)]
             yield from ((v, None) for j, v in enumerate(torques) if j + 1 != place.joint)
-            yield TIME, torques[place.joint - 1]  # a scale that drifts
+            yield TIME, torques[place.joint - 1]  # a drifting scale
 
     @cached_property
     def _signals(self) -> list[dict[str, Array]]:
@@ -368,13 +369,13 @@ class Laws:
         return np.split(x, np.cumsum([len(s[TIME.name]) for s in self._signals])[:-1])
 
     def signal(self, variable: Variable) -> Array:
-        """A signal in all trials one after another."""
+        """Values of a signal in all trials, concatenated."""
         return np.concatenate([s[variable.name] for s in self._signals])
 
     def functions(self, law: Unlisted) -> Array:
-        """Functions of the signal that a law is made of, shape (Q, k): cosines of its rank and itself, or a hum.
+        """Basis functions of a law, shape (Q, k): cosines of the signal's rank and the signal itself, or a hum's waves.
 
-        Cosines alone have no slope at their ends, and what a joint's angle is off by acts through its rate, too.
+        The signal itself adds slope at the ends of the range, where cosines have none: angle errors act through rates.
         """
         x = self.signal(law.variable)
         if law.hz is not None:
@@ -385,12 +386,12 @@ class Laws:
         return np.column_stack([waves, (x - x.mean()) / (math.sqrt(2.0) * np.std(x) + 1e-300)])
 
     def basis(self, law: Unlisted) -> list[Array]:
-        """The law's terms, shape (Q, k) a trial."""
+        """The law's basis functions, shape (Q, k) a trial."""
         f = self.functions(law)
         return self._split(f if law.times is None else f * self.signal(law.times)[:, None])
 
     def columns(self, law: Unlisted) -> list[Array]:
-        """What the terms of a law add to the residual, shape (n, C, k) a trial."""
+        """Columns of the law's terms in the residual, shape (n, C, k) a trial."""
         out = []
         for linear, errors in zip(self.linear, self.basis(law), strict=True):
             D = directions_at(linear, law.place)[:, law.component]  # (n, parts, C)
@@ -400,7 +401,7 @@ class Laws:
         return out
 
     def finer(self, group: Group) -> list[Group]:
-        """The law with more cosines, or the hum a little faster and slower."""
+        """Refinements of a law: twice the cosines, or a hum at a slightly lower and higher frequency."""
         law = self.of(group)
         if law.hz is None:
             return [replace(law, terms=2 * TERMS).group] if law.terms == TERMS else []
@@ -408,11 +409,11 @@ class Laws:
         return [replace(law, hz=law.hz + d).group for d in (-step, step)]
 
     def proposed(self, left: Sequence[Array], white: Callable[[list[Array]], list[Array]]) -> list[Group]:
-        """The likeliest laws by what rows leave along the direction of their place.
+        """Return the most promising laws, judged by the residual along the direction of their place.
 
         Args:
-            left: rows over their variance, shape (n, C) a trial.
-            white: whitens rows (n, C, 1) one by one.
+            left: residual rows over their variance, shape (n, C) a trial.
+            white: whitens each row (n, C, 1) by itself.
         """
         directions: dict[tuple[object, int], list[Array]] = {}
         bases: dict[object, list[Array]] = {}
@@ -439,7 +440,7 @@ class Laws:
 
     @cached_property
     def _hums(self) -> tuple[Array, list[NDArray[np.complex64]]]:
-        """Frequencies, four in each that a trial tells from the next, and waves of them at each trial's rows."""
+        """Hum frequencies, four per resolvable step, and complex waves at each trial's rows."""
         time = [s[TIME.name][t.reduction.sample] for s, t in zip(self._signals, self.linear, strict=True)]
         hz = np.arange(HUM_HZ[0], HUM_HZ[1], 0.25 / max(float(t[-1]) for t in time))
         return hz, [np.exp(-2j * np.pi * np.outer(hz, t)).astype(np.complex64) for t in time]
@@ -447,7 +448,7 @@ class Laws:
     def _hum(
         self, law: Unlisted, directions: Sequence[Array], left: Sequence[Array]
     ) -> tuple[float, Unlisted]:
-        """The likeliest hum of a place, and its gain beside the odds of its frequency."""
+        """The most promising hum at a place, and its gain after paying for the choice of frequency."""
         hz, waves = self._hums
         score, size = np.zeros(len(hz), dtype=complex), 0.0
         for E, D, z in zip(waves, directions, left, strict=True):
@@ -459,12 +460,12 @@ class Laws:
         return float(gain[best]) - math.log(own.among) - math.log1p(own.group.slab[0] ** 2 * size), own
 
     def told(self, group: Group, mean: Array, covariance: Array, prior: Array) -> Law:
-        """A law with its formula.
+        """Summarise a fitted law with its formula.
 
         Args:
-            group: the law, in the model.
-            mean, covariance: of its terms, shapes (k,) and (k, k).
-            prior: variances with which these were fitted, shape (k,).
+            group: the law, with its columns in the problem.
+            mean, covariance: posterior of its terms, shapes (k,) and (k, k).
+            prior: prior variances of the fit, shape (k,).
         """
         law = self.of(group)
         place, x, f = law.place, self.signal(law.variable), self.functions(law)
@@ -479,9 +480,15 @@ class Laws:
         )  # fmt: skip
 
     def pieces(self, group: Group, law: Law, mean: Array) -> Iterator[Piece]:
-        """A law, its terms (k,) as other data have them, as functions of one amplitude each, as simulators take it.
+        """Split a law into functions with one amplitude each, as the simulator takes them.
 
-        Where the constant is not its own it has none: that is what zeros, biases and places are found beside.
+        If the law has no constant of its own, an extra constant removes its mean. Other parameters, such as sensor
+        zeros, already include that mean.
+
+        Args:
+            group: the law.
+            law: its summary.
+            mean: values of its terms, as fitted to other data, shape (k,).
         """
         own = self.of(group)
         x = self.signal(own.variable)

@@ -1,4 +1,4 @@
-"""Long recordings in parts: some are searched for causes, the others held against what is found."""
+"""Split long recordings into parts: search some for causes, and compare the others with the result."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ from estimator.errors import InputError
 from estimator.recording.model import Recording
 
 PART_S = 180.0
-"""Longest part of a recording that is one trial: latent states cost the square of its length."""
+"""Longest part of a recording that is one trial [s]. Chosen: the cost of latent states is quadratic in its length."""
 
 
 @dataclass(frozen=True, eq=False)
 class LaterPart(Recording):
-    """A part that begins in motion: its commands cannot be simulated from there."""
+    """A part that begins in motion, so that its commands cannot be simulated."""
 
 
 def parted(recordings: Sequence[Recording], longest_s: float | None = None) -> list[Recording]:
-    """The recordings, long ones in parts of equal length.
+    """Split long recordings into parts of equal length.
 
-    Parts keep the recording's clock. They overlap by what the filters take at their ends, so that all rows are there.
+    Parts keep the recording's clock. They overlap by the transients of the filters, so that no rows are lost.
 
     Args:
         recordings: whole.
-        longest_s: of a part [s]; None for that of the rules.
+        longest_s: longest part [s]; None for ``PART_S``.
     """
     return [part for recording in recordings for part in _parts(recording, longest_s or PART_S)]
 
 
 def seconds(recordings: Sequence[Recording]) -> float:
-    """How long recordings are together [s]."""
+    """Total duration of recordings [s]."""
     return sum(len(recording.time) / recording.metadata.rate_hz for recording in recordings)
 
 
 def _edges(recording: Recording, longest_s: float) -> list[int]:
-    """Samples between which the parts are."""
+    """Sample indices of the boundaries between parts."""
     samples, longest = len(recording.time), longest_s * recording.metadata.rate_hz
     count = max(1, -int(-samples // longest))
     return [round(k * samples / count) for k in range(count + 1)]
@@ -69,21 +69,21 @@ def _parts(recording: Recording, longest_s: float) -> list[Recording]:
 
 
 SEARCHED_PARTS, SHORTEST_PART_S = 4, 40.0
-"""Least number of parts, and their least length: they predict each other."""
+"""Least number of parts, and their least length [s]. Chosen: parts cross-validate each other."""
 
 SEARCHED_S, SEARCHED_POWER = 480.0, 1.4
-"""Length of recordings that is searched, of three robots; of N robots (3 / N)^power of it."""
+"""Duration that is searched with three robots [s]; N robots scale it by (3 / N)^power. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """Some parts of all that there are.
+    """A selection of parts.
 
     Attributes:
         recordings: whole.
-        longest_s: of a part [s].
-        parts: of all of them, in their order.
-        taken: numbers of those that are searched, rising.
+        longest_s: longest part [s].
+        parts: all parts in order.
+        taken: indices of the parts that are searched, increasing.
     """
 
     recordings: tuple[Recording, ...]
@@ -93,14 +93,13 @@ class Choice:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], *, whole: bool = False) -> Choice:
-        """Every part, or of recordings that together are longer than is searched, parts spread evenly over them.
+        """Select every part, or evenly spread parts if the recordings are longer than ``searched_s``.
 
-        A search takes time and memory with the length of the data, while what minutes of motion tell of robots and
-        causes changes little with more of the same.
+        The cost of a search grows with the length of the data, while more of the same motion adds little information.
 
         Args:
             recordings: of one team.
-            whole: whether to take all parts, however long.
+            whole: whether to select all parts, however long.
         """
         most_s, total_s = searched_s(recordings[0].metadata.robots), seconds(recordings)
         everything = whole or total_s <= most_s
@@ -119,16 +118,16 @@ class Choice:
 
     @property
     def others(self) -> tuple[int, ...]:
-        """Numbers of the parts that are not."""
+        """Indices of the parts that are not searched."""
         return tuple(sorted({*range(len(self.parts))} - {*self.taken}))
 
     def beside(self, more: Iterable[int]) -> Choice:
-        """With further parts among those that are searched."""
+        """Add parts to the search."""
         return replace(self, taken=tuple(sorted({*self.taken, *more})))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is to be said of it: a sentence for each recording that is cut, or one for all."""
+        """Notes for the report: a sentence for each recording that is split, or one for all."""
         if self.others:
             about = seconds(self.searched) / 60.0, seconds(self.recordings) / 60.0
             return (
@@ -146,24 +145,24 @@ class Choice:
 
 
 def searched_s(robots: int) -> float:
-    """How much of long recordings is searched, all together [s]: less of many robots, whose minutes take longer."""
+    """Duration of recordings that is searched [s]; it falls with the number of robots, which makes minutes costlier."""
     return SEARCHED_S * (3.0 / robots) ** SEARCHED_POWER
 
 
 ODD_CHANCE, ODD_FACTOR = 0.01, 1.5
-"""False alarm rate of a whole diagnosis at which a part is searched, too, and a factor on that threshold."""
+"""False alarm rate per diagnosis at which another part is searched, and a safety factor on that threshold. Chosen."""
 
 ODD_WINDOW_S = 10.0
-"""Length of the windows that are compared with searched parts [s]: a short push, some periods of a motion."""
+"""Length of the windows that are compared [s]. Chosen: a short push, or some periods of a motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """Residual of one part, in windows.
+    """Residual statistics of one part, in windows.
 
     Attributes:
-        means: of every channel in every window of motion, shape (w, C).
-        rms: about those, shape (w, C).
+        means: mean of every channel in every window of motion, shape (w, C).
+        rms: standard deviation within every window, shape (w, C).
         holds: mean of every channel in every hold, shape (h, C).
     """
 
@@ -173,12 +172,12 @@ class Left:
 
     @classmethod
     def of(cls, reduction: Reduction, rows: Array) -> Left:
-        """From rows, shape (n, C), in any unit."""
+        """Compute the statistics of rows, shape (n, C), in any unit."""
         moving, time = rows[: reduction.moving], reduction.time[: reduction.moving]
         lasts_s = time[-1] - time[0] if len(time) else 0.0
-        count = max(1, int(lasts_s / ODD_WINDOW_S))  # equal ones: none is left over at the end
+        count = max(1, int(lasts_s / ODD_WINDOW_S))  # equal windows leave no remainder
         window = np.minimum((time - time[:1]) / max(lasts_s, 1e-9) * count, count - 1).astype(int)
-        # One that holds leave little of tells little.
+        # Drop windows that consist mostly of holds.
         parts = [moving[window == k] for k in np.unique(window)]
         full = max(map(len, parts), default=0)
         parts = [part for part in parts if 2 * len(part) >= full]
@@ -189,13 +188,13 @@ class Left:
 
 
 def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int, float]:
-    """By what factor of what is allowed each part leaves more than what was searched; beyond 1 something else is there.
+    """Residual of each part over the allowed residual; a value above 1 indicates another cause.
 
-    What was not there to compare with, holds for one, is not compared.
+    Statistics that the searched parts lack, such as those of holds, are not compared.
 
     Args:
-        others: parts by their number.
-        searched: parts that were.
+        others: parts that were not searched, by index.
+        searched: parts that were searched.
     """
     worst = dict.fromkeys(others, 0.0)
     for name in ("means", "rms", "holds"):
@@ -203,7 +202,7 @@ def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int,
         count = sum(x.size for x in each.values())
         if len(known) < 2 or not count:
             continue
-        # Means are about zero; how loud windows are, about what they are on average, in shares of it.
+        # Means are compared with zero, standard deviations with their average in the logarithm.
         middle = known.mean(axis=0) if name == "rms" else np.zeros(known.shape[1])
         scale = np.sqrt(np.sum((known - middle) ** 2, axis=0) / (len(known) - (name == "rms")))
         allowed = -ODD_FACTOR * stdtrit(len(known) - 1, 0.5 * ODD_CHANCE / count)
@@ -220,7 +219,7 @@ def _of(name: str, lefts: Sequence[Left]) -> Array:
 
 
 def times_as_much(others: Sequence[Left], searched: Sequence[Left]) -> float | None:
-    """How many times as much is left in motion as in what was searched, median of channels; None where all rests."""
+    """Ratio of the residual in motion to that of the searched parts, median over channels; None without motion."""
     squares = [_of("means", lefts) ** 2 + np.exp(2.0 * _of("rms", lefts)) for lefts in (others, searched)]
     if not all(map(len, squares)):
         return None
@@ -229,11 +228,11 @@ def times_as_much(others: Sequence[Left], searched: Sequence[Left]) -> float | N
 
 
 ODD_NAMED = 3
-"""How many odd parts that were not searched are named."""
+"""Number of conspicuous parts that a note names. Chosen."""
 
 T = TypeVar("T")
 RowsLeft = Callable[[Recording], tuple[Reduction, Array]]
-"""Rows that what was found leaves in a part, and how they were made."""
+"""Residual rows of a part under the result of a search, and their reduction."""
 
 
 def search_parts(
@@ -242,15 +241,16 @@ def search_parts(
     left_by: Callable[[T], RowsLeft],
     say: Callable[[str], object],
 ) -> tuple[Choice, T, tuple[str, ...]]:
-    """Search the parts that are taken, and those in which more is left than in these, too, until there are none.
-
-    Returns the parts that were searched, the result, and sentences about the others.
+    """Search the selected parts, then add and search parts with a larger residual until there are none.
 
     Args:
-        choice: the parts, not all of which are taken.
-        search: of some.
-        left_by: what a result leaves in a part; it raises an ``InputError`` where there are no such robots.
-        say: takes the name of the stage that begins.
+        choice: the parts, not all of which are selected.
+        search: searches some parts.
+        left_by: residual of a part under a result; raises an ``InputError`` if no such robots can exist.
+        say: takes the name of each stage.
+
+    Returns:
+        The selection, the result, and notes about the other parts.
     """
     most = 2 * len(choice.taken)
     while True:
@@ -258,7 +258,7 @@ def search_parts(
         say("hold against the other parts")
         try:
             odd, ratio = _against(choice, left_by(searched))
-        except InputError:  # no such robots
+        except InputError:  # no such robots can exist
             note = "What was found is no team that can be, so it was not held against the other parts."
             return choice, searched, (note,)
         room = most - len(choice.taken)
@@ -271,7 +271,7 @@ def search_parts(
 
 
 def _against(choice: Choice, left_by: RowsLeft) -> tuple[dict[int, float], float | None]:
-    """Parts in which more is left than in any that was searched, by number, and by how much all others leave more."""
+    """Parts with a larger residual than the searched ones, by index, and the overall ratio of the residuals."""
     left = {k: Left.of(*left_by(part)) for k, part in enumerate(choice.parts)}
     known = [left[k] for k in choice.taken]
     others = {k: left[k] for k in choice.others}

@@ -1,4 +1,4 @@
-"""Recordings of a team as a linear problem, linear around given robots, payload and causes."""
+"""Build the linear diagnosis problem of a team, linearised around given robots, payload and causes."""
 
 from __future__ import annotations
 
@@ -26,49 +26,49 @@ from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
 
 TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
-"""Durations searched. Chosen: octaves."""
+"""Push durations where the search starts [s]. Chosen: octaves."""
 
 EDGES_HZ = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
-"""Octaves of the noise; rows come 12.5 times a second. What rests is a band of its own."""
+"""Band edges of the noise model [Hz], in octaves. Rows come at 12.5 Hz; rows of holds form an extra band."""
 UNKNOWN = 1e6
-"""Standard deviations that the data alone would leave of an unknown, in which its prior is as wide as none."""
+"""Prior standard deviation of an unknown over the one that the data alone give it: the prior has no influence."""
 SLAB = 64.0
-"""Largest size of a fault that is expected, in tolerances or typical sizes."""
+"""Largest prior standard deviation of a chosen cause, in tolerances or typical sizes."""
 LIKELIEST = 8
-"""Shapes and events whose exact linear gain is computed in each step."""
+"""Number of shapes proposed in each step. The exact linear gain ranks them."""
 NEAR = 3
-"""Shapes nearby whose evidence is computed in each step."""
+"""Number of neighbouring shapes, and of pushes, proposed in each step."""
 BLOCK = 64
-"""Columns at a time of which copies are made. Chosen: memory."""
+"""Number of columns that are copied at a time. Chosen: limits memory."""
 ENDS = 3
-"""Times that each end of a push is set where its linear gain is largest. Chosen: twice is nearly always enough."""
+"""Passes that move both ends of a push to the largest linear gain. Chosen: two passes nearly always suffice."""
 STEP_SHARE = 1.0
-"""Standard deviation of a step of a number of a shape, in that number."""
+"""Prior standard deviation of a Gauss-Newton step of a shape number, as a share of that number."""
 EXACT = (
     "phi_zero", "theta_zero", "link_length", "base_tilt", "sea_bias", "payload_mass", "clock_delay", "torque_skew",
 )  # fmt: skip
-"""Causes whose law is geometry or arithmetic."""
+"""Causes whose law is pure geometry or arithmetic, so that they need no model discrepancy."""
 
 
 @dataclass(frozen=True, eq=False)
 class RowBands(Bands):
-    """Cosine coefficients of the moving rows of each trial by octave; rows of holds are a band of their own, the last.
+    """Frequency bands of the rows: cosine coefficients of moving rows by octave, and rows of holds as the last band.
 
     Attributes:
-        moving: how many rows move.
+        moving: number of moving rows of each trial.
     """
 
     moving: Sequence[int] = ()
 
     def of_trial(self, trial: int) -> NDArray[np.intp]:
-        """Band of every row of a channel of three components, shape (3 n,)."""
+        """Return the band of every row of one channel of three components, shape (3 n,)."""
         m, last = self.moving[trial], len(self.edges_hz) - 2
         frequency = np.arange(m) * self.rates_hz[trial] / (2.0 * m)
         band = np.minimum(np.searchsorted(self.edges_hz, frequency, side="right") - 1, last - 1)
         return np.repeat(np.append(band, np.full(self.lengths[trial] - m, last)), 3)
 
     def spectrum(self, series: Sequence[Array], channel: int = 0) -> Array:
-        """Rows of all trials of one channel, (n, 3, ...) each, as coefficients, shape (sum 3 n, ...)."""
+        """Transform the rows of one channel, shape (n, 3, ...) a trial, into coefficients, shape (sum 3 n, ...)."""
         out = []
         for t, x in enumerate(series):
             m = self.moving[t]
@@ -77,7 +77,7 @@ class RowBands(Bands):
         return np.concatenate(out)
 
     def rows(self, spectrum: Array) -> list[Array]:
-        """The inverse, shape (sum 3 n, ...) to (n, 3, ...) each."""
+        """Transform coefficients, shape (sum 3 n, ...), back into rows, shape (n, 3, ...) a trial."""
         out, first = [], 0
         for m, n in zip(self.moving, self.lengths, strict=True):
             x = spectrum[first : first + 3 * n].reshape(n, 3, *spectrum.shape[1:])
@@ -88,11 +88,11 @@ class RowBands(Bands):
 
 @dataclass(frozen=True, eq=False)
 class Listed:
-    """Causes at places in shapes whose columns are not in the problem.
+    """Candidate causes whose columns are kept outside the problem.
 
     Attributes:
-        groups: without columns.
-        X: all their columns in the rows of each channel, in the order of the cells, shape (C, n, k).
+        groups: the candidates, without column indices.
+        X: columns of all groups in every channel, rows in the order of the cells, shape (C, n, k).
     """
 
     groups: Sequence[Group]
@@ -100,7 +100,7 @@ class Listed:
 
     @classmethod
     def together(cls, each: list[Listed]) -> Listed:
-        """All of some, which are taken out of their list one by one: both at once would take twice the memory."""
+        """Join several listings. The list is emptied on the way, so that memory holds only one copy."""
         widths = [e.X.shape[2] for e in each]
         groups, X = (
             [g for e in each for g in e.groups],
@@ -112,26 +112,27 @@ class Listed:
 
     @property
     def spans(self) -> list[slice]:
-        """Columns of each group."""
+        """Columns of each group in ``X``."""
         ends = np.cumsum([len(g.slab) for g in self.groups])
         return [slice(e - len(g.slab), e) for e, g in zip(ends, self.groups, strict=True)]
 
 
 @dataclass(eq=False)
 class TeamProblem:
-    """A linear problem; see ``evidence.search.Linear``.
+    """The linear problem of a team; implements ``evidence.search.Linear``.
 
     Attributes:
-        rig: the recordings, linear.
-        cells, groups, families, laws: of the engine.
-        labels: candidate of a column, and which parameter; None of unknowns.
-        tolerance: standard deviations of a healthy team, shape (K,).
-        listed: shapes whose columns are not in the problem.
-        shared, local: columns of the unknowns of all trials, and of each.
-        opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C); or None.
-        candidates: by the identity of a group.
-        catalogue: columns that do not change.
-        there: values where all is linear, shape (K,).
+        rig: the linearised recordings.
+        cells, groups, families, laws: as in ``evidence.search.Linear``.
+        labels: candidate and parameter index of every column; None for nuisance parameters.
+        tolerance: prior standard deviation of every column in a healthy team, shape (K,).
+        listed: other shapes of the causes, whose columns are not in the problem.
+        shared, local: columns of the unknowns that all trials share, and of each trial's own.
+        opened: for each trial, matrices that whiten the rows against latent states of the chosen causes, such as
+            friction at rest, shape (n, C, C); None without latent states.
+        candidates: candidate of every group, by the group's identity.
+        catalogue: columns that stay the same during the search.
+        there: parameter values at the linearisation point, shape (K,).
     """
 
     rig: TeamRig
@@ -151,22 +152,22 @@ class TeamProblem:
 
     @property
     def bands(self) -> RowBands:
-        """Bands of the rows."""
+        """Frequency bands of the rows."""
         return cast("RowBands", self.cells.bands)
 
     @property
     def sensors(self) -> Array:
-        """Rows are whitened: noise has unit variance."""
+        """Noise variance of every channel and band. It is one, because the rows are whitened."""
         return np.ones((len(self.cells.channels), len(self.cells.bands.edges_hz) - 1))
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
-        """Variances of unknowns and of a healthy team."""
+        """Prior variances of all columns in a healthy team."""
         return np.array(self.tolerance) ** 2
 
     # --- columns
 
     def rows_of(self, x: Sequence[Array]) -> list[Array]:
-        """Whitened rows (n, C, ...) of every trial beside what chosen causes leave open."""
+        """Whiten rows (n, C, ...) of every trial against the latent states of the chosen causes."""
         if self.opened is None:
             return list(x)
         return [
@@ -178,18 +179,18 @@ class TeamProblem:
         return self.rows_of(self.rig.columns(candidate))
 
     def spectra(self, columns: Sequence[Array]) -> Array:
-        """Columns (n, 3 C, k), one array a trial, as rows of the cells, shape (C, n, k)."""
+        """Turn columns (n, 3 C, k), one array a trial, into rows of the cells, shape (C, n, k)."""
         bands, order = self.bands, self.cells.order
         return np.stack([
             bands.spectrum([x[:, k : k + 3] for x in columns])[order] for k in range(0, columns[0].shape[1], 3)
         ])  # fmt: skip
 
     def add(self, columns: Sequence[Array]) -> list[int]:
-        """Append columns (n, 3 C, k), one array a trial."""
+        """Append columns (n, 3 C, k), one array a trial, and return their indices."""
         return self.cells.add_rows(self.spectra(columns))
 
     def beside(self, X: NDArray[Any]) -> NDArray[Any]:
-        """Rows of the cells, shape (C, n, k), beside what chosen causes leave open."""
+        """Whiten rows of the cells, shape (C, n, k), against the latent states of the chosen causes."""
         if self.opened is None:
             return X
         out = np.empty_like(X)
@@ -205,7 +206,12 @@ class TeamProblem:
         return self.spectra(self.rows_of(each))
 
     def listing(self, candidates: Iterable[Candidate], count: int) -> Listed:
-        """Candidates with their columns, apart from the problem; ``count``: shapes of equal probability."""
+        """List candidates and their columns outside the problem.
+
+        Args:
+            candidates: the causes in their shapes.
+            count: number of equally probable shapes; a candidate's own ``among`` takes precedence.
+        """
         groups, each = [], []
         for c in candidates:
             groups.append(self.group_of(c, -math.log(c.among or count)))
@@ -213,7 +219,7 @@ class TeamProblem:
         return Listed(groups, np.concatenate(each, axis=2))
 
     def group_of(self, candidate: Candidate, log_prior: float, columns: Sequence[int] = ()) -> Group:
-        """A candidate as a group of the engine."""
+        """Turn a candidate into a group of the search and register it."""
         at = candidate.transient
         place = (
             candidate.place
@@ -234,7 +240,7 @@ class TeamProblem:
         return g
 
     def values_of(self, group: Group, x: Array) -> Array:
-        """Values of a group's parameters, those that do not show among them, shape (k,)."""
+        """Values of all parameters of a group, shape (k,); parameters without a column are zero."""
         out = np.zeros(len(self.candidates[group.identity].parameters))
         for n, k in enumerate(group.columns):
             label = self.labels[k] if k < len(self.labels) else None
@@ -242,7 +248,7 @@ class TeamProblem:
         return out
 
     def place(self, group: Group) -> Group:
-        """A shape or a law with its columns, which are added to the problem."""
+        """Add the columns of a shape or an unlisted law to the problem."""
         if group.late:
             pairs = zip(self.rig.whitening, self.laws_of.columns(self.laws_of.of(group)), strict=True)
             return replace(group, columns=tuple(self.add(self.rows_of([w(x) for w, x in pairs]))))
@@ -251,15 +257,20 @@ class TeamProblem:
     # --- proposals
 
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
-        """The likeliest shapes and pushes; ``late``: and laws that no table lists."""
+        """Return the most promising shapes and pushes.
+
+        Args:
+            posterior: of the current set of causes.
+            late: whether to propose unlisted laws, too.
+        """
         out: list[Group] = []
         if late:
             rows = self.cells.rows
             v = np.maximum(posterior.variance, posterior.left[0] / np.maximum(rows, 1.0))
-            each = 0.5 * (rows * (v - 1.0 - np.log(v)) - 1.0)  # chance alone makes half a nat of every band
+            each = 0.5 * (rows * (v - 1.0 - np.log(v)) - 1.0)  # pure chance contributes half a nat per band
             noise = float(np.sum(each[rows > 0.0]))
             least = {"auto": OPEN_NATS, "always": -math.inf, "never": math.inf}[self.rig.laws]
-            # In learnt noise a law hides that is told beside that of the sensors.
+            # The learnt noise may absorb an unlisted law, so use at most the noise of the sensors.
             quiet = replace(posterior, variance=np.minimum(v, self.sensors))
             out += (
                 self.laws_of.proposed(self.left(quiet.mean, quiet.variance), self._white)
@@ -277,7 +288,13 @@ class TeamProblem:
         return [*out, *self.pushes(posterior)]
 
     def gains(self, posterior: Posterior, listed: Listed, octaves: int = 5) -> Array:
-        """Log evidence that each listed shape adds, its prior included, shape (L,)."""
+        """Log evidence that each listed shape adds, including its prior, shape (L,).
+
+        Args:
+            posterior: of the current set of causes.
+            listed: the shapes.
+            octaves: number of prior sizes to average over, each half of the one before.
+        """
         cells, spans = self.cells, listed.spans
         s, L, z = posterior._factor
         active = posterior.active
@@ -311,7 +328,7 @@ class TeamProblem:
         return out
 
     def pushes(self, posterior: Posterior) -> list[Group]:
-        """The likeliest push of each duration: force and moment on the payload, constant for a while."""
+        """Return the most promising pushes: a constant force and moment on the payload for a limited time."""
         if "push" in self.rig.excluded:
             return []
         found: dict[tuple[int, int, int], float] = {}
@@ -337,7 +354,7 @@ class TeamProblem:
                 windows += 2 * len(starts) // n
                 first = int(np.argmax(gains(starts, starts + n)))
                 stop = first + n
-                for _ in range(ENDS):  # the octaves are where a search for its ends begins
+                for _ in range(ENDS):  # start from the octave, then refine both ends
                     stop = (
                         first
                         + 2
@@ -354,7 +371,7 @@ class TeamProblem:
 
     @cached_property
     def wrenches(self) -> list[Array]:
-        """Whitened balance rows of forces along {b1} and moments in {1}, shape (n, 6, 6) a trial."""
+        """Whitened balance rows per unit force along {b1} and unit moment in {1}, shape (n, 6, 6) a trial."""
         out = []
         for linear, white in zip(self.rig.linear, self.rig.whitening, strict=True):
             R = linear.data.R_bi[:, 0]
@@ -365,7 +382,12 @@ class TeamProblem:
         return [x[:, -6:] for x in self.rows_of(out)]
 
     def left(self, x: Array, variance: Array | None = None) -> list[Array]:
-        """Rows that values of the columns leave, over variances where these are given, shape (n, C) a trial."""
+        """Residual rows after subtracting the columns times ``x``, shape (n, C) a trial.
+
+        Args:
+            x: values of the columns.
+            variance: divides the rows if given, shape (C, bands).
+        """
         parts = []
         for c, channel in enumerate(self.cells.channels):
             known, rows = channel.columns < len(x), np.empty_like(channel.y)
@@ -377,18 +399,18 @@ class TeamProblem:
         return [np.concatenate(each, axis=1) for each in zip(*parts, strict=True)]
 
     def _white(self, rows: Sequence[Array]) -> list[Array]:
-        """Rows (n, C, k) whitened one by one."""
+        """Whiten each row (n, C, k) by itself, without the correlation along time."""
         return self.rows_of([w.rows_only(r) for w, r in zip(self.rig.whitening, rows, strict=True)])
 
     @cached_property
     def laws_of(self) -> Laws:
-        """What no table lists."""
+        """Laws that no listed cause describes."""
         return Laws(self.rig.linear)
 
     # --- shapes and forms
 
     def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
-        """The same cause in neighbouring shapes, the likeliest by the linear problem without it."""
+        """Return the same cause in neighbouring shapes, ranked by their evidence in its place."""
         if group.late:
             return self.laws_of.finer(group)
         candidate = self.candidates[group.identity]
@@ -399,9 +421,7 @@ class TeamProblem:
             () if candidate.transient else of(candidate.shape) for of in (cause.further, cause.grown)
         )
         near += in_shapes(candidate, further, trials)
-        for more in in_shapes(
-            candidate, grown, trials
-        ):  # the same columns, until its further number has moved
+        for more in in_shapes(candidate, grown, trials):  # same columns until the additional number has moved
             of_more = replace(group, log_prior=-math.log(more.among)) if more.among else group
             out += self._stepped(more, of_more, posterior)
         if near:
@@ -417,7 +437,12 @@ class TeamProblem:
         return out
 
     def slopes(self, candidate: Candidate, x: Array) -> tuple[list[int], Array, Array]:
-        """Columns by the numbers of a shape that the data determine, appended; these numbers, and sizes of steps."""
+        """Append the derivatives of the rows by those numbers of a shape that the data determine.
+
+        Returns:
+            Indices of the new columns, the current numbers, and the prior standard deviations of their steps. All are
+            empty if the shape has no such numbers.
+        """
         steps = shape_steps(candidate)
         names = [n for n in CAUSES[candidate.cause].determined if n in candidate.shape]
         if not steps or len(steps) != len(names):
@@ -436,7 +461,7 @@ class TeamProblem:
         )
 
     def _stepped(self, candidate: Candidate, group: Group, posterior: Posterior) -> list[Group]:
-        """The cause with the numbers of its shape a Gauss-Newton step further."""
+        """The cause with its shape numbers moved by one Gauss-Newton step."""
         count = self.cells.count
         index, numbers, size = self.slopes(candidate, self.values_of(group, posterior.mean))
         if not index:
@@ -447,7 +472,7 @@ class TeamProblem:
         self.cells.truncate(count)
         cause = CAUSES[candidate.cause]
         names = [n for n in cause.determined if n in candidate.shape]
-        # A time, a mass or a frequency has no other sign: its logarithm takes the step, by its prior at most.
+        # Numbers that cannot change sign, such as a time or a mass, take a limited step in their logarithm.
         scale = np.array(
             [not cause.slope_step(n, 0.0) and bool(x) for n, x in zip(names, numbers, strict=True)]
         )
@@ -461,7 +486,14 @@ class TeamProblem:
             return []
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """The trace of each number times smooth functions of time, place, speed and load; and earlier or later."""
+        """Forms of a cause's model discrepancy.
+
+        These are its trace times smooth functions of time, place, speed and load, and its trace shifted in time.
+
+        Args:
+            group: the cause.
+            values: of all columns.
+        """
         if group.cause in EXACT or group.event or group.late:
             return []
         x = self.values_of(group, values)
@@ -469,7 +501,7 @@ class TeamProblem:
         return [form for k in np.flatnonzero(x) for form in self._forms([c[..., k] * x[k] for c in each])]
 
     def _forms(self, traces: Sequence[Array]) -> list[Series]:
-        """Forms of one trace, rows (n, C) a trial."""
+        """Discrepancy forms of one trace, rows (n, C) a trial."""
         parts, moving = [], self.bands.moving
         slopes = [np.gradient(r[:m], axis=0) for r, m in zip(traces, moving, strict=True)]
         size, steep = (math.sqrt(sum(float(np.sum(r**2)) for r in rows)) for rows in (traces, slopes))
@@ -489,16 +521,17 @@ class TeamProblem:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """Columns of a healthy team and of all shapes.
+    """Columns of a healthy team and of all shapes of the causes.
 
     Attributes:
-        rig: whose columns those of a healthy team are.
-        groups: of causes in their first shapes, their columns counted from zero.
-        labels, tolerance, kinds: of the columns; ``kinds`` their numbers by cause.
-        X: their rows, shape (C, n, k).
+        rig: the rig whose linearisation gives the columns.
+        groups: causes in their first shapes; column indices start at zero.
+        labels, tolerance: of every column, as in ``TeamProblem``.
+        kinds: column indices by cause.
+        X: the columns, shape (C, n, k).
         listed: all other shapes.
-        apart: by candidate, columns by which its other shapes differ.
-        candidates: by the identity of a group.
+        apart: for each candidate, columns that describe how its other shapes differ from the first.
+        candidates: candidate of every group, by the group's identity.
     """
 
     rig: TeamRig
@@ -513,11 +546,12 @@ class Catalogue:
 
     @classmethod
     def of(cls, plain: TeamProblem, near: Catalogue | None = None) -> Catalogue:
-        """For the rig of a problem without columns in which nothing is left open.
+        """Compute the catalogue of a rig.
 
         Args:
-            plain: the problem.
-            near: of a rig with the same whitening nearby, whose other shapes will do: they are only proposed.
+            plain: the rig's problem, without columns and without latent states.
+            near: catalogue of a nearby rig with the same whitening. Its other shapes are reused, because they only
+                serve as proposals.
         """
         rig = plain.rig
         groups: list[Group] = []
@@ -557,7 +591,7 @@ class Catalogue:
 
 
 def _apart(first: Array, others: Array, most: int = 2) -> Array:
-    """Columns by which a healthy part in another of its shapes differs from the first, shape (C, n, k)."""
+    """Main directions in which other shapes of a healthy part differ from its first shape, shape (C, n, k)."""
     apart = others - first[..., None]
     _, V = np.linalg.eigh(np.einsum("cnk,cnl->kl", apart, apart))
     return apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2])
@@ -566,12 +600,12 @@ def _apart(first: Array, others: Array, most: int = 2) -> Array:
 def team_problem(
     rig: TeamRig, opened: Sequence[Array] | None = None, catalogue: Catalogue | None = None
 ) -> TeamProblem:
-    """The linear problem of a rig.
+    """Build the linear problem of a rig.
 
     Args:
-        rig: recordings, linear.
-        opened: of each trial, what makes rows white beside what chosen causes leave open, shape (n, C, C).
-        catalogue: columns of this rig, or of one with the same whitening nearby; None makes them.
+        rig: the linearised recordings.
+        opened: whitening against the latent states of the chosen causes, shape (n, C, C) a trial.
+        catalogue: columns of this rig, or of a nearby one with the same whitening. None computes them.
     """
     linears = list(zip(rig.linear, rig.whitening, strict=True))
     rows = [white(linear.residual) for linear, white in linears]
@@ -588,7 +622,7 @@ def team_problem(
     columns = out.beside(catalogue.X)
     residual = [x.reshape(len(x), -1, 3) for x in out.rows_of(rows)]
     out.cells = Cells.of(bands, residual)
-    there = np.zeros(len(catalogue.labels))  # values count from the design, not from where all is linear
+    there = np.zeros(len(catalogue.labels))  # values count from the design, not from the linearisation point
     for k, label in enumerate(catalogue.labels):
         at = None if label is None else origin_of(label[0], rig.origin)
         there[k] = 0.0 if label is None or at is None else at[label[1]]
@@ -614,7 +648,7 @@ def team_problem(
     out.labels += catalogue.labels
     out.tolerance += catalogue.tolerance
     out.groups = [replace(g, columns=tuple(first + k for k in g.columns)) for g in catalogue.groups]
-    places = Counter(g.cause for g in catalogue.groups)  # a single part has no kin to learn its spread from
+    places = Counter(g.cause for g in catalogue.groups)  # a spread cannot be learnt from a single part
     out.families = [[first + k for k in kind] for cause, kind in catalogue.kinds.items() if places[cause] > 1]
     out.listed = replace(catalogue.listed, X=out.beside(catalogue.listed.X))
     return out

@@ -1,4 +1,4 @@
-"""Causes in the closed loop: recorded commands simulated again, a test that the rows know nothing of."""
+"""Test causes in closed loop: simulate the recorded commands again, which is evidence beyond the residual rows."""
 
 from __future__ import annotations
 
@@ -42,24 +42,24 @@ from mocobot_sim.effects.law import Law as LawEffect
 from mocobot_sim.extended.extended import write_extended
 
 TOLD_NATS = 5.0
-"""By which the closed loop at least prefers what responds better by the margin. Chosen."""
+"""Log odds for the cause with a better simulated response, if it is better by the margin. Chosen."""
 CONTRADICTED = 0.5
-"""By which causes lose probability that make the response worse. Chosen: as likely wrong as not."""
+"""Factor on the probability of causes that make the response worse. Chosen: as likely wrong as right."""
 VISIBLE_CHI2_PER_N = 3.0
-"""chi2/n of the closed loop from which healthy parts are simulated as they are found, too."""
+"""Closed-loop chi2/n above which the deviations of healthy parts are simulated, too. Chosen."""
 Active = list[tuple[Candidate, Array]]
 """Candidates and the values of their parameters."""
 
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What some trials tell, as a simulation of one of them takes it.
+    """Values for the simulation of a trial, fitted to other trials.
 
     Attributes:
-        shared, local: displacements of the unknowns of all trials and of this one.
+        shared, local: displacements of the unknowns that all trials share, and of this trial's own.
         active: causes.
-        healthy: other parts, and by how much they are off.
-        laws: effects of what no table lists.
+        healthy: other parts, with their deviations.
+        laws: effects of unlisted laws.
     """
 
     shared: Array
@@ -76,8 +76,8 @@ class Hypothesis:
     Attributes:
         problem: with the columns of the set.
         state: the set.
-        whole: whether a simulation has every healthy part as it is found, within its tolerance, too; otherwise only
-            those that are not as designed where all is linear.
+        whole: whether a simulation includes the deviations of all healthy parts, within their tolerances. Otherwise it
+            includes only parts that deviate from the design at the linearisation point.
     """
 
     problem: TeamProblem
@@ -91,14 +91,14 @@ class Hypothesis:
 
     @cached_property
     def causes(self) -> list[tuple[Candidate, Group]]:
-        """Those of the set that tables list."""
+        """The listed causes of the set."""
         known = self.problem.candidates
         groups = [c.group for c in self.state.chosen if c.group.identity in known]
         return [(known[g.identity], g) for g in groups]
 
     @cached_property
     def laws(self) -> list[tuple[Group, Law]]:
-        """What no table lists, with its formula by all trials."""
+        """The unlisted laws of the set, with formulas fitted to all trials."""
         out, p = [], self.state.posterior
         for group in (c.group for c in self.state.chosen if c.group.late):
             k = list(group.columns)
@@ -108,12 +108,12 @@ class Hypothesis:
 
     @property
     def of_trials(self) -> bool:
-        """Whether a cause is there in some trials only: the others say nothing of it."""
+        """Whether a cause acts in some trials only, so that the other trials cannot predict it."""
         return any(candidate.of_trials for candidate, _ in self.causes)
 
     @cached_property
     def carried(self) -> dict[int, list[int]]:
-        """Columns of each healthy part that a simulation has, by the identity of its candidate."""
+        """Columns of each healthy part that a simulation includes, by the identity of its candidate."""
         there = {candidate.key for candidate, _ in self.causes}
         out: dict[int, list[int]] = {}
         for k, label in enumerate(self.problem.labels):
@@ -127,22 +127,25 @@ class Hypothesis:
         return parts_of(self.problem, self.state)
 
     def _is(self, columns: Iterable[int]) -> NDArray[np.bool_]:
-        """Which of the active columns are among some, shape (K,)."""
+        """Mask of the active columns that are among some, shape (K,)."""
         return np.isin(self.parts.active, list(columns))
 
     def told(self, trial: int | None) -> Told:
-        """What a simulation of a trial takes: all from the other trials, but the unknowns of its own; None: of all.
+        """Fit the values for the simulation of a trial to the other trials, and its own unknowns to itself.
 
-        With a single trial, or a cause that is there in some trials only, all trials tell.
+        With a single trial, or if a cause acts in some trials only, all trials enter the fit.
+
+        Args:
+            trial: index of the trial; None fits to all trials.
         """
         p, parts = self.problem, self.parts
         others = parts.others(None if self.of_trials else trial)
         prior, x = self.state.posterior.prior[parts.active], np.zeros(len(parts.active))
-        # Healthy parts and laws have the values that all in the model together gives them.
+        # Fit healthy parts and laws together with everything else.
         beside = [*self.carried.values(), *(group.columns for group, _ in self.laws)]
         if beside:
             x = np.where(self._is(k for own in beside for k in own), parts.step(x, prior, others), 0.0)
-        # Causes are what they are beside that: what else may be off has no share of what they do.
+        # Then fit causes and unknowns with these fixed and all other parts as designed.
         causes = (group.columns for _, group in self.causes)
         alone = self._is(k for own in (p.shared, *p.local, *causes) for k in own)
         x = parts.step(x, np.where(alone, prior, 0.0), others)
@@ -176,7 +179,7 @@ def responses(
     """Simulate every trial under every hypothesis, with unknowns and causes fitted to the other trials.
 
     Args:
-        hypotheses: of the same recordings.
+        hypotheses: about the same recordings.
         jobs: parallel processes.
         simulated: called with 1 for every simulated trial.
     """
@@ -197,15 +200,15 @@ def responses(
 
 @dataclass(frozen=True, eq=False)
 class Confirmed:
-    """What the closed loop made of a set of causes.
+    """Result of the closed-loop test of a set of causes.
 
     Attributes:
-        outcome: with what responds best, where the rows could not tell.
-        odds: of its causes, with what the closed loop says of their rivals.
+        outcome: the search result; a rival replaces a cause if it responds better.
+        odds: of the causes, updated by the closed loop.
         gain: responses without and with the causes.
-        tried: mean chi-square per number with a rival in a cause's place, by both their causes and places.
+        tried: mean chi-square per number with a rival in a cause's place, by the keys of cause and rival.
         contradicted: whether the causes make the response worse.
-        notes: sentences about what was exchanged or is contradicted.
+        notes: sentences about a replaced or contradicted cause.
     """
 
     outcome: TeamOutcome
@@ -222,7 +225,7 @@ class _Swap:
 
     Attributes:
         odds: of the cause.
-        rival: the other.
+        rival: the group that replaces it.
     """
 
     odds: Odds
@@ -234,7 +237,7 @@ class _Swap:
         return self.odds.chosen.group
 
     def state(self, search: Search, near: State) -> State:
-        """A set with the rival, whose columns are added where they are not in the problem."""
+        """The set with the rival instead of the cause; missing columns are added to the problem."""
         rest = [c for c in near.chosen if c is not self.odds.chosen]
         return search.with_one(rest, Chosen(self.rival, self.odds.chosen.scale), near.posterior)
 
@@ -245,11 +248,11 @@ def confirm(
     jobs: int = 1,
     simulated: Callable[[int], object] | None = None,
 ) -> Confirmed:
-    """Simulate without causes, with them, and with each rival in a cause's place that the rows cannot tell from it.
+    """Simulate without causes, with them, and with each rival that the rows cannot distinguish from a cause.
 
     Args:
         outcome: of a search; its rig can simulate.
-        odds: of the causes that are named; other causes of the set are not simulated.
+        odds: of the named causes; other causes of the set are not simulated.
         jobs: parallel processes.
         simulated: called with 1 for every simulated trial.
     """
@@ -311,13 +314,13 @@ def confirm(
 
 
 def _only(outcome: TeamOutcome, chosen: Sequence[Chosen]) -> State:
-    """The set with some of its causes."""
+    """Reduce the set to some of its causes."""
     state = outcome.state
     return state if len(chosen) == len(state.chosen) else outcome.search.value(chosen, state.posterior)
 
 
 def _swaps(outcome: TeamOutcome, odds: Sequence[Odds]) -> Iterator[_Swap]:
-    """Rivals that the rows do not tell from a cause, each in its place; events are of one trial alone."""
+    """Rivals that the rows cannot distinguish from a cause, except for events, which belong to a single trial."""
     there = {o.chosen.group.key for o in odds}
     for o in odds:
         for group in o.told():
@@ -331,7 +334,7 @@ def _swaps(outcome: TeamOutcome, odds: Sequence[Odds]) -> Iterator[_Swap]:
 
 
 def _exchanged(outcome: TeamOutcome, odds: Sequence[Odds], swap: _Swap) -> tuple[TeamOutcome, list[Odds]]:
-    """The outcome with the rival in the cause's place, and the odds; what both had, it has."""
+    """Replace a cause by its rival in outcome and odds; the rival inherits most of their joint probability."""
     search = outcome.search
     state = search.settled(search.formed(swap.state(search, outcome.state)))
     out = []
@@ -351,7 +354,7 @@ def _exchanged(outcome: TeamOutcome, odds: Sequence[Odds], swap: _Swap) -> tuple
 
 
 def _revised(odds: Odds, worse: set[tuple[Key, Key]], weight: float) -> Odds:
-    """The odds of a cause once rivals respond worse: these are no look-alikes."""
+    """Lower the odds of rivals that respond worse, and give their probability to the cause."""
     most, rivals = math.exp(-TOLD_NATS) * odds.probability, []
     for r in odds.rivals:
         out = r.group is not None and (odds.chosen.group.key, r.group.key) in worse
@@ -364,7 +367,7 @@ def _revised(odds: Odds, worse: set[tuple[Key, Key]], weight: float) -> Odds:
 def _with_all_as_found(
     gain: Gain, found: Hypothesis, jobs: int, simulated: Callable[[int], object] | None
 ) -> Gain:
-    """The gain with responses of healthy parts as they are found, where more than noise is left without."""
+    """Add responses with the deviations of healthy parts, if more than noise remains without them."""
     left = [b.chi2_per_n for _, b in gain.pairs]
     if not left or np.mean(left) <= VISIBLE_CHI2_PER_N:
         return gain
@@ -372,10 +375,10 @@ def _with_all_as_found(
 
 
 def left_by(outcome: TeamOutcome) -> Callable[[Recording], tuple[Reduction, Array]]:
-    """What robots, payload and causes as a search found them leave in the rows of a recording.
+    """Make a function that computes the residual rows of a recording under a search result.
 
     Raises:
-        InputError: there are no such robots.
+        InputError: no such robots can exist.
     """
     rig, found = outcome.problem.rig, found_in(outcome.problem, outcome.state)
     units, _, shared = robots_at(rig, found)
@@ -383,21 +386,21 @@ def left_by(outcome: TeamOutcome) -> Callable[[Recording], tuple[Reduction, Arra
 
 
 def write_model(outcome: TeamOutcome, chosen: Sequence[Chosen], folder: Path, *, whole: bool = False) -> None:
-    """Write the estimated team with causes in it as an extended model; ``mocobot simulate --model`` takes it.
+    """Write the estimated team with causes as an extended model for ``mocobot simulate --model``.
 
     Args:
         outcome: of a search.
-        chosen: those of its causes that are named.
+        chosen: its named causes.
         folder: to be written.
-        whole: whether every healthy part is in it as it is found, within its tolerance, too.
+        whole: whether to include the deviations of all healthy parts, within their tolerances.
 
     Raises:
-        InputError: the folder cannot be written, or a cause has values that no effect can have.
+        InputError: the folder cannot be written, or no effect can have the values of a cause.
     """
     found = Hypothesis(outcome.problem, _only(outcome, chosen), whole)
     rig, told = found.rig, found.told(None)
     effects, causes = list(told.laws), [cause for cause, _ in found.causes]
-    for cause, group in found.causes:  # as large as they are told, beside what is healthy
+    for cause, group in found.causes:  # with their estimated sizes, next to the healthy parts
         values = outcome.problem.values_of(group, found.state.posterior.mean)
         effects += named_effects(cause, rig.effects(cause, values))
     parts = rig.of_healthy(0, causes, told.healthy) if whole else []

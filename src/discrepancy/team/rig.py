@@ -1,4 +1,4 @@
-"""A team of Omnids: recordings as whitened rows, the columns of every cause, and how to simulate it again."""
+"""A team of Omnids: its recordings as whitened rows, the columns of every cause, and its simulation."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ from mocobot_sim.scene.pymjcf import why_not_composed
 
 @dataclass(frozen=True, eq=False)
 class AsFound:
-    """What a search found.
+    """Robots, payload and causes as a search found them.
 
     Attributes:
         units: the robots.
         shared: grasps and payload.
-        causes: the others with their values.
+        causes: causes that are not parameters of the robots, with their values.
     """
 
     units: ArmUnit
@@ -66,7 +66,7 @@ class AsFound:
 
     @classmethod
     def of(cls, units: ArmUnit, shared: Shared, causes: Iterable[tuple[Candidate, Array]]) -> AsFound:
-        """With those causes that are not the robots' own and not of some trials alone."""
+        """Drop the causes that are parameters of the robots or act in some trials only."""
         return cls(units, shared, [(c, v) for c, v in causes if places_of(c) is None and not c.of_trials])
 
 
@@ -76,15 +76,15 @@ class TeamRig:
 
     Attributes:
         recordings: the trials.
-        sensed: what noise leaves in the rows.
+        sensed: effect of sensor noise on the rows.
         linear: linearised trials.
         tolerances: standard deviations by cause and parameter.
         excluded: causes left out of the catalogue.
-        origin: how far from the robots as they were believed to be all is linear; None for not at all.
-        resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
+        origin: linearisation point of the robots, minus their assumed parameters; None for zero.
+        resting: for each cause that acts as noise at rest, its spread over its tolerance.
         jobs: parallel processes.
-        laws: whether to look for what no table lists: where noise is loud (``auto``), ``always`` or ``never``.
-        kept: what causes leave open, which is asked for again and again.
+        laws: when to search for unlisted laws: ``auto`` (if the noise is excessive), ``always`` or ``never``.
+        kept: cache of the causes' latent states.
     """
 
     recordings: tuple[Recording, ...]
@@ -110,8 +110,8 @@ class TeamRig:
         """Linearise recordings around their estimate.
 
         Raises:
-            InputError: the recordings do not determine the grasps, the mass and the centre of mass, or a cause to
-                be excluded does not exist.
+            InputError: the recordings do not determine grasps, mass and centre of mass, or an excluded cause does not
+                exist.
         """
         left_out, limits = excluded_from(CAUSES, excluded), limits_of(tolerances, HEALTHY)
         linear, sensed = linearised_trials(recordings, start_shared(estimate), limits, jobs)
@@ -119,7 +119,7 @@ class TeamRig:
 
     @property
     def whitening(self) -> tuple[Whitening, ...]:
-        """One for each trial."""
+        """Whitening of each trial."""
         return self.sensed.whitening
 
     @property
@@ -137,7 +137,7 @@ class TeamRig:
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """Pose of each further robot as seen by the first, then the balance of wrenches, 6 N."""
+        """The 6 N channels: pose of each further robot relative to the first, then the wrench balance."""
         out = []
         for i in range(2, self.robots + 1):
             out += [Channel(f"grasp {i} rotation {a}", "kinematic", i, "rad") for a in "xyz"]
@@ -146,20 +146,20 @@ class TeamRig:
         return out + [Channel(f"moment {a}", "balance", None, "N m") for a in "xyz"]
 
     def candidates(self) -> list[Candidate]:
-        """Every cause of the catalogue at every place; transients come from ``transients``."""
+        """Every cause of the catalogue at every place, without transients."""
         found = every_candidate(self.robots, self.tolerances, self.excluded)
         return [candidate for candidate in found if not (self.aligned and CAUSES[candidate.cause].by_clocks)]
 
     @property
     def aligned(self) -> bool:
-        """Whether the motion has set the robots' clocks in every trial."""
+        """Whether the motion aligned the robots' clocks in every trial."""
         return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
 
     def columns(self, candidate: Candidate) -> Sequence[Array]:
         return self._each(lambda t: self._columns(t, candidate), len(self.linear))
 
     def _each(self, of: Callable[[int], Array], count: int) -> Sequence[Array]:
-        """Arrays by their number; of long recordings each whenever it is asked for."""
+        """Compute several arrays; those of long recordings are computed at each access."""
         return OneByOne(of, count) if is_filed(self.linear[0]) else list(map(of, range(count)))
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:
@@ -171,13 +171,22 @@ class TeamRig:
         return columns
 
     def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
-        """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
+        """Residual per unit of each parameter in a trial, before whitening, shape (n, C, k)."""
         return CAUSES[candidate.cause].columns(self.linear[trial], *indices(candidate), candidate.shape)
 
     def _without(
         self, trial: int, active: Sequence[tuple[Candidate, Array]], noise: Signals | None = None
     ) -> tuple[Signals, list[tuple[Candidate, Array]]]:
-        """A trial's signals without causes that are errors of them, functions of them without noise; and others."""
+        """Remove signal errors from a trial's signals.
+
+        Args:
+            trial: index from 0.
+            active: causes with their values.
+            noise: sensor noise, which causes that are functions of the readings must not see.
+
+        Returns:
+            The corrected signals, and the causes that are not errors of the signals.
+        """
         signals, others = self.linear[trial].signals, []
         for candidate, values in active:
             x = noise if noise and CAUSES[candidate.cause].adjusted else None
@@ -196,18 +205,24 @@ class TeamRig:
             return self.kept[key]
         of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
         own = [w.of_patches(of(t, *place)).fewer() for w, t in zip(self.whitening, self.linear, strict=True)]
-        if not is_filed(self.linear[0]):  # of long recordings they would fill the memory
+        if not is_filed(self.linear[0]):  # those of long recordings would fill the memory
             self.kept[key] = own
         return own
 
     def beyond(self, candidate: Candidate, values: Array) -> Array:
-        """Values beyond what the robots, as they were found, have already."""
+        """Values minus those that the linearisation point of the robots already includes."""
         return beyond(candidate, values, self.origin)
 
     def residual_there(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        """The exact whitened residual where all is linear: what the robots are off by is in none of it."""
+        """Exact whitened residual at given values of unknowns and causes, shape (n, C) a trial.
+
+        Args:
+            shared: displacement of the shared unknowns.
+            local: displacement of each trial's own unknowns.
+            active: causes with their values.
+        """
         out = []
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
@@ -232,7 +247,7 @@ class TeamRig:
         return Context(pi[1:4] / pi[0], height, candidate.shape, trial)
 
     def effects(self, candidate: Candidate, values: Array) -> list[Effect] | None:
-        """The simulator's effects, or None where the values are none that they can have (a negative play).
+        """The simulator's effects, or None if they cannot have such values (a negative play).
 
         Args:
             candidate: a cause.
@@ -252,7 +267,7 @@ class TeamRig:
         return origin_of(candidate, self.origin) is not None
 
     def robots_of(self, trial: int, healthy: Sequence[tuple[Candidate, Array]]) -> Recording:
-        """The recording of a trial with its robots off by as much as they are found beside the causes."""
+        """A trial's recording, with the estimated deviations of its healthy robots in the metadata."""
         recording = self.recordings[trial]
         units = recording.metadata.units
         if not healthy or units is None:
@@ -268,7 +283,7 @@ class TeamRig:
     def of_healthy(
         self, trial: int, causes: Sequence[Candidate], healthy: Sequence[tuple[Candidate, Array]]
     ) -> list[Effect]:
-        """What healthy parts are as effects, beside causes: those that ``robots_of`` does not have."""
+        """Effects of healthy parts, except for causes and for what ``robots_of`` already includes."""
         there = {candidate.key for candidate in causes}
         as_designed = self.recordings[trial].metadata.units is None
         effects: list[Effect] = []
@@ -282,10 +297,11 @@ class TeamRig:
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
         healthy: Sequence[tuple[Candidate, Array]] = (), laws: Sequence[Effect] = (),
     ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
-        """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
+        """Make a function that simulates one trial's commands with displaced unknowns and with causes.
 
-        It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
-        that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
+        The function returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or
+        None if the simulation is impossible. It only holds the recording and numbers, so that it can run in another
+        process.
         """
         linear = self.linear[trial]
         effects = [*laws]
@@ -306,11 +322,11 @@ class TeamRig:
         )
 
     def left_in(self, recording: Recording, found: AsFound) -> tuple[Reduction, Array]:
-        """Rows that another recording of the team leaves, shape (n, C), its bases where they leave the least.
+        """Residual rows of another recording of the team, shape (n, C), with its bases fitted.
 
         Args:
-            recording: of the same payload, its units as they were believed to be.
-            found: robots, payload, and causes that are not of one trial alone.
+            recording: of the same payload, with the assumed robots in its metadata.
+            found: robots, payload, and causes that act in every trial.
         """
         units, shared = found.units, found.shared
         known = replace(recording, metadata=replace(recording.metadata, units=units))
@@ -328,7 +344,7 @@ class TeamRig:
         return scale_of_response(self.sensed.noise, self.linear[trial].signals)
 
     def quantities(self, trial: int) -> dict[str, Array]:
-        """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
+        """RMS over robots and axes of grasp velocity [m/s], displacement [m] and torque [N m], shape (n,) each."""
         linear = self.linear[trial]
         at = linear.reduction.sample
         velocity, h = linear.data.twist[at, :, 3:], linear.data.p_bi[at]
@@ -339,7 +355,7 @@ class TeamRig:
         return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
 
     def directions(self, trial: int) -> dict[str, Array]:
-        """Unit directions in the whitened rows of every spring torque and angle, shape (n, C, 1) each."""
+        """Unit directions of every spring torque and angle in the whitened rows, shape (n, C, 1) each."""
         out, linear, white = {}, self.linear[trial], self.whitening[trial].rows_only
         for robot in range(self.robots):
             J = linear.J.at(robot, slice(None), linear.reduction.sample)

@@ -1,4 +1,4 @@
-"""A verdict on a team as JSON values with words, text and folder."""
+"""Report a verdict on a team: JSON values with sentences, and models for the result folder."""
 
 from __future__ import annotations
 
@@ -29,12 +29,13 @@ from estimator.arrays import Array
 
 
 def signature(rig: TeamRig, z: Sequence[Array]) -> dict[str, Any]:
-    """Describe what is left of the whitened residual beyond noise, shape (n, C) a trial, as plain numbers.
+    """Describe the whitened residual beyond noise, shape (n, C) a trial, as plain numbers.
 
     Returns:
-        ``chi2_per_n`` in all and by ``kind`` of channel, ``robot``, ``trial``; ``moving_share``: part of the excess
-        while the rig moves; ``correlation`` of its size with the rig's explanatory quantities; ``frequency_hz``:
-        median frequency of the worst channel; ``along``: the source along which most of it points; ``sentence``.
+        ``chi2_per_n`` overall and by ``kind`` of channel, ``channel`` and ``trial``; ``moving_share``: share of the
+        excess during motion; ``correlation`` of its size with the rig's explanatory quantities; ``worst_channel``;
+        ``frequency_hz``: median frequency of that channel; ``along``: shares of the residual along the directions of
+        its likeliest sources; ``sentence``.
     """
     squares = np.concatenate([(x**2) for x in z])
     out: dict[str, Any] = {"chi2_per_n": float(squares.mean())}
@@ -76,7 +77,7 @@ def _median_frequency(rig: TeamRig, z: Sequence[Array], channel: int) -> float:
 
 
 def _along(rig: TeamRig, z: Sequence[Array]) -> dict[str, float]:
-    """Share of the squared residual along each source's own direction (one of C dimensions, or a few)."""
+    """Share of the squared residual along the direction of each possible source, for the five largest."""
     shares: dict[str, list[float]] = {}
     total = sum(float(np.sum(x**2)) for x in z)
     for t, x in enumerate(z):
@@ -119,7 +120,7 @@ UNDECIDABLE = (
         "one robot released at a time",
     ),
 )
-"""What recordings of a parked team that holds one rigid payload cannot decide: what, why, and what would."""
+"""Questions that a parked team with one rigid payload cannot answer: what, why, and what would answer them."""
 
 
 UNITS = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}
@@ -127,13 +128,18 @@ UNITS = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position":
 
 
 def describe(candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
-    """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+    """Describe the action of a cause at its place in a sentence with numbers; standard errors may be NaN."""
     cause = CAUSES[candidate.cause]
     return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
 
 
 def statements(robots: int, *, aligned: bool) -> list[dict[str, Any]]:
-    """What, why, and what would decide it, for a team of N robots whose clocks the motion may have set (aligned)."""
+    """Undecidable questions of a team of N robots: what, why, and what would decide them.
+
+    Args:
+        robots: N.
+        aligned: whether the motion aligned the robots' clocks.
+    """
     said = [{"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE]
     if aligned:
         why = "the conversion has taken out what the motion tells of the clocks"
@@ -152,11 +158,11 @@ NOT_SIMULATED: Values = {
     "held_out": {"before": None, "after": None, "as_found": None}, "units": {}, "noise": {}, "removed": None,
     "validated": False, "trials": [],
 }  # fmt: skip
-"""What ``gain`` has where nothing was simulated."""
+"""Values of ``gain`` in the JSON without a simulation."""
 
 
 class TeamValues(Told):
-    """A verdict on a team as values with words."""
+    """A verdict on a team as values with sentences."""
 
     machine = "team"
     verdict: TeamVerdict
@@ -197,14 +203,14 @@ class TeamValues(Told):
 
 @dataclass(frozen=True, eq=False)
 class TeamDiagnosed(Diagnosed[TeamVerdict]):
-    """A verdict with what simulations say.
+    """A verdict with the results of closed-loop simulations.
 
     Attributes:
-        verdict: of the engine.
+        verdict: causes, sizes and their benefit.
         outcome: of the search.
-        gain: responses in closed loop; None where there were none.
-        not_simulated: why there were none.
-        errors: of the payload's estimates ``before`` and ``after``, where the truth is known.
+        gain: responses in closed loop; None without a simulation.
+        not_simulated: reason why there is no simulation.
+        errors: of the payload's estimates ``before`` and ``after``, if the truth is known.
     """
 
     verdict: TeamVerdict
@@ -239,7 +245,7 @@ class TeamDiagnosed(Diagnosed[TeamVerdict]):
 
 
 def gain_to_dict(gain: Gain, rig: TeamRig) -> Values:
-    """``gain`` of the JSON."""
+    """Convert responses to ``gain`` of the JSON."""
     channels = list(next((a.rms for a, _ in gain.pairs), {}))
     removed = excess_removed((a.chi2_per_n, b.chi2_per_n) for a, b in gain.pairs)
     if removed is not None:
@@ -270,14 +276,14 @@ def _response(response: Response | None) -> dict[str, float] | None:
 
 
 def _mean(responses: Sequence[Response | None]) -> dict[str, float] | None:
-    """That of some trials is not to be held against that of all."""
+    """Mean over all trials; None if a trial failed, because a mean over fewer trials is not comparable."""
     each = [values for values in map(_response, responses) if values is not None]
     whole = each and len(each) == len(responses)
     return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if whole else None
 
 
 def place_of(candidate: Candidate) -> dict[str, Any]:
-    """Cause (its name, in words, in words at its place), family and place of a candidate, as all over the JSON."""
+    """Cause, family and place of a candidate, in names and words, with the keys used throughout the JSON."""
     return {
         "cause": candidate.cause,
         "kind": candidate.kind,

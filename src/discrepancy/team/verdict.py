@@ -1,4 +1,4 @@
-"""From a search in recordings of a team to a verdict: causes with probabilities, sizes, and what they are worth."""
+"""Turn a search result into a verdict: causes with probabilities, sizes and their benefit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from estimator.arrays import Array
 
 
 def parts_of(problem: TeamProblem, state: State) -> Parts:
-    """The rows of a search by trial; base poses, grips and what acts in some trials only are each trial's own."""
+    """Split the rows by trial. Base poses, clocks and causes that act in some trials belong to each trial alone."""
     local = [k for own in problem.local for k in own]
     events = [
         k
@@ -41,7 +41,7 @@ def parts_of(problem: TeamProblem, state: State) -> Parts:
 
 
 def _each(problem: TeamProblem, state: State) -> Iterator[tuple[Array, Array, float, Array]]:
-    """Weighted normal equations of the active columns, and rows by channel and band, of each trial."""
+    """Weighted normal equations of the active columns, and row counts by channel and band, of each trial."""
     cells, active = problem.cells, np.flatnonzero(state.posterior.prior)
     place = np.full(cells.count, -1)
     place[active] = np.arange(len(active))
@@ -63,17 +63,17 @@ def _each(problem: TeamProblem, state: State) -> Iterator[tuple[Array, Array, fl
 
 
 STEPS = 10.0
-"""Steps of a number of a shape up to which it may be off, a prior as wide as none."""
+"""Prior standard deviation of a shape number, in steps of the search. Chosen: wide enough to have no influence."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TeamVerdict(Verdict):
-    """What recordings say of a model of a team.
+    """Verdict on a model of a team.
 
     Attributes:
         rig: the recordings.
-        candidates: by cause and place as findings have them.
-        left: whitened rows that are left, as simulated (``before``) and with everything that was found (``after``).
+        candidates: by cause and place, as in the findings.
+        left: whitened residual rows, of the given model (``before``) and with all findings (``after``).
         estimates: of the payload, by the same names.
     """
 
@@ -86,13 +86,13 @@ class TeamVerdict(Verdict):
 def judged_team(
     outcome: TeamOutcome, odds: Sequence[Odds], notes: Sequence[str] = (), *, contradicted: bool = False
 ) -> TeamVerdict:
-    """What a search found, told.
+    """Turn a search result into a verdict.
 
     Args:
         outcome: of the search.
         odds: of its causes.
         notes: sentences on the recordings.
-        contradicted: whether the causes make the response to the commands worse.
+        contradicted: whether the causes make the simulated response worse.
     """
     verdict = _TeamJudge(outcome, odds).verdict(outcome, notes)
     if contradicted and verdict.verdict == "explained":
@@ -101,8 +101,6 @@ def judged_team(
 
 
 class _TeamJudge(Judge):
-    """What one search found in recordings of a team."""
-
     problem: TeamProblem
     tolerated = True
 
@@ -112,7 +110,7 @@ class _TeamJudge(Judge):
         super().__init__(outcome.problem, (outcome.search, outcome.state), plain, parts, odds)
 
     def verdict(self, outcome: TeamOutcome, notes: Sequence[str]) -> TeamVerdict:
-        """All that is told."""
+        """Assemble the verdict."""
         told, problem, rig = self.told(), self.problem, self.rig
         prior, fitted = np.zeros(len(self.state.posterior.prior)), self.fitted(problem)
         prior[fitted] = self.state.posterior.prior[fitted]
@@ -157,7 +155,7 @@ class _TeamJudge(Judge):
 
     @cache  # noqa: B019
     def _law(self, group: Group) -> Law:
-        """What no table lists, with its formula."""
+        """The unlisted law with its formula."""
         return self.problem.laws_of.told(group, *self.fit_of(group))
 
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
@@ -175,12 +173,12 @@ class _TeamJudge(Judge):
         return (Member(group.place, candidate.joint, numbers, errors),)
 
     def _parameters(self, group: Group) -> list[int]:
-        """Which parameter of its candidate each column of a group is."""
+        """Parameter index of each column of a group."""
         labels = [self.problem.labels[k] if k < len(self.problem.labels) else None for k in group.columns]
         return [n if label is None else label[1] for n, label in enumerate(labels)]
 
     def _with_shape(self, group: Group, candidate: Candidate, x: Array, C: Array) -> Array:
-        """Covariance of values and of the numbers of the shape that the data determine, shape (k + s, k + s)."""
+        """Covariance of values and of the shape numbers that the data determine, shape (k + s, k + s)."""
         cells, p, k = self.problem.cells, self.state.posterior, len(x)
         count = cells.count
         index, _, size = self.problem.slopes(candidate, x)
@@ -207,7 +205,7 @@ class _TeamJudge(Judge):
         return [*problem.shared, *(k for own in problem.local for k in own)]
 
     def before(self) -> Side:
-        """Noise and spreads are those with the causes: without, a kind's spread takes up what one of it does."""
+        """The state without causes, with the noise and spreads found with them, so that these absorb no cause."""
         p, prior = self.state.posterior, self.state.posterior.prior.copy()
         nominal = np.append(self.problem.prior((), None), np.zeros(len(prior)))
         own = [k for c in self.state.chosen for k in (*c.group.columns, *c.forms)]
@@ -226,10 +224,10 @@ class _TeamJudge(Judge):
         return first.values()
 
     def _shaped(self, group: Group) -> bool:
-        return False  # other shapes are listed apart
+        return False  # other shapes are listed separately
 
     def _scatter(self) -> list[Scatter]:
-        """Kinds that are off everywhere, by the numbers that have tolerances."""
+        """Causes whose parameters are inflated everywhere, limited to parameters with tolerances."""
         return [
             replace(
                 s,
@@ -243,12 +241,12 @@ class _TeamJudge(Judge):
 
 
 def traces(rig: TeamRig, opened: Sequence[Array] | None, left: Mapping[str, Sequence[Array]]) -> list[Trace]:
-    """Residuals of every trial for pictures.
+    """Residuals of every trial, for plots.
 
     Args:
         rig: the recordings.
-        opened: what makes rows white beside what chosen causes leave open, shape (n, C, C) a trial; or None.
-        left: rows so whitened, ``before`` and ``after``, shape (n, C) a trial.
+        opened: whitening against the latent states of the chosen causes, shape (n, C, C) a trial; or None.
+        left: residual rows after that whitening, ``before`` and ``after``, shape (n, C) a trial.
     """
     out = []
     for t, (linear, white) in enumerate(zip(rig.linear, rig.whitening, strict=True)):
@@ -265,12 +263,12 @@ def traces(rig: TeamRig, opened: Sequence[Array] | None, left: Mapping[str, Sequ
 
 
 def unwhitened(white: Whitening, y: Array) -> Array:
-    """The residual whose whitening is y, shape (n, C) -> (n, C)."""
+    """Invert the whitening, shape (n, C) -> (n, C)."""
     order, moving = white.ar.shape[1], white.moving
     z = y[:moving].copy()
     for c in range(y.shape[1] if moving > order else 0):
         a = np.concatenate([[1.0], -white.ar[c]])
-        # The first rows are as they were; they are the past of the first that was predicted.
+        # The first rows were not predicted; they are the past of the first predicted row.
         past = [
             float(np.dot(white.ar[c][k:], z[order - 1 :: -1, c][: order - k] if order else []))
             for k in range(order)

@@ -1,4 +1,4 @@
-"""The catalogue of a team's causes, by subject, and how far a well-kept Omnid may be from its model."""
+"""The catalogue of a team's causes by topic, and their default tolerances."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CAUSES: dict[str, Cause] = {cause.name: cause() for cause in CATALOGUE}
 
 
 def default_tolerances() -> dict[str, dict[str, float]]:
-    """Those that the causes have, by cause and parameter."""
+    """Default standard deviations by cause and parameter."""
     return {
         name: dict(zip(cause.parameters, cause.tolerances, strict=True))
         for name, cause in CAUSES.items()
@@ -44,7 +44,7 @@ def default_tolerances() -> dict[str, dict[str, float]]:
 
 
 def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
-    """The defaults, with what a TOML file changes; see ``discrepancy.cause_names``.
+    """The default tolerances, with changes from a TOML file; see ``discrepancy.cause_names``.
 
     Raises:
         InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.

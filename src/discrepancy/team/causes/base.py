@@ -1,4 +1,4 @@
-"""What every cause of the team's catalogue offers the diagnosis."""
+"""Interface of every cause in the team's catalogue."""
 
 import inspect
 import re
@@ -25,7 +25,7 @@ GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What turns columns' values into an effect's parameters.
+    """Quantities that turn the columns' values into an effect's parameters.
 
     Attributes:
         p_1c: centre of mass of the payload in {1} [m], shape (3,).
@@ -41,31 +41,31 @@ class Context:
 
 
 class Cause(ABC):
-    """One physical cause: the trace that one unit of each of its parameters leaves in the residual.
+    """A physical cause: the residual that one unit of each of its parameters adds.
 
-    The simulator's effect has the same name. Tolerances are those of a well-kept Omnid: assumed, like its masses, for a
-    calibrated unit with 16-bit encoders; a lab replaces them by its own (``--tolerances``).
+    The simulator's effect has the same name. Default tolerances are assumed, for a well-kept, calibrated Omnid with
+    16-bit encoders. A lab replaces them with its own (``--tolerances``).
 
     Attributes:
-        name: as on the command line: that of the class, in lower case with underscores.
-        title: in words, for people; the part it sits at in braces, such as ``friction in {driven joint}``. The name
-            without underscores, if a cause does not say.
-        family: causes of one family look alike.
-        parameters: names of the columns' parameters, units as suffix.
-        tolerances: of the parameters, standard deviations that are no news; none where the cause is an event.
-        scales: their typical sizes, where there are no tolerances.
+        name: as on the command line: the class name in lower case with underscores.
+        title: in words, with the part in braces, such as ``friction in {driven joint}``. The default is the name
+            without underscores.
+        family: causes of one family resemble each other.
+        parameters: names of the columns' parameters, with units as suffix.
+        tolerances: standard deviation of each parameter in a healthy team; empty if the cause is an event.
+        scales: typical sizes of the parameters, if there are no tolerances.
         positive: parameters that cannot be negative.
-        transient: whether it acts for a while in one trial.
-        where: the part of the machine, of what sits at no robot.
-        among: of how many it is one, where its shape says at which of many places it sits; 0 where places are listed.
-        separate: what experiment would tell it from its look-alikes.
-        at: what it can sit at; every robot has its own but for the payload.
-        joints: those that it can sit at, from 1.
-        shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
-        determined: numbers of the shape that the data determine, with what ``slope_step`` makes steps of.
-        clipped: the effect's parameters that are zero where the fit has them below.
-        by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
-            adjusted: whether it is a function of the readings, which are taken without their noise then.
+        transient: whether it acts during an interval of one trial only.
+        where: the part of the machine, for causes that belong to no robot.
+        among: number of equally probable places, if the shape contains the place; 0 if the places are listed.
+        separate: experiment that would distinguish it from similar causes.
+        at: the part that it acts on. Every robot has its own, except for the payload.
+        joints: joints that it can act on, from 1.
+        shapes: alternative numbers that change the columns themselves; the first one is in the catalogue.
+        determined: shape numbers that the data determine, and the size of their finite differences (``slope_step``).
+        clipped: parameters of the effect that are set to zero if the fit makes them negative.
+        by_clocks: whether it only acts through the robots' clocks, so that it is invisible if the motion aligned them.
+        adjusted: whether it is a function of the readings, which are then taken without their noise.
     """
 
     name: ClassVar[str]
@@ -96,9 +96,9 @@ class Cause(ABC):
         """The cause at a place.
 
         Args:
-            given: standard deviations that are no news, by parameter; an event where there are none.
+            given: standard deviation of each parameter in a healthy team; empty for an event.
             shape: numbers inside its columns.
-            robot, joint: where, from 1.
+            robot, joint: place, from 1.
         """
         parameters = tuple(
             Parameter(name, given.get(name, 0.0), scale)
@@ -114,14 +114,14 @@ class Cause(ABC):
         return replace(self.candidate(given, when.shape), transient=when)
 
     def sentence(self, n: Numbers) -> str:
-        """What it does, without place and full stop; the first line of its docstring, if it says nothing else."""
+        """Describe its action, without place and full stop. The default is the first line of the class docstring."""
         said = (inspect.getdoc(self) or self.name).splitlines()[0].rstrip(".")
         each = ", ".join(f"{name} = {number(value, n.se.get(name), '')}" for name, value in n.values.items())
         return f"{said} ({each})"
 
     @property
     def per(self) -> Literal["joint", "robot", "payload"]:
-        """What has one of it at most."""
+        """The part that has at most one such cause."""
         if self.at == "payload":
             return "payload"
         return "joint" if self.at.endswith("joint") else "robot"
@@ -132,63 +132,64 @@ class Cause(ABC):
 
         Args:
             trial: the linearised trial.
-            robot, joint: place, indices from 0 (0 where it has none).
+            robot, joint: place, indices from 0 (0 if it has none).
             shape: one of ``shapes``.
         """
 
     def undo(
         self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
     ) -> Signals | None:
-        """The signals as they would be without the cause, or None where it is not an error of the signals."""
+        """Remove the cause from the signals. Return None if it is not an error of the signals."""
         return None
 
     def finer(self, shape: Shape) -> Sequence[Shape]:
-        """Shapes near a chosen one, for a second look."""
+        """Shapes near a chosen one, for a finer search."""
         return []
 
     def further(self, shape: Shape) -> Sequence[Shape]:
-        """Shapes that have more to them, to be tried once the best of the plain ones is found."""
+        """Shapes with additional features, tried once the best simple shape is found."""
         return []
 
     def grown(self, shape: Shape) -> Sequence[Shape]:
-        """The same shape with a number more that the data determine, zero so far; none where that is all."""
+        """The same shape with one more number, still zero, that the data determine. Empty if there is none."""
         return []
 
     def around(self, values: Array, shape: Shape) -> Shape:
-        """The shape, its columns linear around values."""
+        """The shape whose columns are linearised around given values."""
         return shape
 
     def alike(self, shape: Shape) -> int:
-        """Number of equally likely ones that differ by their shapes alone; 0 where places are listed."""
+        """Number of equally probable candidates that differ in shape only; 0 if the places are listed."""
         return self.among
 
     def slope_step(self, name: str, number: float) -> float:
-        """By how much a number of the shape is changed for slopes: a share of it."""
+        """Step of a shape number for finite differences, by default a share of the number."""
         return self.determined[name] * abs(number)
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
-        """Columns of what the cause leaves open in one trial, such as the friction of a joint at rest."""
+        """Columns of latent states that a cause adds to one trial, such as the friction torque of a joint at rest."""
         return Patches(trial.residual.shape)
 
     def place(self, candidate: Candidate) -> str:
-        """Robot and joint, of a gimbal its axis, too."""
+        """Robot and joint, and the axis of a gimbal joint."""
         if self.at != "gimbal joint" or candidate.joint is None:
             return candidate.place.capitalize()
         return f"Robot {candidate.robot}, gimbal joint {candidate.joint}, axis {GIMBAL_AXES[candidate.joint]}"
 
     def physical(self, values: Array, context: Context) -> dict[str, float]:
-        """The effect's parameters (names as in the simulator) from the columns' values."""
+        """Convert the columns' values to the effect's parameters (names as in the simulator)."""
         return dict(zip(self.parameters, values.tolist(), strict=True))
 
     def report(
         self, values: Array, covariance: Array, context: Context
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """The effect's parameters and their standard errors; a shape that was chosen, not determined, has none (NaN).
+        """Return the effect's parameters and their standard errors. A shape that is not determined by the data has NaN.
 
         Args:
-            values: the columns', shape (k,).
-            covariance: of the values, then of what is determined of the shape, shape (k + s, k + s) or (k, k).
-            context: what else the parameters depend on.
+            values: of the columns, shape (k,).
+            covariance: of the values, then of the shape numbers that the data determine, shape (k + s, k + s) or (k,
+                k).
+            context: other quantities that the parameters depend on.
         """
         physical = self.physical(values, context)
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -204,7 +205,7 @@ class Cause(ABC):
         return physical, {name: float(np.sqrt(v)) if v else float("nan") for name, v in squares.items()}
 
     def _moved(self, values: Array, context: Context, step: Array) -> dict[str, float]:
-        """The effect's parameters a step away, in values and shape."""
+        """The effect's parameters after a step in values and shape."""
         k = len(values)
         named = (name for name in self.determined if name in context.shape)
         further = dict(zip(named, step[k:], strict=False))
@@ -213,13 +214,13 @@ class Cause(ABC):
 
 
 class ReadingError(Cause):
-    """An error of one robot's readings, linear in the parameters: taken out of the signals, not added to the model."""
+    """An error of one robot's readings, linear in its parameters; it is removed from the signals."""
 
     @abstractmethod
     def errors(
         self, signals: Signals, robot: int, joint: int, shape: Shape, arm: Arms
     ) -> Sequence[Mapping[str, Array]]:
-        """Per parameter what one unit adds to ``phi``, ``theta``, ``tau`` of the robot, shape (Q, 3) or (3,)."""
+        """Error of the robot's ``phi``, ``theta``, ``tau`` per unit of each parameter, shape (Q, 3) or (3,)."""
 
     def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
         signals = trial.adjusted if self.adjusted else trial.signals
@@ -237,19 +238,19 @@ class ReadingError(Cause):
 
 
 def one_joint(values: Array, joint: int) -> Array:
-    """A signal of one joint among three, shape (Q,) -> (Q, 3)."""
+    """Place a signal at one joint of three, shape (Q,) -> (Q, 3)."""
     out = np.zeros((len(values), 3))
     out[:, joint] = values
     return out
 
 
 def one_robot(values: Array, robots: int, robot: int) -> Array:
-    """A signal of one robot among N, shape (Q, 3) -> (Q, N, 3)."""
+    """Place a signal at one robot of N, shape (Q, 3) -> (Q, N, 3)."""
     out = np.zeros((len(values), robots, 3))
     out[:, robot] = values
     return out
 
 
 def stack(columns: Sequence[Array]) -> Array:
-    """Columns (n, C) side by side, shape (n, C, k)."""
+    """Stack columns (n, C) to shape (n, C, k)."""
     return np.stack(columns, axis=-1)

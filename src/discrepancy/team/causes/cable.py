@@ -1,4 +1,4 @@
-"""Cables and straps that pull at a robot or at the payload."""
+"""Cables, straps and springs that pull at a robot's grasp or at the payload."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from discrepancy.team.causes.base import Cause, Shape
 from estimator.arrays import Array
 
 CABLES, CABLE_LINES = 10_000, 100
-"""Distinguishable cables: ways 0.1 rad apart times eight stretches; lines 0.1 m apart at the payload."""
+"""Distinguishable cables: directions 0.1 rad apart times eight stretches; their lines at the payload, 0.1 m apart."""
 
 TETHER_LEVER_M, TETHER_FINER_M, TETHER_STEP_M = 0.4, (0.2, 0.07, 0.025), 0.02
-"""Levers of a payload tether [m]: first grid, finer grids, and step of slopes."""
+"""Levers of a payload tether [m]: first grid, finer grids, and step of finite differences. Chosen."""
 
 CABLE_STIFFENS_RANGE_PER_M, CABLE_STIFFENS_STEP_PER_M, STRAPS = (-3.0, 1000.0), 20.0, 20
-"""Relative growth of a strap's stiffness per metre: range, step of slopes, distinguishable values."""
+"""Relative growth of a strap's stiffness per metre: range, step of finite differences, distinguishable values."""
 
 CABLE_NEAR_PER_M, CABLE_NEAR_RANGE_PER_M, CABLE_NEAR_STEP_PER_M = 1.0, (0.05, 5.0), 0.4
-"""One over how far away it is tied: at first, at least and most, and over which slopes are taken. Chosen: a room."""
+"""Inverse distance of the anchor [1/m]: first value, range, and step of finite differences. Chosen: size of a room."""
 
 CABLE_STRETCHES_M, CABLE_STRETCH_STEP_M = (0.03, 0.0, 0.1), 0.015
-"""Stretch at home [m], tried first: slack at times, half of the time, never; and step of slopes."""
+"""Stretch at home [m] tried first (sometimes slack, half of the time, never); step of finite differences. Chosen."""
 
 CABLE_TURNS, CABLE_TURN_STEP = (-0.45, 0.45), 0.15
-"""Slopes across each of six axes from which a cable may come, 24 ways in all; and step of slopes."""
+"""Slopes across each of six axes that give 24 first directions of a cable; step of finite differences. Chosen."""
 
 TURNS, OFFSETS = ("turn_1", "turn_2"), ("offset_1_m", "offset_2_m")
-"""Shape numbers: direction, as slopes across an axis; where its line passes the centre of mass."""
+"""Shape numbers: direction, as slopes across an axis; offset of the line from the centre of mass."""
 STRETCH, NEAR, STIFFENS = "stretch_m", "near_per_m", "stiffens_per_m"
-"""By how much it is stretched at home; one over how far away it is tied; by which share it is stiffer per stretch."""
+"""Shape numbers: stretch at home; inverse distance of the anchor; relative growth of stiffness per stretch."""
 SLOPE_STEPS: Mapping[str, float] = (
     dict.fromkeys(TURNS, CABLE_TURN_STEP)
     | dict.fromkeys(OFFSETS, TETHER_STEP_M)
@@ -48,14 +48,15 @@ def is_cable(shape: Shape) -> bool:
 
 
 def pull(shape: Shape, moved: Array) -> Array:
-    """Force per stiffness on the point that it is tied to [m], along the axes of {b}, shape (Q, 3).
+    """Force over stiffness on the attachment point [m], in {b}, shape (Q, 3).
 
-    Stretched to e at home and tied at a distance D along the unit vector u, |D u - x| - D + e along D u - x, and
-    none where that is negative; x is how far the point has moved. Stretched by d, a strap pulls with d + s d^2.
+    A cable is stretched by e at home, and its anchor is at the distance D along the unit vector u. With the point
+    displaced by x, the stretch is |D u - x| - D + e, and the force acts along D u - x. A slack cable has no force. A
+    strap stretched by d pulls with d + s d^2.
 
     Args:
         shape: a cable's.
-        moved: the point from where it is at home [m], in {b}, shape (Q, 3).
+        moved: displacement of the point from home [m], in {b}, shape (Q, 3).
     """
     near = _near(shape)
     away = direction(shape) - near * moved
@@ -67,25 +68,25 @@ def pull(shape: Shape, moved: Array) -> Array:
 
 
 def direction(shape: Shape) -> Array:
-    """From the point at home to where it is tied, a unit vector in {b}, shape (3,)."""
+    """Unit vector from the attachment point at home to the anchor, in {b}, shape (3,)."""
     across = np.roll(np.array([np.nan, *(shape[name] for name in TURNS)]), _axis(shape))
     across[_axis(shape)] = 1.0 - 2.0 * (shape["side"] % 2)
     return across / np.linalg.norm(across)
 
 
 def lever(shape: Shape) -> Array:
-    """From the centre of mass to the nearest point of its line at home [m], along the axes of {1}, shape (3,)."""
+    """Vector from the centre of mass to the nearest point of the cable's line at home [m], in {1}, shape (3,)."""
     u, to = direction(shape), np.roll(np.array([0.0, *(shape[name] for name in OFFSETS)]), _axis(shape))
     return np.asarray(to - to @ u * u, dtype=np.float64)
 
 
 def tied(values: Array, shape: Shape, home: Array) -> dict[str, float]:
-    """The effect's parameters: how stiff, to where, and below which length it is slack.
+    """Convert a tether to the effect's parameters: stiffness, anchor, and the length below which it is slack.
 
     Args:
         values: of a tether's columns, shape (4,).
         shape: its shape, a cable's or not.
-        home: where it is tied to the payload, at home [m], in {b}, shape (3,).
+        home: attachment point on the payload at home [m], in {b}, shape (3,).
     """
     stiffness = values[3] if abs(values[3]) > 1e-6 else 1e-6
     away, length_m = values[:3] / stiffness, 0.0
@@ -98,14 +99,14 @@ def tied(values: Array, shape: Shape, home: Array) -> dict[str, float]:
 
 
 def beside_force(columns: Sequence[Array]) -> Array:
-    """A tether's columns, shape (n, C, 4): of the force at home, which a cable has none of, and of the stiffness."""
+    """Columns of a tether, shape (n, C, 4): force at home, which is zero for a cable, and stiffness."""
     out = np.zeros((*columns[0].shape, 4))
     out[..., 4 - len(columns) :] = np.stack(columns, axis=-1)
     return out
 
 
 def slack(n: Numbers) -> str:
-    """What a sentence about a tether says of its length, and of how it stiffens."""
+    """Part of a tether's sentence about its slack length and stiffening."""
     if not n.values.get("length_m"):
         return ""
     below = n("length_m", "m")
@@ -115,7 +116,7 @@ def slack(n: Numbers) -> str:
 
 
 def every_way(stretches_m: Sequence[float] = CABLE_STRETCHES_M) -> list[Shape]:
-    """From every side, stretched by so much each."""
+    """Shapes of cables from every side, with each of some stretches."""
     ways = product(range(6), CABLE_TURNS, CABLE_TURNS, stretches_m)
     return [
         {"side": float(side), TURNS[0]: one, TURNS[1]: two, STRETCH: e, NEAR: CABLE_NEAR_PER_M}
@@ -124,27 +125,27 @@ def every_way(stretches_m: Sequence[float] = CABLE_STRETCHES_M) -> list[Shape]:
 
 
 def first_ways() -> list[Shape]:
-    """Those that are tried first."""
+    """Shapes of cables that are tried first."""
     return every_way(CABLE_STRETCHES_M[:1])
 
 
 def otherwise_slack(shape: Shape) -> list[Shape]:
-    """The same cable, slack at other times: no steps lead from one that never is to one that is."""
+    """The same cable with other stretches. No gradient leads from a cable that is never slack to one that is."""
     return [{**shape, STRETCH: e} for e in CABLE_STRETCHES_M] if is_cable(shape) else []
 
 
 def strap(shape: Shape) -> list[Shape]:
-    """A cable that may also stiffen."""
+    """The same cable as a strap, whose stiffness may grow."""
     return [{**shape, STIFFENS: 0.0}] if is_cable(shape) and STIFFENS not in shape else []
 
 
 def alike(shape: Shape) -> int:
-    """Number of equally likely cables that differ by their shapes alone."""
+    """Number of equally probable cables that differ in shape only."""
     return CABLES * (STRAPS if STIFFENS in shape else 1)
 
 
 def through(at: Array, shape: Shape) -> Shape:
-    """With its line through a point of the payload, seen from the centre of mass in {1} [m], shape (3,)."""
+    """Move the cable's line through a point of the payload, given from the centre of mass in {1} [m], shape (3,)."""
     u, axis = direction(shape), _axis(shape)
     _, *offsets = np.roll(at - at[axis] / u[axis] * u, -axis)
     return {**shape, **dict(zip(OFFSETS, map(float, offsets), strict=True))}
@@ -155,7 +156,7 @@ def _axis(shape: Shape) -> int:
 
 
 def _near(shape: Shape) -> float:
-    """Within what a room has: one that the data do not tell must not be behind the point."""
+    """Inverse distance of the anchor, limited to the size of a room so that the anchor stays in front of the point."""
     return float(np.clip(shape[NEAR], *CABLE_NEAR_RANGE_PER_M))
 
 
@@ -164,10 +165,10 @@ def _stiffens(shape: Shape) -> float:
 
 
 class Tether(Cause):
-    """Force k (anchor - grasp) on the payload at a robot's grasp, anchor fixed in that robot's {b}.
+    """Force k (anchor - grasp) on the payload at a robot's grasp, with the anchor fixed in that robot's {b}.
 
-    The columns are the force at the home position and the stiffness. With ``stretch_m`` in its shape it is a cable, of
-    which stiffness is all.
+    The columns are the force at home and the stiffness. With ``stretch_m`` in its shape it is a cable, which has a
+    stiffness only.
     """
 
     title = "tether at {grasp}"
@@ -220,10 +221,10 @@ class Tether(Cause):
 
 
 SLOSH_REACH_M = 1.5
-"""From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+"""Largest distance from centre of mass to attachment point [m]. Chosen: no payload of three robots is larger."""
 
 TETHER_POINTS = 1000
-"""Distinguishable points of a payload, 0.1 m apart: the prior odds of one at a grasp against a free one."""
+"""Distinguishable points of a payload, 0.1 m apart: prior odds of an attachment at a grasp against any other point."""
 
 LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
 
@@ -233,11 +234,10 @@ def _at(lever: Array) -> Shape:
 
 
 class PayloadTether(Cause):
-    """Force k (anchor - point) on a point of the payload, anchor fixed in robot 1's {b}.
+    """Force k (anchor - point) on a point of the payload, with the anchor fixed in robot 1's {b}.
 
-    The columns are the force at home and the stiffness; the point is the shape, seen from the centre of mass along the
-    axes of {1}. With ``stretch_m`` in its shape it is a cable, of which stiffness is all, and the point where its line
-    is at home.
+    The columns are the force at home and the stiffness. The shape is the point, from the centre of mass in {1}. With
+    ``stretch_m`` in its shape it is a cable, which has a stiffness only, and the shape gives its line at home.
     """
 
     title = "tether of the payload"
@@ -277,9 +277,9 @@ class PayloadTether(Cause):
         return [through(at, way) for way in every_way()]
 
     def finer(self, shape):
-        """Nearer to the best; a tether is tied within the payload's reach."""
+        """Nearby points, within the payload's reach."""
         if is_cable(shape):
-            return otherwise_slack(shape)  # slopes tell the rest
+            return otherwise_slack(shape)  # Gauss-Newton steps refine the other numbers
         moved = [
             dict(shape) | {name: shape[name] + step}
             for name in LEVERS
@@ -306,7 +306,7 @@ class PayloadTether(Cause):
 
 
 def _lever(shape):
-    """From the centre of mass to where it is tied, in {1} [m], shape (3,)."""
+    """Attachment point from the centre of mass, in {1} [m], shape (3,)."""
     if is_cable(shape):
         return lever(shape)
     return np.array([shape[name] for name in LEVERS])

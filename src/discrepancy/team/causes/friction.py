@@ -1,4 +1,4 @@
-"""Friction of driven joints, gimbal axes and springs: sliding, at rest, and giving way before it slips."""
+"""Friction of driven joints, gimbal axes and springs: sliding, at rest, and presliding."""
 
 from __future__ import annotations
 
@@ -24,9 +24,13 @@ from estimator.filtering import differentiate
 def pieces_while(
     where: NDArray[np.bool_], rate_hz: float, knots_s: float, shortest_s: float = 0.0
 ) -> Iterator[tuple[slice, Array]]:
-    """Per interval of ``where`` (Q,): its s samples, and k hats between knots at most ``knots_s`` apart, shape (s, k).
+    """For each interval of ``where`` (Q,), yield its s samples and k hat functions, shape (s, k).
 
-    Intervals shorter than ``shortest_s`` have none.
+    Args:
+        where: mask of the samples.
+        rate_hz: sampling rate [Hz].
+        knots_s: largest distance between knots [s].
+        shortest_s: shorter intervals are skipped [s].
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int))).reshape(-1, 2)
     for start, stop in edges:
@@ -41,7 +45,7 @@ def pieces_while(
 
 
 def in_parts(pieces: Iterator[tuple[slice, Array]], most: int) -> Iterator[tuple[slice, Array]]:
-    """The same with at most so many columns at a time, and of the samples those between which they are not zero."""
+    """Split the functions into at most ``most`` columns at a time, and trim samples where they are zero."""
     for at, values in pieces:
         for first in range(0, values.shape[1], most):
             some = values[:, first : first + most]
@@ -51,12 +55,11 @@ def in_parts(pieces: Iterator[tuple[slice, Array]], most: int) -> Iterator[tuple
 
 
 def played(x: Array, half_width: float) -> Array:
-    """A signal (Q,) behind a play: it stays where it is until the signal is farther off than half the play's width.
+    """Play operator: follow a signal (Q,) at a distance of at most ``half_width``.
 
-    While the signal rises or falls without turning, only where it began matters: from turn to turn, not from sample to
-    sample.
+    Along a monotonic part of the signal only its start matters, so the loop runs over turning points, not over samples.
     """
-    moves = np.flatnonzero(np.diff(x))  # where it does not stand still
+    moves = np.flatnonzero(np.diff(x))  # samples that move
     way = np.sign(np.diff(x)[moves])
     turns = moves[1:][way[1:] != way[:-1]]
     ends, at, starts = [*x[turns].tolist(), float(x[-1])], float(x[0]), []
@@ -69,36 +72,36 @@ def played(x: Array, half_width: float) -> Array:
 
 
 PRESLIDING_OPEN_SHARE = 0.5
-"""Share of its limit by which presliding friction may differ from Prandtl's law until it slips."""
+"""Standard deviation of presliding friction around Prandtl's law, over the friction limit. Chosen."""
 
 PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
-"""Shares of such a torque that are tried next. Chosen."""
+"""Factors of a presliding displacement tried next. Chosen."""
 
 PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
-"""The same of a joint's friction, by its angle. Chosen: bristles of 0.2 to 2 mrad are met; a step of 16 bits is 0.1."""
+"""Presliding angles tried first, and their range [rad]. Chosen: bristles yield by 0.2 to 2 mrad."""
 
 REST_KNOTS_S = 0.05
-"""Between knots of friction at rest, which follows the load: nothing faster passes the rows' filter."""
+"""Time between knots of friction at rest, which follows load [s]. Derived: the rows' filter stops faster changes."""
 
 TURN_RAD_PER_S = 1e-2
-"""Below this speed, friction that keeps its direction may not have reversed yet after a turn."""
+"""Speed below which friction with a kept direction may not have reversed yet after a turn [rad/s]. Chosen."""
 
 KEPT = "kept_below_rad_per_s"
-"""Rate of a shape below which friction keeps its direction: so stiff that no encoder shows how it gives way."""
+"""Shape number: speed below which friction keeps its direction, with a presliding too stiff for encoders [rad/s]."""
 
 
 class Friction(Cause):
-    """Friction of what a joint's signal tells the motion of: Coulomb and, unless a cause has one parameter, viscous.
+    """Friction of a joint: Coulomb and, unless a cause has one parameter only, viscous.
 
-    At rest, below the rate that is its shape, it may have any value up to its limit, or it keeps what it had. Or it
-    gives way in proportion before it slips, as a slider behind a spring does (Prandtl): it is reversed in full over
-    twice what it gives way by.
+    The shape selects the behaviour at rest. Below the given rate friction may have any value up to its limit, or it
+    keeps its direction. Or it follows Prandtl's law: it grows with displacement before it slips, and a full reversal
+    takes twice the presliding displacement.
 
     Attributes:
-        moves: the signal.
-        sign: of the torque's reading while that grows.
-        gives: name of what it gives way by, in units of the signal.
-        gives_range: of that.
+        moves: signal that shows the joint's motion.
+        sign: sign of the error in the torque reading while that signal grows.
+        gives: name of the presliding displacement, in units of the signal.
+        gives_range: range of the presliding displacement.
     """
 
     family = "dissipation"
@@ -132,7 +135,7 @@ class Friction(Cause):
         return super().physical(values, context) | {self.gives: context.shape.get(self.gives, 0.0)}
 
     def direction(self, trial: TrialLinear, robot: int, joint: int) -> Array:
-        """What a torque of 1 N m adds to the residual's samples, shape (Q, C)."""
+        """Residual samples per 1 N m of friction torque, shape (Q, C)."""
         return trial.J(robot, TAU, np.eye(3)[joint])
 
     def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
@@ -148,11 +151,11 @@ class Friction(Cause):
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
-        """What it does while it holds: any torque that it takes, as it changes with the load.
+        """Latent states of friction that does not slip: any torque up to its limit, which changes with the load.
 
-        Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
-        it may be another by a share of its limit until it slips. Where it is kept, whatever it is while the joint turns
-        round, or seems to move the other way, and too slowly to be sure.
+        With presliding, they include the displacement before the first slip, and a deviation from Prandtl's law until
+        friction slips. With a kept direction, they include any value while the joint turns round or moves too slowly to
+        tell its direction.
         """
         bent, rate, *_ = (*self._sliding(trial.signals, trial, robot, joint, shape), None)
         state = np.abs(bent)
@@ -172,8 +175,8 @@ class Friction(Cause):
     ) -> Sequence[Array]:
         """Direction of motion in [-1, 1], which fades to zero at rest, and rate; as many as there are parameters.
 
-        Where it gives way, how far it is bent in place of the direction. Angles are taken without their noise: that of
-        a parallel axis, which moves alike, would else be told apart by noise, and both together have less.
+        With presliding, the first is the presliding displacement over its limit. Angles are used without their noise:
+        otherwise that noise would separate the frictions of parallel axes that move alike.
         """
         (number,) = shape.values()
         smooth = signals.smooth(self.moves, robot, joint)
@@ -189,9 +192,9 @@ class Friction(Cause):
 
 
 def _kept(rate: Array, slow: float) -> Array:
-    """Direction of motion, and at rest of the motion before, 0 until the first, shape (Q,).
+    """Direction of motion, shape (Q,). At rest it is that of the motion before, and 0 until the first motion.
 
-    Which way it moves is told where it is fast; since when, by where its rate left zero before.
+    Only motions that exceed the rate ``slow`` count. Each begins where its rate last left zero.
     """
     out, way = np.zeros_like(rate), np.sign(rate)
     starts, fastest = _motions(rate)
@@ -201,10 +204,11 @@ def _kept(rate: Array, slow: float) -> Array:
 
 
 def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
-    """Where a joint rests, turns round, or may move against the direction that is kept, shape (Q,).
+    """Samples where a joint rests, turns round, or may move against the kept direction, shape (Q,).
 
-    At rest friction holds what it has to. It is reversed only once a joint has moved by more than it gives way, be
-    that less than encoders show: a law that reverses it at once takes that for a late torque sensor.
+    At rest friction holds any load. It reverses only once the joint has moved by more than the presliding displacement,
+    which may be below the encoder's resolution. A law that reverses at once would mistake that for a late torque
+    sensor.
     """
     starts, fastest = _motions(rate)
     counts = np.diff([*starts, len(rate)])
@@ -213,22 +217,22 @@ def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
 
 
 def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:
-    """Where each motion one way begins, and how fast it becomes."""
+    """Start of each motion in one direction, and its largest speed."""
     starts = np.flatnonzero(np.diff(np.sign(rate), prepend=0.0))
     return starts, np.maximum.reduceat(np.abs(rate), starts) if len(starts) else np.zeros(0)
 
 
 PRESLIDING_RANGE_NM = (0.01, 1.0)
-"""Derived: less is passed within a sample; more is hardly ever turned round."""
+"""Range of presliding torques [N m]. Derived: smaller ones pass within a sample; larger ones hardly ever reverse."""
 
 PRESLIDINGS_NM = (0.05, 0.2)
-"""Torque [N m] over which friction inside a spring gives way before it slips, tried first."""
+"""Presliding torques of friction inside a spring tried first [N m]. Chosen."""
 
 
 class SeaHysteresis(Friction):
-    """Friction parallel to the spring: the link gets more than the deflection tells while the torque grows.
+    """Friction parallel to the spring: while the torque grows, the link gets more than the deflection shows.
 
-    Torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
+    A torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
     """
 
     title = "friction inside the spring of {driven joint}"
@@ -256,26 +260,26 @@ class SeaHysteresis(Friction):
 
 
 class JointFriction(Friction):
-    """The link gets less than the spring gives while it moves; below ``slow_rad_per_s`` it rests."""
+    """A moving link gets less torque than the spring provides; below ``slow_rad_per_s`` it rests."""
 
     title = "friction in {driven joint}"
     separate = "An arm-only run (payload released) shows friction of the joint alone."
 
 
 class GimbalFriction(Friction):
-    """The gimbal is not quite passive: it turns the payload with a moment about its axis (1, 2, 3 are z, y, x).
+    """The gimbal exerts a friction moment on the payload about its axis (1, 2, 3 are z, y, x).
 
-    A pure moment is the same wherever it acts, so robots with parallel axes share the blame.
+    A pure moment acts the same at every place, so gimbals with parallel axes cannot be distinguished.
     """
 
     title = "friction in {gimbal axis}"
     at = "gimbal joint"
     moves = "theta"
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."
-    undo = Cause.undo  # no sensor reads it
+    undo = Cause.undo  # no sensor reads this friction
 
     def direction(self, trial, robot, joint):
-        """The payload is turned by less than the balance believes: an outside moment against the axis."""
+        """Residual samples per 1 N m of external moment against the axis, shape (Q, C)."""
         moment = moment_about_axes(trial.s[:, robot, THETA], np.eye(3)[joint])
         moment = moment @ trial.shared.grasps.R_1i[robot].T
         return np.concatenate([np.zeros((len(moment), trial.channels - 3)), moment], axis=1)

@@ -1,4 +1,4 @@
-"""What acts on the payload, or is another payload: pushes, drag, another mass."""
+"""Causes at the payload: pushes, drag, and changes of its mass."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
 from estimator.rigid_team import balance, fusion_matrix
 
 MASS_OVER_S = 60.0
-"""Time in which a drifting mass becomes as much as its columns say."""
+"""Time in which a drifting mass changes by one unit of its columns [s]. Chosen."""
 
 TEAM_PUSH_EDGE_S = 0.05
-"""Step of slopes by ends and ramps of a push; rows are 0.08 s apart."""
+"""Step of finite differences by ends and ramps of a push [s]. Chosen: rows are 0.08 s apart."""
 
 
 PUSH_RAMPS = (0.25, 0.8)
-"""Ramps of a push over its length at half its height, tried first. Chosen: Gauss-Newton steps do the rest."""
+"""Ramps of a push over its length at half height, tried first. Chosen: Gauss-Newton steps refine them."""
 
 
 def during(trial: TrialLinear, shape: Shape) -> Array:
-    """Share of a push that acts about each sample: 1 within its interval but for the ramps, 0 outside, shape (Q,).
+    """Strength of a push at each sample: 1 within its interval, less on its ramps, 0 outside, shape (Q,).
 
-    A mean over the sample's own time, so that ends between samples are told apart.
+    The mean over each sample period resolves ends that lie between samples.
     """
     each = 1.0 / trial.signals.rate_hz
     edges = np.append(trial.signals.time - 0.5 * each, trial.signals.time[-1] + 0.5 * each)
@@ -34,7 +34,7 @@ def during(trial: TrialLinear, shape: Shape) -> Array:
 
 
 class Push(Cause):
-    """Force (axes of {b1}) at a payload point, as force and moment at the origin of {1}."""
+    """A force (in {b1}) at a payload point, expressed as force and moment at the origin of {1}."""
 
     title = "push on the payload"
     family = "push"
@@ -46,7 +46,7 @@ class Push(Cause):
         0.02,
         0.02,
         0.02,
-    )  # friction that rests anew is a small push while it lasts
+    )  # friction that settles differently acts like a small push
     transient = True
     determined = dict.fromkeys(("start_s", "duration_s", "ramp_s"), 0.25)
     at = "payload"
@@ -65,7 +65,7 @@ class Push(Cause):
         return most if name == "start_s" else min(most, super().slope_step(name, number))
 
     def finer(self, shape):
-        """As long at half its height, with ramps."""
+        """The same length at half height, with ramps."""
         ramps = [] if shape.get("ramp_s") else [share * shape["duration_s"] for share in PUSH_RAMPS]
         return [
             {"start_s": shape["start_s"] - 0.5 * r, "duration_s": shape["duration_s"] + r, "ramp_s": r}
@@ -85,7 +85,7 @@ class Push(Cause):
 
     def physical(self, values, context):
         force, moment = values[:3], values[3:]
-        # Only the line of action shows; the point on it nearest to the centre of mass is named.
+        # Only the line of action is observable; report its point nearest to the centre of mass.
         lever = np.cross(force, moment - np.cross(context.p_1c, force)) / max(force @ force, 1e-12)
         point = context.p_1c + lever
         return (
@@ -99,7 +99,7 @@ class Push(Cause):
 class Drag(Cause):
     """Force -c v on the payload at its centre of mass, and a moment -c_r omega.
 
-    With ``powers`` of two in its shape also -q |v| v and -q_r |omega| omega, as air and water resist; both may act.
+    With ``powers`` of two in its shape, also -q |v| v and -q_r |omega| omega, like air and water. Both may act.
     """
 
     title = "drag on the payload"
@@ -107,8 +107,8 @@ class Drag(Cause):
     parameters = (
         "coefficient_Ns_per_m", "turning_Nms_per_rad", "quadratic_Ns2_per_m2", "turning_quadratic_Nms2_per_rad2",
     )  # fmt: skip
-    # The second: the first at half a metre. A plate of 0.4 m^2 in air is within the first at 0.2 m/s, as a carry has;
-    # with squares of speeds goes what is as much at 1 m/s, and at 1 rad/s.
+    # The first covers a plate of 0.4 m^2 in air at 0.2 m/s, a typical carrying speed; the second is the first at half
+    # a metre. The quadratic ones are equal to these at 1 m/s and 1 rad/s.
     tolerances = (0.05, 0.01, 0.05, 0.01)
     at = "payload"
     positive: ClassVar = parameters
@@ -155,19 +155,19 @@ def _squared(v: Array) -> Array:
 
 
 MASS_SPANS = 5
-"""Up to which trial one may be there for some trials only. Chosen: of five, each span; of more, only what stays."""
+"""Number of trials within which every span of trials is a shape. Chosen: a later change of mass can only be lasting."""
 
 MASS_TRIALS = 12
-"""With which another mass may begin at most. Chosen: more are no experiment but a log."""
+"""Last trial in which a mass change may begin. Chosen: longer series are logs, not experiments."""
 
 INERTIAS = tuple("xyz"[i] + "xyz"[j] for i, j in ORDER)
 
 
 class PayloadMass(Cause):
-    """More mass (or less) at some place of the payload, in some trials or growing from the start of every trial.
+    """Additional or missing mass at a point of the payload, in some trials or growing from the start of every trial.
 
-    The columns are the ten of a rigid body: mass at the payload's centre, its first moment about that, and its inertia
-    beyond that of a point. The shape says in which trials, and over which time as much comes to it.
+    The columns are the ten inertial parameters: mass at the payload's centre, first moment about that, and inertia
+    beyond that of a point. The shape says in which trials, or in which time one unit is added.
     """
 
     title = "payload whose mass changes"
@@ -223,7 +223,7 @@ class PayloadMass(Cause):
 
 
 def _ten_columns(com: Array) -> Array:
-    """Inertial parameters (m, m c, J about {1}) of one unit of each parameter, shape (10, 10)."""
+    """Inertial parameters (m, m c, J about {1}) per unit of each parameter, shape (10, 10)."""
     pi = np.eye(10)
     pi[1:4, 0], pi[4:, 0] = com, inertia_parameters(_of_point(com))
     for k, axis in enumerate(np.eye(3)):

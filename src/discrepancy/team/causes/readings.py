@@ -1,4 +1,4 @@
-"""What sensors and logs of a robot say wrongly: zeros, scales, lags, late clocks, lengths of links; tilts of bases."""
+"""Causes in the readings of a robot: zeros, scales, lags, late clocks, link lengths; and tilts of bases."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from estimator.arm.unit import ArmUnit, design_of
 
 
 class Late(ReadingError):
-    """A robot's readings are those of ``delay_s`` ago.
+    """A robot's readings are late by ``delay_s``.
 
     Attributes:
-        readings: which of them.
+        readings: names of the late readings.
     """
 
     parameters = ("delay_s",)
@@ -30,19 +30,19 @@ class Late(ReadingError):
 
     def undo(self, signals, trial, robot, joint, values, shape):
         time = np.arange(len(signals.time)) / signals.rate_hz
-        at = np.clip(time + values[0], 0.0, time[-1])  # held at the ends
+        at = np.clip(time + values[0], 0.0, time[-1])  # readings stay constant beyond the ends
         late = {}
         for name in self.readings:
             x = getattr(signals, name)[:, robot]
             shifted = CubicSpline(time, x)(at)
-            # The last piece meets the last sample but for rounding, and what is held is the sample.
+            # Beyond the end the last sample holds exactly; the spline meets it only up to rounding.
             shifted[at >= time[-1]] = x[-1]
             late[name] = one_robot(x - shifted, trial.robots, robot)
         return signals.minus(**late)
 
 
 class PhiZero(ReadingError):
-    """phi reads too much by a constant."""
+    """phi reads too high by a constant."""
 
     title = "encoder zero of {driven joint}"
     family = "arm_geometry"
@@ -59,14 +59,14 @@ class PhiZero(ReadingError):
 
 
 class ThetaZero(ReadingError):
-    """theta reads too much by a constant; joints 1, 2, 3 are z, y, x."""
+    """theta reads too high by a constant; joints 1, 2, 3 are z, y, x."""
 
     title = "encoder zero of {gimbal axis}"
     family = "gimbal_zero"
     parameters = ("zero_rad",)
     tolerances = (1e-4,)
     at = "gimbal joint"
-    joints = (1, 2)  # no recording shows the last one's
+    joints = (1, 2)  # no recording can show that of the last axis
     separate = (
         "The zero of the last gimbal axis is part of the grasp frame; only a known grasp would show it."
     )
@@ -80,9 +80,9 @@ class ThetaZero(ReadingError):
 
 
 class SeaScale(ReadingError):
-    """The spring is stiffer than believed by a factor 1 + scale, so the reading is low by it.
+    """The spring is stiffer than assumed by a factor 1 + scale, so the torque reads too low.
 
-    A scale common to all springs cannot be told from the payload's mass; a single one can.
+    A scale common to all springs cannot be distinguished from the payload's mass; the scale of one spring can.
     """
 
     title = "spring stiffness of {driven joint}"
@@ -101,7 +101,7 @@ class SeaScale(ReadingError):
 
 
 class SeaBias(ReadingError):
-    """tau reads too much by a constant."""
+    """tau reads too high by a constant."""
 
     title = "torque zero of {driven joint}"
     family = "sea_torque"
@@ -119,12 +119,12 @@ class SeaBias(ReadingError):
 
 
 def _stiffness(arm, joint):
-    """How stiff a spring is over what its readings assume."""
+    """Stiffness of a spring over the stiffness that its readings assume."""
     return 1.0 + (arm.of("stiffness_ratio")[joint] if isinstance(arm, ArmUnit) else 0.0)
 
 
 class SeaHardening(ReadingError):
-    """Torque k d + k3 d^3 of deflection d, read as k d."""
+    """A deflection d produces the torque k d + k3 d^3, but the sensor reads k d."""
 
     title = "hardening of the spring of {driven joint}"
     family = "sea_torque"
@@ -143,7 +143,7 @@ class SeaHardening(ReadingError):
 
 
 class TorqueSkew(Late):
-    """All torques of a robot are those of ``delay_s`` ago; only the log is late, the controller is not."""
+    """All torques of a robot are logged late by ``delay_s``; the controller sees them in time."""
 
     title = "late torque log of {robot}"
     family = "dissipation"
@@ -155,7 +155,7 @@ class TorqueSkew(Late):
 
 
 class TorqueLag(ReadingError):
-    """All torques of a robot lag by a first-order filter, which the controller sees as well."""
+    """All torques of a robot pass a first-order lag, which also affects the controller."""
 
     title = "lag of the torque sensors of {robot}"
     family = "dissipation"
@@ -174,7 +174,7 @@ class TorqueLag(ReadingError):
 
 
 class SensorLag(ReadingError):
-    """One torque lags by a first-order filter, which the controller sees as well."""
+    """The torque of one joint passes a first-order lag, which also affects the controller."""
 
     title = "lag of the torque sensor in {driven joint}"
     family = "dissipation"
@@ -192,11 +192,10 @@ class SensorLag(ReadingError):
 
 
 class ClockDelay(Late):
-    """Everything a robot logs is that of ``delay_s`` ago.
+    """All readings of a robot are late by ``delay_s``.
 
-    All robots' clocks late by as much is nothing: what else is off in the model is made of the same readings, and
-    late, too. Taken one by one they would shift the residual against that. So a column is what one robot's delay adds
-    less what a delay of all does, an N-th of it each.
+    An equal delay of all robots is unobservable, because the model uses the same late readings. Each column is
+    therefore the effect of one robot's delay minus the mean over all robots.
     """
 
     title = "clock delay of {robot}"
@@ -215,11 +214,10 @@ class ClockDelay(Late):
 
 
 class LinkLength(ReadingError):
-    """True length minus design.
+    """Lengths of a leg deviate from the design.
 
-    At the same wrist the leg's joint then stands at another angle: a length is an error of phi that depends on the
-    pose, and by virtual power one of the torques. What hangs on the link and at the knee takes no part in that: it
-    is weighed at the true angle.
+    At the same wrist position the joint then has another angle. A length error thus acts as a pose-dependent error of
+    phi and, by virtual power, of the torques. The weight of link and knee follows the true angle.
     """
 
     title = "lengths of {leg}"
@@ -246,14 +244,14 @@ class LinkLength(ReadingError):
 
 
 def _errors(phi, tau, joint, arm):
-    """Readings minus those of a leg of the arm's lengths, per metre: angles (3, Q) and torques (3, Q, 3)."""
+    """Readings minus those of a leg with the assumed lengths, per metre: angles (3, Q) and torques (3, Q, 3)."""
     angle, slopes = _phi_error(phi, joint, arm)
     at, leg = phi[:, joint], partial(_of_leg, joint=joint)
     at_knee = 0.5 * arm.gravity_mps2 * leg(arm.rod_mass_kg)
     weight = arm.gravity_mps2 * leg(arm.proximal_mass_kg) * arm.proximal_com_m + at_knee * leg(
         arm.proximal_length_m
     )
-    # (I - d(error)/d(phi))^-T on what drives the wrist, to first order ...
+    # (I - d(error)/d(phi))^-T on the torque that drives the wrist, to first order ...
     torque = -slopes * (tau[:, joint] - weight * np.cos(at))[:, None]
     # ... and the weight of link and knee at another angle, and of the knee on a longer lever.
     torque[:, :, joint] -= weight * np.sin(at) * angle
@@ -262,15 +260,18 @@ def _errors(phi, tau, joint, arm):
 
 
 def _of_leg(values, joint):
-    """A number of one leg: as designed all are alike."""
+    """Value of one leg; the legs of the design are equal."""
     return np.broadcast_to(values, 3)[joint]
 
 
 def _phi_error(phi, joint, arm):
-    """Reading minus the angle at which a leg of the arm's lengths would reach the same wrist, per metre, shape (3, Q).
+    """Error of phi due to length errors of a leg, per metre, and its derivative by the three angles.
 
-    And its derivative by the three angles, (3, Q, 3). It is minus what the rod has of a longer link, a longer rod or a
-    wider base, over the rod's leverage.
+    The error is the reading minus the angle at which a leg with the assumed lengths reaches the same wrist. It equals
+    minus the change of rod length due to a longer link, a longer rod or a wider base, over the rod's leverage.
+
+    Returns:
+        Error, shape (3, Q), and derivative, shape (3, Q, 3).
     """
     legs, own = leg_geometry(phi, arm), np.eye(3)[joint]
     rod, knee, lever = legs.rod[:, joint], legs.knee_d1[:, joint], legs.leverage[:, joint]
@@ -279,7 +280,7 @@ def _phi_error(phi, joint, arm):
     across = np.cos(angle)[:, None] * up - np.sin(angle)[:, None] * u
     length = np.full(len(phi), _of_leg(arm.rod_length_m, joint))
     shares = np.stack([np.sum(rod * along, axis=1), length, rod @ u])
-    # By every angle the wrist moves, and by the leg's own the knee does.
+    # Every angle moves the wrist; the leg's own angle moves the knee.
     rod_moves = jacobian_of(legs) - knee[..., None] * own  # (Q, 3, 3)
     of_along = np.einsum("qij,qi->qj", rod_moves, along) + np.sum(rod * across, axis=1)[:, None] * own
     of_lever = (
@@ -291,7 +292,7 @@ def _phi_error(phi, joint, arm):
 
 
 class BaseTilt(Cause):
-    """{b} is turned by the rotation vector (roll, pitch, 0), in its own axes; yaw is an unknown of each trial."""
+    """{b} is turned by the rotation vector (roll, pitch, 0) in {b}; yaw is a nuisance parameter of each trial."""
 
     title = "tilt of {base}"
     family = "base_tilt"
@@ -329,7 +330,7 @@ class BaseTilt(Cause):
         up = np.einsum("qji,j->qi", data.R_bi[:, robot], up_b) @ grasps.R_1i[robot].T / trial.robots
         raw[:, -6:-3] = mass * g * up
         raw[:, -3:] = np.cross(mass_c, g * up)
-        # The arm's own weight, which the balance takes off the torques.
+        # The arm's own weight, which the balance subtracts from the torques.
         legs = leg_geometry(trial.s[:, robot, PHI], arm)
         at_knee = arm.proximal_mass_kg * arm.proximal_com_m / arm.proximal_length_m + 0.5 * arm.rod_mass_kg
         at_wrist = arm.wrist_mass_kg + 0.5 * np.sum(np.broadcast_to(arm.rod_mass_kg, 3))

@@ -1,4 +1,4 @@
-"""A mass that swings in the payload: a pendulum that hangs from a point which is moved."""
+"""A mass that swings in the payload: a pendulum that hangs from a moving point."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from estimator.arrays import Array
 from estimator.so3 import skew
 
 SWING_ROUNDS, SWING_FIRST_ROUNDS, SWING_SETTLED = 20, 1, 1e-4
-"""Rounds of a pendulum that swings far; the same while shapes are scanned; relative change that ends them."""
+"""Largest number of iterations for large swings; the same while shapes are scanned; relative change that stops them."""
 
 SWING_MOST, SWING_START, SWING_EASED = 0.95, 0.9, 0.6
-"""Largest swing over the length; the same while it is sought; most that the restoring force is eased."""
+"""Largest swing over the length; the same during the iteration; largest relative reduction of the restoring force."""
 
 SWING_CALM, SWING_WEIGHT, SWING_LEAST_WEIGHT = 0.5, 0.7, 0.3
-"""Change of a round over the last from which rounds oscillate; damping of a new round, and its least."""
+"""Change over the last change from which the iteration counts as oscillating; its step factor then; the least step."""
 
 
 @dataclass(frozen=True)
 class Pendulum:
-    """On one level way.
+    """Swing of a pendulum along one level direction.
 
     Attributes:
-        length_m: of its rod [m].
+        length_m: length of its rod [m].
         damping_ratio: of small swings.
-        gravity: of the place [m/s^2].
-        rate_hz: of samples.
+        gravity: acceleration of gravity [m/s^2].
+        rate_hz: sampling rate [Hz].
     """
 
     length_m: float
@@ -44,21 +44,21 @@ class Pendulum:
 
     @property
     def damping_per_s(self) -> float:
-        """Damping over the speed [1/s]."""
+        """Damping force over mass and speed [1/s]."""
         return float(2.0 * self.damping_ratio * np.sqrt(self.gravity / self.length_m))
 
     def restored(self, steeper: float) -> Pendulum:
-        """One whose restoring force is steeper [1/s^2], damped by as much."""
+        """Return a pendulum with a restoring force steeper by ``steeper`` [1/s^2] and the same damping force."""
         stiff = self.gravity / self.length_m + steeper
         ratio = 0.5 * self.damping_per_s / np.sqrt(stiff)
         return Pendulum(self.gravity / stiff, float(ratio), self.gravity, self.rate_hz)
 
     def small(self, drive: Array, integrals: int) -> Array:
-        """Small swings, from rest: relative acceleration (0 integrals), speed (1) or displacement (2).
+        """Small swings from rest: relative acceleration (0 integrals), speed (1) or displacement (2).
 
         Args:
             drive: acceleration of the point, linear between samples, shape (Q, ...).
-            integrals: of the acceleration.
+            integrals: number of integrals of the acceleration.
         """
         numerators, denominator = _filters(self)
         return np.asarray(lfilter(numerators[integrals], denominator, drive, axis=0), dtype=np.float64)
@@ -71,34 +71,35 @@ def swung(
     pendulums: Sequence[Pendulum],
     rounds: int = SWING_ROUNDS,
 ) -> tuple[list[Array], list[Array], Array]:
-    """How 1 kg swings on two level ways whose damper turns with what it hangs in, from rest.
+    """Swing of 1 kg along two level directions from rest; the damper turns with the payload.
 
-    Off by x and y the mass is higher by z, so that (Lagrange's equations)
+    A displacement x and y raises the mass by z, so Lagrange's equations are
 
         x'' + z_x (z'' + b + g) + damper = -a,
 
-    and y alike; a and b are the point's acceleration along the way and upwards, and z_x is the slope of z, which is
-    x / length where it is small. Solved by rounds: what the last swing leaves of the straight line nearest to its
-    restoring force (Krylov and Bogoliubov's equivalent linearisation) is put beside the drive. Rounds settle up to some
-    0.3 rad rms (0.8 rad at most); beyond, what is returned is finite and not told how wrong.
+    and the same for y. Here a and b are the point's acceleration along the direction and upwards, and z_x is the slope
+    of z, about x / length for small x. The solution is iterative (Krylov and Bogoliubov's equivalent linearisation):
+    the best linear restoring force is solved exactly, and its error in the last iteration is added to the drive. The
+    iteration converges up to about 0.3 rad rms (0.8 rad peak). Beyond that the result is finite, but its error is
+    unknown.
 
     Args:
-        drives: acceleration of the point along each level way, then by how much more per unit of something, (Q, k).
-        turned: rate at which what the damper is fixed to turns about each way's axis [rad/s], shape (Q,) each.
+        drives: acceleration of the point along each level direction, then its derivatives by other quantities, (Q, k).
+        turned: turn rate of the damper's mount about the axis of each direction [rad/s], shape (Q,) each.
         lift: upward acceleration of the point [m/s^2], shape (Q,).
-        pendulums: on each way; the hinge of the first is on the rod of the second.
-        rounds: at most.
+        pendulums: for each direction; the hinge of the first is on the rod of the second.
+        rounds: largest number of iterations.
 
     Returns:
-        Relative accelerations [m/s^2] and moments of the damper [N m] of each way, shape (Q, k) each, and upward
-        acceleration [m/s^2], shape (Q,). What is per unit of something is that of small swings.
+        For each direction, relative accelerations [m/s^2] and moments of the damper [N m], shape (Q, k) each, and the
+        upward acceleration [m/s^2], shape (Q,). Derivatives are those of small swings.
     """
     held = [
         drive[:, 0] - own.damping_per_s * own.length_m * rate
         for own, drive, rate in zip(pendulums, drives, turned, strict=True)
     ]
     swing, last, weight = _swing(pendulums, held), np.inf, 1.0
-    # Small swings grow without end; to begin with, and ever after, none goes farther than its rod.
+    # Small swings may grow without bound. Limit the start and every iteration to the length of the rods.
     swing *= _within(pendulums, swing)
     far = Far.of(pendulums, swing, turned, lift)
     for _ in range(rounds):
@@ -112,7 +113,7 @@ def swung(
         ]
         new = weight * _swing(eased, driven) + (1.0 - weight) * swing
         moved = float(np.sqrt(np.mean((new - swing) ** 2) / max(float(np.mean(new**2)), 1e-300)))
-        if moved > SWING_CALM * min(last, 1.0):  # it goes to and fro
+        if moved > SWING_CALM * min(last, 1.0):  # the iteration oscillates
             weight = max(SWING_WEIGHT * weight, SWING_LEAST_WEIGHT)
         new *= _within(pendulums, new)
         swing, last, far = new, moved, Far.of(pendulums, new, turned, lift)
@@ -127,7 +128,7 @@ def swung(
 
 
 def _swing(pendulums: Sequence[Pendulum], driven: Sequence[Array]) -> Array:
-    """Displacement, speed and acceleration of small swings along each way, shape (2, 3, Q)."""
+    """Displacement, speed and acceleration of small swings along each direction, shape (2, 3, Q)."""
     return np.array(
         [
             [own.small(x, integrals) for integrals in (2, 1, 0)]
@@ -137,25 +138,25 @@ def _swing(pendulums: Sequence[Pendulum], driven: Sequence[Array]) -> Array:
 
 
 def _within(pendulums: Sequence[Pendulum], swing: Array) -> Array:
-    """By which share swings are to be lessened to stay within their rods, of each way, shape (2, 1, 1)."""
+    """Factor that keeps swings within their rods, for each direction, shape (2, 1, 1)."""
     most = np.abs(swing[:, 0]).max(axis=1) / [SWING_START * own.length_m for own in pendulums]
     return np.asarray(1.0 / np.maximum(most, 1.0))[:, None, None]
 
 
 def _line(own: Pendulum, x: Array, beyond: Array) -> float:
-    """By how much the straight line nearest to the restoring force is steeper than that of small swings [1/s^2]."""
+    """Stiffness of the best linear restoring force minus that of small swings [1/s^2]."""
     steeper = float(beyond @ x / max(float(x @ x), 1e-300))
     return max(steeper, -SWING_EASED * own.gravity / own.length_m)
 
 
 @dataclass(frozen=True, eq=False)
 class Far:
-    """What a pendulum that swings far does beyond its small swings.
+    """Nonlinear terms of a pendulum with large swings.
 
     Attributes:
-        beyond: what drives it besides, along each way [m/s^2], shape (Q,) each.
-        rising: its upward acceleration [m/s^2], shape (Q,).
-        rates: of its hinges [rad/s], shape (Q,) each.
+        beyond: drive in addition to that of small swings, along each direction [m/s^2], shape (Q,) each.
+        rising: upward acceleration [m/s^2], shape (Q,).
+        rates: of the hinges [rad/s], shape (Q,) each.
     """
 
     beyond: list[Array]
@@ -164,14 +165,15 @@ class Far:
 
     @classmethod
     def of(cls, pendulums: Sequence[Pendulum], swing: Array, turned: Sequence[Array], lift: Array) -> Far:
-        """Along the first way it swings on L, from a hinge on the rod on which it swings along the other, of length A.
+        """Compute the nonlinear terms at a given swing.
 
-        So it hangs ((A - L + (L^2 - x^2)^0.5)^2 - y^2)^0.5 below that one's hinge; z is what that lacks of A.
+        The rod of the first direction, of length L, hangs from a hinge on the rod of the second, of length A. The mass
+        is ((A - L + (L^2 - x^2)^0.5)^2 - y^2)^0.5 below the upper hinge; z is A minus that.
 
         Args:
-            pendulums: along both ways.
-            swing: displacements, speeds and accelerations along them, shape (2, 3, Q).
-            turned, lift: as of ``swung``.
+            pendulums: for both directions.
+            swing: displacements, speeds and accelerations, shape (2, 3, Q).
+            turned, lift: as in ``swung``.
         """
         (one, two), ((x, dx, ddx), (y, dy, ddy)) = pendulums, swing
         L, A, most = one.length_m, two.length_m, SWING_MOST
@@ -200,7 +202,7 @@ class Far:
 
 @lru_cache(maxsize=256)
 def _filters(pendulum: Pendulum) -> tuple[list[Array], Array]:
-    """Numerators for acceleration, speed and displacement, and their denominator."""
+    """Numerators for acceleration, speed and displacement, and their common denominator."""
     w = np.sqrt(pendulum.gravity / pendulum.length_m)
     rates = np.array([[0.0, 1.0], [-(w**2), -2.0 * pendulum.damping_ratio * w]])  # of displacement and speed
     out = np.array([rates[1], [0.0, 1.0], [1.0, 0.0]])
@@ -208,56 +210,56 @@ def _filters(pendulum: Pendulum) -> tuple[list[Array], Array]:
     discrete = cont2discrete(system, 1.0 / pendulum.rate_hz, method="foh")
     A, B, C, D, _ = cast("tuple[Array, Array, Array, Array, float]", discrete)
     trace, det = np.trace(A), A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
-    # C (z - A)^-1 B + D: (z - A)^-1 is (z + A - trace) over the denominator.
+    # C (z - A)^-1 B + D, where (z - A)^-1 is (z + A - trace) over the denominator.
     ends = C @ (A - trace * np.eye(2)) @ B + D * det
     numerators = np.concatenate([D, C @ B - D * trace, ends], axis=1)
     return list(numerators), np.array([1.0, -trace, det])
 
 
 SLOSH_SECONDS = 150
-"""Distinguishable second modes: without these odds a second mode would explain noise beside the first."""
+"""Number of distinguishable second modes. Their prior odds keep a second mode from fitting noise."""
 
 SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
-"""By which a heading is moved next, and the step of slopes by it. Chosen."""
+"""Changes of a heading tried next, and the step of its finite difference. Chosen."""
 
 SLOSH_SECOND_FINER, SLOSH_SHARES_FINER = (0.6, 0.75, 0.87, 0.95, 1.05, 1.15, 1.35, 1.7), (0.5, 0.75, 1.3, 2.0)
-"""Shares of the second length, and of its share, tried next. Chosen."""
+"""Factors of the second length, and of its mass share, tried next. Chosen."""
 
 SLOSH_SECOND, SLOSH_SHARE = (0.3, 0.55, 1.8, 3.3), 0.25
-"""Length of a second pendulum over the first's, and its share of the mass, tried first."""
+"""Length of a second pendulum over the first's, and its share of the mass, tried first. Chosen."""
 
 SLOSH_HEADINGS_RAD = (0.0, 0.79, 1.57, 2.36)
-"""Its headings, tried first. Measured, likewise: one 25 deg off still helps."""
+"""Headings of the second mode tried first. Measured: a heading that is wrong by 25 deg still helps."""
 
 SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
-"""Length across over that along, tried first: 25 % off still helps."""
+"""Length across over length along, tried first. Measured: a value that is wrong by 25 % still helps."""
 
 SLOSH_REACH_M = 1.5
-"""From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+"""Largest distance from the centre of mass to the pivot. Chosen: no payload of three robots is larger."""
 
 SLOSH_MOST_DAMPED = 0.3
 """Largest damping ratio tried. Chosen."""
 
 SLOSH_LENGTHS_M = (0.04, 1.0)
-"""Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
+"""Range of lengths. Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones resemble drag or play."""
 
 OFF = ("off_x_m", "off_y_m", "off_z_m")
-"""Numbers of a shape: from the centre of mass to where it hangs for the columns, in {1}; any place nearby will do."""
+"""Shape numbers: from the centre of mass to the approximate pivot at which the columns are computed, in {1}."""
 
 
 class Slosh(Cause):
-    """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
+    """A pendulum that hangs from a point of the payload; the cause is its motion relative to the payload.
 
-    Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length, far ones
-    what ``team.causes.slosh`` says; v is how fast it would swing if it turned with the payload, to which its
-    damper is fixed. The payload feels -mass x'' at the point, upwards what raises the mass, and, as the damper pulls
-    where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and rigid part are in the
-    payload's own parameters.
+    Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length; large ones
+    obey ``swung``. The damper is fixed to the payload; v is the speed of a mass that turns with the payload. The
+    payload feels -mass x'' at the point, and the reaction of raising the mass. The damper acts at the mass, so it also
+    exerts the moment of its force 2 zeta w mass (x' - v), one length below the point. The payload's own parameters
+    include the pendulum's weight and rigid motion.
 
-    What swings may have two modes, of one damping ratio. With ``across_length_m`` in its shape it is Blackburn's
-    pendulum, as a liquid in a box that is longer than wide: it swings on ``length_m`` along ``heading_rad`` (from x of
-    {1}, about z) and on that across; the mass is one, so across it hangs from a point that is lower by the difference.
-    With ``second_length_m`` a share of the mass swings on that, from the same point.
+    The mass may have two modes with one damping ratio. With ``across_length_m`` in its shape it is Blackburn's
+    pendulum, like a liquid in an oblong box: it swings on ``length_m`` along ``heading_rad`` (from x of {1}, about z)
+    and on ``across_length_m`` across. The mass is one, so the pivot across is lower by the difference. With
+    ``second_length_m`` a share of the mass swings on that length, from the same point.
     """
 
     title = "mass that swings in the payload"
@@ -302,7 +304,7 @@ class Slosh(Cause):
             drop_m = shape["length_m"] - shape["across_length_m"]
             along, across = _ways(R_b1, shape["heading_rad"])
             ways = [Way.of(trial, along, point), Way.of(trial, across, point - [0.0, 0.0, drop_m])]
-            # Its weight and rigid part are not where the payload's own parameters have it.
+            # The mass hangs lower than the payload's own parameters assume: correct its weight and rigid motion.
             for way, sign in (ways[1], -1.0), (Way.of(trial, across, point), 1.0):
                 wrench += sign * way.pull[:, :, None] * way.drive[:, None]
             wrench[:, 3:, 0] += drop_m * gravity * np.cross(across[:, 2:] * across, R_b1[:, 2])
@@ -315,18 +317,18 @@ class Slosh(Cause):
                 wrench[:, 3:] += share * way.about[:, :, None] * moment[:, None]
             wrench[..., 0] -= share * up.pull * rising[:, None]
         wrench[:, 3:, 1:] -= skew(wrench[:, :3, 0])  # moving the point by r moves the force: r x f = -f x r
-        # Its moments are about the centre of mass, wherever it was swung.
+        # Express moments about the centre of mass, whatever pivot was used.
         wrench[..., 0] -= wrench[..., 1:] @ off
         return trial.of_wrench(wrench[:, :3], wrench[:, 3:])
 
     def around(self, values, shape):
-        """Swung about where it is found to hang."""
+        """Compute the columns at the pivot that the values indicate."""
         at = np.clip(values[1:] / max(values[0], 1e-6), -SLOSH_REACH_M, SLOSH_REACH_M)
         return {**shape, **dict(zip(OFF, at.tolist(), strict=True))}
 
     def finer(self, shape):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
-        more = (0.5, 0.7, 0.85, 0.95, 1.05, 1.2, 1.4)  # swings less: the mass comes out larger
+        more = (0.5, 0.7, 0.85, 0.95, 1.05, 1.2, 1.4)  # damping reduces the swing: the mass comes out larger
         length, damping = shape["length_m"], shape["damping_ratio"]
         near = [{"length_m": length * x} for x in longer]
         near += [
@@ -357,13 +359,13 @@ class Slosh(Cause):
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A level way on which a mass swings that hangs from a point of the payload.
+    """A level direction along which a mass swings that hangs from a point of the payload.
 
     Attributes:
-        pull: wrench on the payload, in {1}, of 1 N along it at the point, shape (Q, 6).
-        about: axis, in {1}, about which it swings, shape (Q, 3).
-        drive: how the point is accelerated along it, and by how much more the further it is on each axis, shape (Q, 4).
-        turned: how fast the payload turns about that axis [rad/s], shape (Q,).
+        pull: wrench on the payload in {1} per 1 N along the direction at the point, shape (Q, 6).
+        about: axis in {1} about which the mass swings, shape (Q, 3).
+        drive: acceleration of the point along the direction, and its derivative by the point's position, shape (Q, 4).
+        turned: turn rate of the payload about that axis [rad/s], shape (Q,).
     """
 
     pull: Array
@@ -373,7 +375,7 @@ class Way:
 
     @classmethod
     def of(cls, trial: TrialLinear, way: Array, point: Array) -> Way:
-        """Along unit vectors in {1}, shape (Q, 3), from a point in {1}."""
+        """Make the direction from unit vectors in {1}, shape (Q, 3), and a point in {1}."""
         about, motion = np.cross(way, trial.data.R_bi[:, 0, 2]), trial.motion
         further = (way[:, None] @ trial.turning)[:, 0]
         at = further @ point + np.sum(way * motion.acceleration, axis=1)
@@ -386,7 +388,7 @@ _LEVEL: WeakKeyDictionary[TrialLinear, tuple[Array, tuple[Way, Way, Way]]] = Wea
 
 
 def _level_ways(trial: TrialLinear, point: Array) -> tuple[Way, Way, Way]:
-    """From a point in {1} two ways to tell swings of one length by, and upwards; the last ones are kept."""
+    """Level x and y of {b1} and up, from a point in {1}; the last result of each trial is cached."""
     if trial not in _LEVEL or not np.array_equal(_LEVEL[trial][0], point):
         R_b1 = trial.data.R_bi[:, 0]
         x, y, up = (Way.of(trial, R_b1[:, k], point) for k in range(3))
@@ -399,12 +401,12 @@ def _off(shape: Shape) -> Array:
 
 
 def _has_two(shape: Shape) -> bool:
-    """Whether it has a second mode."""
+    """Whether a shape has a second mode."""
     return "across_length_m" in shape or "second_length_m" in shape
 
 
 def _second_modes(shape: Shape) -> list[Shape]:
-    """What a shape with one mode lacks of one with two."""
+    """Additional numbers that turn a shape with one mode into one with two."""
     length_m = shape["length_m"]
     two: list[Shape] = [
         {"across_length_m": length_m * x, "heading_rad": turn}
@@ -415,7 +417,7 @@ def _second_modes(shape: Shape) -> list[Shape]:
 
 
 def _nearer_mode(shape: Shape) -> list[Shape]:
-    """Numbers of the second mode, changed."""
+    """Changed numbers of the second mode."""
     name = "across_length_m" if "across_length_m" in shape else "second_length_m"
     near: list[Shape] = [{name: shape[name] * x} for x in SLOSH_SECOND_FINER]
     if name == "across_length_m":
@@ -424,7 +426,7 @@ def _nearer_mode(shape: Shape) -> list[Shape]:
 
 
 def _tried(shape: Shape) -> bool:
-    """Whether pendulums are so long and so little damped that it is worth a try."""
+    """Whether lengths, damping ratio and mass share are in the range that is searched."""
     least, most = SLOSH_LENGTHS_M
     lengths = [x for name, x in shape.items() if name.endswith("length_m")]
     share = shape.get("second_share", 0.5)
@@ -434,7 +436,7 @@ def _tried(shape: Shape) -> bool:
 
 
 def _ways(R_b1: Array, heading_rad: float) -> tuple[Array, Array]:
-    """Level directions in {1}, shapes (Q, 3): on a heading from x of {1}, and across."""
+    """Level directions in {1}, shape (Q, 3) each: on a heading from x of {1}, and across."""
     c, s = (R_b1 @ [np.cos(heading_rad), np.sin(heading_rad), 0.0])[:, :2].T
     c, s = (x[:, None] / np.hypot(c, s)[:, None] for x in (c, s))
     x, y = R_b1[:, 0], R_b1[:, 1]

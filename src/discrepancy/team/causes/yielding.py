@@ -1,4 +1,4 @@
-"""What gives way to a force: bases and grasps behind a lag, creep, and a loose grasp."""
+"""Compliant bases and grasps with a lag, creeping bases, and loose grasps."""
 
 from __future__ import annotations
 
@@ -18,20 +18,19 @@ from estimator.arm.motion import THETA
 from estimator.arrays import Array
 
 RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
-"""Time constants tried first, a factor of four apart: a Gauss-Newton step finds the rest."""
+"""Time constants tried first [s]. Chosen: a factor of about four apart, which Gauss-Newton steps bridge."""
 
 RELAXATION_RANGE_S = (0.001, 0.5)
-"""Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
+"""Range of time constants [s]. Derived: shorter ones shift a 1 Hz motion by less than 0.6 %; longer ones are creep."""
 
 RELAXATION_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
-"""Shares of such a time that are tried next. Chosen."""
+"""Factors of a time constant tried next. Chosen."""
 
 
 class Yielding(Cause):
-    """Compliance times the force, behind a lag of first order: compliance times damping is its time constant.
+    """A displacement proportional to force with a first-order lag; the time constant is compliance times damping.
 
-    A mass that moves along lags as well. Where a shape has ``inertia_s2``, compliance times that mass, the lag is of
-    second order.
+    A moving mass makes the lag second-order: the shape then has ``inertia_s2``, compliance times that mass.
     """
 
     family = "compliance"
@@ -51,7 +50,7 @@ class Yielding(Cause):
 
 
 def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
-    """A force (Q, 3) behind the lag, linear between samples, at rest before them."""
+    """Apply the lag to a force (Q, 3), which is linear between samples and constant before them."""
     below = [shape["relaxation_s"], 1.0]
     if inertia_s2 := shape.get("inertia_s2"):
         below.insert(0, inertia_s2)
@@ -61,13 +60,13 @@ def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
 
 
 BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
-"""Compliance times moving mass over the lag squared, tried first (1/4: critical damping); finer shares."""
+"""Compliance times moving mass over squared time constant, tried first (1/4: critical damping); finer factors."""
 
 
 class BaseCompliance(Yielding):
-    """The base gives way to the horizontal force, which is the reaction to arm and payload.
+    """The base yields to the horizontal reaction force of arm and payload.
 
-    Where it gives way much the robot's own mass shows: on 14 um/N, 70 kg swing at 5 Hz.
+    With a large compliance the robot's own mass matters: on 14 um/N, 70 kg oscillate at 5 Hz.
     """
 
     title = "compliance of {base}"
@@ -92,7 +91,7 @@ class BaseCompliance(Yielding):
         return [*({**shape, **time} for time in times), *({**shape, "inertia_s2": x} for x in inertias)]
 
     def further(self, shape):
-        """With the robot's mass on the spring; the same lag where forces are slow."""
+        """Add the robot's mass to the spring; slow forces have the same lag."""
         if "inertia_s2" in shape:
             return []
         shares = BASE_INERTIA_SHARES
@@ -112,20 +111,20 @@ class BaseCompliance(Yielding):
 
 
 CREEP_STARTS = 100
-"""How many of them there are, each as likely as the others. Derived: three bases, by a minute in steps of 2 s."""
+"""Number of distinguishable start times. Derived: three bases, each a minute in steps of 2 s."""
 
 CREEP_STEP_S = 0.5
-"""Step of slopes by that time. Chosen: what creeps from half a second sooner or later goes nearly the same way."""
+"""Step of finite differences by the start time [s]. Chosen: half a second changes the path little."""
 
 CREEP_FINER_S = (-2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0)
-"""By which such a time is moved next. Chosen."""
+"""Changes of a start time tried next [s]. Chosen."""
 
 CREEP_STARTS_S = tuple(3.0 * k for k in range(1, 31))
-"""Into a trial, at which a base may begin to creep, tried first. Chosen: trials last less than a minute and a half."""
+"""Start times of creep within a trial, tried first [s]. Chosen: trials last less than a minute and a half."""
 
 
 class BaseCreep(Cause):
-    """The base moves at constant velocity (x, y in its own axes) during a trial; with ``start_s`` from then on only."""
+    """The base moves at constant velocity (x, y in its own axes) during a trial; with ``start_s`` only from then on."""
 
     title = "creep of {base}"
     family = "base_creep"
@@ -159,7 +158,7 @@ class BaseCreep(Cause):
         return super().physical(values, context) | {"start_s": context.shape.get("start_s", 0.0)}
 
     def columns(self, trial, robot, joint, shape):
-        # From the recording's begin, of which this may be a later part; a constant way is the bases' own.
+        # Count from the start of the recording, even in a later part. The base poses absorb a constant.
         since = shape.get("start_s", trial.signals.time[0])
         time = np.maximum(0.0, trial.signals.time - since)
         return stack(
@@ -171,29 +170,28 @@ class BaseCreep(Cause):
 
 
 GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
-"""Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
+"""Factors of that offset tried next, and its range [m]. Derived: the rotation about a nearer pivot is negligible."""
 
 GRASP_TURNS_M = (0.05, -0.05)
-"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first [m]."""
+"""Positions of the pivot along the grasp's axis from the gimbal's centre, tried first [m]. Chosen."""
 
 
 class GraspFlex(Yielding):
-    """The payload's grasp site stays behind the flange, giving way to the force on the payload.
+    """The payload's grasp yields against the flange under the force on the payload.
 
-    It may turn besides, about a point on the grasp's axis at ``offset_m`` from the gimbal's centre (along z of {i}).
-    The gimbal passes no moment, so the moment about that point is its distance times the force across the axis, and
-    the turning goes with the force: ``turning_rad_per_N`` is compliance in rotation times distance. Without such a
-    point in its shape it does not turn.
+    It may also rotate, about a pivot on the grasp's axis at ``offset_m`` from the gimbal's centre (along z of {i}). The
+    gimbal transmits no moment, so the moment about the pivot is its distance times the transverse force.
+    ``turning_rad_per_N`` is rotational compliance times distance. Without ``offset_m`` the grasp does not rotate.
     """
 
     title = "compliance of {grasp}"
     parameters = ("compliance_m_per_N", "turning_rad_per_N")
-    tolerances = (1e-7, 1e-6)  # the second: bolts 7 cm apart that give way as much, 5 cm off the gimbal
+    tolerances = (1e-7, 1e-6)  # second: bolts 7 cm apart with the same compliance, 5 cm from the gimbal
     positive = ("compliance_m_per_N", "turning_rad_per_N")
     clipped = ("turning_rad_per_N",)
     at = "grasp"
     shapes = (
-        *({"relaxation_s": time_s} for time_s in sorted(RELAXATIONS_S)),  # no base moves along
+        *({"relaxation_s": time_s} for time_s in sorted(RELAXATIONS_S)),  # no large mass moves along
         *({"relaxation_s": min(RELAXATIONS_S), "offset_m": offset_m} for offset_m in GRASP_TURNS_M),
     )
     determined: ClassVar = {**Yielding.determined, "offset_m": 0.1}
@@ -222,7 +220,7 @@ class GraspFlex(Yielding):
 
     def columns(self, trial, robot, joint, shape):
         R_bi, to_b1 = trial.data.R_bi[:, robot], trial.bases.R[robot]
-        # Its springs turn with it, and so does what lags in them.
+        # The springs turn with the payload, and so does their lag.
         force = lagging(trial.data.wrench[:, robot, 3:], trial.signals.rate_hz, shape)
         gives = _moved(trial, robot, to_b1 @ R_bi, -force)
         turns = np.zeros_like(gives)
@@ -243,28 +241,28 @@ class GraspFlex(Yielding):
 
 
 def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
-    """Rows of a grasp that is displaced along the axes of {i}, shape (Q, 3)."""
+    """Residual rows of a grasp displaced along the axes of {i}, shape (Q, 3)."""
     return trial.of_pose(robot, None, np.einsum("qij,qj->qi", R_b1i, by))
 
 
 PLAY_COLUMNS_AT_A_TIME = 16
-"""Columns of that travel at a time: a limit of memory."""
+"""Columns of the travel within the play that are computed at a time. Chosen: limits memory."""
 
 PLAY_CONTACT_PER_N = 0.02
-"""Share of a play by which its ends give way to a newton, over which slopes are taken."""
+"""Step of finite differences: share of the play by which its ends yield per newton. Chosen."""
 
 PLAY_OPEN_KNOTS_S = 0.05
-"""Between knots of that travel: nothing faster passes the rows' filter."""
+"""Time between knots of the travel within the play [s]. Derived: faster travel does not pass the rows' filter."""
 
 PLAY_OPEN_N, PLAY_OPEN_S = 1.0, 0.03
-"""Force below which a loose payload may travel, and how long before and after: filters spread the force."""
+"""Force below which a loose payload may travel [N]; time around that by which filters spread the force [s]. Chosen."""
 
 
 class GraspPlay(Cause):
-    """The payload rests against one end of its play on every axis of {i}, after the force on it.
+    """The force presses the payload against one end of its play on every axis of {i}.
 
-    Below ``force_N`` it has not settled there, and is anywhere between the ends. The ends may give way to the force:
-    by ``contact_per_N`` of the play, if that is in its shape.
+    Below ``force_N`` the payload may be anywhere between the ends. With ``contact_per_N`` in the shape, the ends also
+    yield to the force, by that share of the play.
     """
 
     title = "play in {grasp}"
@@ -284,7 +282,7 @@ class GraspPlay(Cause):
         return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis{behind}"
 
     def slope_step(self, name, number):
-        return self.determined[name]  # from zero on, and straight
+        return self.determined[name]  # absolute, because the number starts at zero
 
     def physical(self, values, context):
         play_m = float(values[0])
@@ -310,9 +308,9 @@ class GraspPlay(Cause):
 
 
 def displaced(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:
-    """Rows of an offset of the grasp along the axes of {i} under a force in them [N], shape (Q, 3) each.
+    """Residual rows of an offset of the grasp in {i} under a force in {i} [N], shape (Q, 3) each.
 
-    The force still goes through the gimbal's centre, of which the payload is off by so much.
+    The force still acts at the gimbal's centre, from which the payload is now offset.
     """
     in_b = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], offset)
     moment = np.cross(force, offset) @ trial.shared.grasps.R_1i[robot].T

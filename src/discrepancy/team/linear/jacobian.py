@@ -15,19 +15,19 @@ from estimator.signals import GraspData
 from estimator.so3 import cross
 
 TEAM_JACOBIAN_HZ = 25.0
-"""Rate of derivatives, interpolated between. Chosen: twice the rows'."""
+"""Rate of the knots between which derivatives are interpolated [Hz]. Chosen: twice that of the rows."""
 
 
 @dataclass(frozen=True, eq=False)
 class BySignals:
-    """Derivative of the residual's samples by every robot's signals, (Q, C, 21) each; kept at every so-many-th sample.
+    """Derivative of the residual's samples by every robot's signals, (Q, C, 21) each, stored at knots.
 
-    It varies as slowly as the motion: a straight line between its values is good to 1e-3, and single precision is
-    enough. A robot moves its own loop and the balance of wrenches (the first one all loops), and no more is kept.
+    It changes as slowly as the motion, so linear interpolation is accurate to 1e-3 and single precision suffices. A
+    robot affects its own loop and the wrench balance (robot 1 all loops). Only these channels are stored.
 
     Attributes:
-        knots: values of every robot, shape (K, channels that it moves, 21).
-        moved: which these are, for every robot.
+        knots: derivatives for every robot, shape (K, channels that it affects, 21).
+        moved: indices of these channels, for every robot.
         channels: C.
         every: samples from one knot to the next.
         samples: Q.
@@ -41,14 +41,14 @@ class BySignals:
 
     @classmethod
     def none(cls, robots: int, channels: int) -> BySignals:
-        """Where nobody asks for it."""
+        """Make an empty placeholder, for callers that need no derivatives."""
         empty = np.zeros((0, 0, COUNT), np.float32)
         return cls((empty,) * robots, (np.zeros(0, np.intp),) * robots, channels, 1, 0)
 
     def __call__(self, robot: int, slots: slice, change: Array) -> Array:
-        """What changes of some of one robot's signals do, (Q, s) -> (Q, C); of several (Q, s, k) -> (Q, C, k).
+        """Multiply the derivative by changes of one robot's signals, (Q, s) -> (Q, C), or (Q, s, k) -> (Q, C, k).
 
-        A change that stays is of shape (s,).
+        A constant change has shape (s,).
         """
         J = self.knots[robot][..., slots].astype(np.float64)
         after = np.concatenate([J[1:], J[-1:]])
@@ -78,10 +78,9 @@ class BySignals:
 
 
 def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> BySignals:
-    """Derivative of the residual by every robot's signals.
+    """Compute the derivative of the residual by every robot's signals, at 25 Hz.
 
-    Central differences through one robot's own formulas, then by hand through what is linear in the robots;
-    evaluated at 25 Hz.
+    Central differences give the derivative of one robot's own formulas. The rest is linear in the robots and analytic.
     """
     samples, every = len(s), max(1, round(data.rate_hz / TEAM_JACOBIAN_HZ))
     knots = np.arange(0, samples, every)
@@ -122,7 +121,7 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
 def _changes(s: Array, arm: Arms) -> ArmData:
     """Derivative of one robot's data by its signals, (Q, 21) -> (21, Q, ...) each.
 
-    All of a kind at once; where angles stay, so do the legs and the orientation, which are not found again.
+    All signals of one kind are differenced at once. Where angles stay, the leg geometry and the orientation are reused.
     """
     Q, kinds = len(s), COUNT // 3
     at = list(np.moveaxis(s.reshape(Q, kinds, 3), 1, 0))

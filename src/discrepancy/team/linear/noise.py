@@ -1,4 +1,4 @@
-"""How finely each sensor reads, by the recording itself: rounding steps, white noise, and a chattering loop."""
+"""Resolution of each sensor, estimated from the recording: rounding step, white noise, and torque chatter."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ NOISE_SEED = 20250
 """Seed of the noise draws, fixed so that verdicts can be reproduced."""
 
 MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM, MODEL_HZ = 2e-6, 7e-7, 3e-4, 100.0
-"""Error of the model itself (soft rods, welds, integrator), as noise of readings at ``MODEL_HZ``."""
+"""Error of the model itself (soft rods, welds, integrator), as white noise of readings at ``MODEL_HZ``."""
 
 NOISE_ABOVE_HZ = 25.0
-"""Where nothing moves, so that what is there is noise. Chosen."""
+"""Frequency above which nothing moves, so that signals contain noise only [Hz]. Chosen."""
 
 NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
-"""Share of the amplitude between spectral lines below which lines are no noise; lines over the torque's step that count
-as chatter."""
+"""Noise between spectral lines over total noise, below which the lines count as oscillation; amplitude of such lines
+over the torque's noise, from which they count as chatter. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fast:
-    """What every channel has above 25 Hz, shape (3, N, 3) each: phi, theta, tau.
+    """Content of every channel above 25 Hz, shape (3, N, 3) each: phi, theta, tau.
 
     Attributes:
-        white: standard deviation of white noise of a reading. Robust against moments, and against lines where these are
-            most of it: a joint that chatters.
-        lines: root mean square where it is lines and no noise, otherwise 0.
-        at_hz: of the strongest line.
+        white: standard deviation of the white noise of a reading. It is robust against short disturbances, and against
+            spectral lines if these dominate, as in a chattering joint.
+        lines: root mean square of dominant spectral lines, otherwise 0.
+        at_hz: frequency of the strongest line.
     """
 
     white: Array
@@ -48,7 +48,7 @@ class Fast:
 
     @classmethod
     def of(cls, signals: Signals) -> Fast:
-        """What one trial has."""
+        """Analyse one trial."""
         high, x = _high(signals), columns_of(signals)
         frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
         fast = density[frequency > high]
@@ -61,7 +61,7 @@ class Fast:
         return cls(*(np.moveaxis(one.reshape(len(one), 3, 3), 1, 0) for one in each))
 
     def is_loud(self, step: Array) -> bool:
-        """Whether a torque oscillates by much more than its noise, its step and what the model leaves.
+        """Whether a torque oscillates far above its noise, its rounding step and the model's error.
 
         Args:
             step: rounding steps, shape (3, N, 3).
@@ -71,26 +71,26 @@ class Fast:
 
 
 def native_hz(signals: Signals) -> Array:
-    """Rate of every robot's readings [Hz], shape (N,)."""
+    """Rate at which every robot's sensors were read [Hz], shape (N,)."""
     if signals.sampling is None:
         return np.full(signals.phi.shape[1], signals.rate_hz)
     return np.array([sampling.native_hz for sampling in signals.sampling])
 
 
 def columns_of(signals: Signals) -> Array:
-    """The sensors' channels of all robots, shape (Q, N, 9)."""
+    """Readings of all sensors, shape (Q, N, 9)."""
     return np.concatenate([signals.phi, signals.theta, signals.tau], axis=2)
 
 
 def _high(signals: Signals) -> float:
-    """From where on there is noise alone [Hz]."""
+    """Frequency above which signals contain noise only [Hz]."""
     return float(min(NOISE_ABOVE_HZ, 0.4 * min(signals.rate_hz, *native_hz(signals))))
 
 
 def _levels(signals: Signals) -> tuple[Array, Array]:
-    """White noise of a reading with the lines, and without, shape (N, 9) each.
+    """White noise of a reading with and without spectral lines, shape (N, 9) each.
 
-    A conversion leaves less of it there; how much, it shows on noise of one.
+    Resampling removes a part of the noise at high frequency. White noise through the same conversion gives that part.
     """
     rate_hz, x, high = signals.rate_hz, columns_of(signals), _high(signals)
     over_time, between_lines = _fast(high, x, rate_hz)
@@ -107,18 +107,18 @@ def _levels(signals: Signals) -> tuple[Array, Array]:
 
 
 def _fast(high: float, x: Array, rate_hz: float) -> tuple[Array, Array]:
-    """Root mean squares above a frequency: with the lines there, robust against moments; and between the lines."""
+    """Root mean square above a frequency: robust and including spectral lines; and between the lines."""
     band = butter(4, high, btype="high", fs=rate_hz, output="sos")
     fast = np.asarray(sosfiltfilt(band, x, axis=0), dtype=np.float64)
     over_time = 1.4826 * np.median(np.abs(fast), axis=0)
     frequency, density = periodogram(fast, rate_hz, window="hann", axis=0)
-    # Powers of white noise are exponentially distributed: ln 2 of their mean is the median.
+    # The power of white noise is exponentially distributed: its median is ln 2 times its mean.
     level = np.median(density[frequency > high], axis=0) / np.log(2.0)
     return over_time, np.sqrt(level * (rate_hz / 2.0 - high))
 
 
 def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
-    """A sentence where a torque oscillates faster than a team moves, by so much that it is let through; for the notes.
+    """Note for the report if a torque chatters so much that the filters let the chatter pass.
 
     Args:
         trials: signals of every trial, with their cut-offs (``Noise.known_to``).
@@ -137,21 +137,22 @@ def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
 
 
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
-"""Noise of rates up to which signals are smoothed as usual; least cut-off of noisier ones; share of a rounding step
-from which noise counts."""
+"""Noise of rates up to which the usual cut-off holds; least cut-off of noisier signals; noise over the rounding step
+from which noise counts. Chosen."""
 
 PHASE_TRAVEL = 4.0
-"""Steps of travel after which a rounding error is drawn anew."""
+"""Steps of travel after which a rounding error is drawn again. Chosen."""
 
 SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
-"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and octaves by which the signal's
-falls."""
+"""Cut-off of the speed that gives the frequency of rounding stairs; octaves by which the signal's own cut-off may fall.
+Chosen.
+"""
 
 CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
-"""Cut-off over the frequency of chatter, and at most over the sampling rate: the mean torque times angle must pass."""
+"""Cut-off over the frequency of chatter, and its limit over the sampling rate. Chosen: must pass the chatter."""
 
 MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
-"""Frequency up to which the model's own error lies, and its share above."""
+"""Frequency up to which the model's own error lies, and its share above. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +171,8 @@ class Noise:
 
     @classmethod
     def of(cls, trials: list[Signals]) -> Noise:
-        """Resolution of the sensors behind some trials."""
-        # Trial by trial: the grid may lie differently in each.
+        """Estimate the resolution of the sensors from some trials."""
+        # Per trial, because the rounding grid may be offset differently.
         step = np.median([_steps(trial) for trial in trials], axis=0)
         fast = [Fast.of(trial) for trial in trials]
         white = np.sqrt(np.mean([one.white**2 for one in fast], axis=0))
@@ -179,15 +180,15 @@ class Noise:
         return cls(step, sigma, any(one.is_loud(step) for one in fast))
 
     def known_to(self, signals: Signals) -> Signals:
-        """The signals with what they have to be smoothed at for the sake of their rates (``Signals.smooth_hz``).
+        """Set the signals' cut-offs (``Signals.smooth_hz``, ``Signals.pre_hz``) according to their noise.
 
-        What chatters is let through: dry friction turns with it, and hardly holds up what is slower.
+        Chatter must pass the filter: dry friction reverses with it, and then hardly resists slower motion.
         """
         noisy = self.sigma > NOISY_STEPS * self.step
         white = np.where(noisy, np.hypot(self.sigma, self.step / np.sqrt(12.0)), 0.0)
         rates = white * np.sqrt(signals.rate_hz / native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
         quiet = np.array([QUIET_RAD_PER_S, QUIET_RAD_PER_S, QUIET_NM_PER_S])
-        # Noise of a rate grows with the cut-off to the power 3/2.
+        # The noise of a rate grows with the cut-off to the power 3/2.
         less = (quiet[:, None, None] / np.maximum(rates, 1e-300)).clip(max=1.0) ** (2.0 / 3.0)
         smooth_hz = np.maximum(TEAM_SMOOTH_HZ * less, QUIET_HZ)
         fast = Fast.of(signals) if self.chatters else None
@@ -199,12 +200,12 @@ class Noise:
         return replace(signals, smooth_hz=np.maximum(smooth_hz, let_through), pre_hz=pre_hz)
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
-        """Realisations of the sensors' errors on a trial: what they add to its smooth signals.
+        """Draw the sensors' errors on a trial, as additions to its smooth signals.
 
-        Where its samples are not as they were read, errors are drawn at the readings and sent through the conversion.
+        If the samples were resampled, errors are drawn at the original readings and pass through the same conversion.
         """
         smooth = _unrounded(signals, np.moveaxis(self.step, 0, 1).reshape(-1, SENSORS))
-        at_a_time = 8  # for the sake of memory
+        at_a_time = 8  # to limit memory
         for first in range(0, count, at_a_time):
             size = min(at_a_time, count - first)
             ways = [_Way(smooth[:, i], signals, i, rng) for i in range(smooth.shape[1])]
@@ -217,12 +218,12 @@ class Noise:
                 yield Signals(signals.time, phi, theta, tau, signals.rate_hz)
 
     def _errors(self, x: Array, robot: int, rng: np.random.Generator) -> Array:
-        """Errors of one robot's readings, whose true values are ``x``, shape (q, 9)."""
+        """Draw the errors of one robot's readings with true values ``x``, shape (q, 9)."""
         return _read(x, self.step[:, robot].ravel(), self.sigma[:, robot].ravel(), rng)
 
 
 class _Way:
-    """One robot's signals at its readings, and what becomes of errors there.
+    """One robot's signals at the original readings, and the conversion of errors from there to the samples.
 
     Attributes:
         x: signals at the readings, shape (q, 9).
@@ -239,9 +240,9 @@ class _Way:
             self.x = CubicSpline(time, smooth)(at)
 
     def converted(self, errors: list[Array]) -> Array:
-        """Errors of the recording's samples, shape (D, Q, 9), from those of the readings, (q, 9) each.
+        """Convert errors of the readings, (q, 9) each, to errors of the samples, shape (D, Q, 9).
 
-        What the conversion itself misses of the signals, where samples lack, is among them.
+        They include the interpolation error of the conversion, for example where samples are missing.
         """
         if self._conversion is None:
             return np.array(errors)
@@ -252,7 +253,7 @@ class _Way:
 
 @cache
 def _rate_gain(rate_hz: float) -> float:
-    """Standard deviation of the rates that tell rest from motion, of white noise of 1 at every sample [1/s]."""
+    """Standard deviation of the rates that separate rest from motion, for unit white noise of every sample [1/s]."""
     impulse = np.zeros(int(4.0 * rate_hz) + 1)
     impulse[len(impulse) // 2] = 1.0
     smooth = low_pass(impulse, rate_hz, TEAM_SMOOTH_HZ)
@@ -260,7 +261,7 @@ def _rate_gain(rate_hz: float) -> float:
 
 
 def _read(x: Array, step: Array, sigma: Array, rng: np.random.Generator) -> Array:
-    """Errors of readings of ``x`` with white noise and then rounding, for every channel in the last axis."""
+    """Draw errors of readings of ``x`` with white noise and then rounding, for every channel in the last axis."""
     rounds = step > 0
     step = np.where(rounds, step, 1.0)
     x = x + step * _phase(x / step, rng)
@@ -269,9 +270,10 @@ def _read(x: Array, step: Array, sigma: Array, rng: np.random.Generator) -> Arra
 
 
 def _model_errors(x: Array, rate_hz: float, rng: np.random.Generator) -> Array:
-    """What the model itself leaves, shape (Q, N, 9): slow in motion, and the same while all rests.
+    """Draw the error of the model itself, shape (Q, N, 9): slow in motion, and constant at rest.
 
-    Rounding does so, too, and is drawn for it: to a step that scatters by the floor; of what is quick, little stays.
+    A rounding error behaves the same way, so it serves as the model: its step gives the error's size. Only a small
+    share of its fast part is kept.
     """
     floor = np.repeat([MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM], 3)
     step = floor * np.sqrt(12.0 * rate_hz / MODEL_HZ)
@@ -281,12 +283,12 @@ def _model_errors(x: Array, rate_hz: float, rng: np.random.Generator) -> Array:
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:
-    """How far a signal (in steps) truly is from where its readings put it: the same while it rests.
+    """Draw the offset of the true signal from its readings (in steps), which stays the same while the signal rests.
 
-    A resting encoder repeats one rounding error; what was recorded of it always lies on the grid itself. The phase is
-    a broken line over travel, drawn anew every ``PHASE_TRAVEL`` steps, uniform modulo one everywhere.
+    Recorded readings lie on the rounding grid, but a resting encoder repeats one rounding error. The offset is
+    piecewise linear over travel with a knot every ``PHASE_TRAVEL`` steps.
     """
-    # Beyond two knots a sample nothing is left to repeat.
+    # Above two knots per sample nothing repeats.
     travel = np.minimum(np.abs(np.diff(x, axis=0, prepend=x[:1])), 2 * PHASE_TRAVEL)
     at = np.cumsum(travel, axis=0) / PHASE_TRAVEL
     low = np.floor(at).astype(np.intp)
@@ -297,10 +299,10 @@ def _phase(x: Array, rng: np.random.Generator) -> Array:
 
 
 def _unrounded(signals: Signals, step: Array) -> Array:
-    """A trajectory that the readings may have come from, shape (Q, N, 9), with ``step`` (N, 9).
+    """Estimate a smooth trajectory behind the readings, shape (Q, N, 9), with ``step`` (N, 9).
 
-    Readings of a slow joint are stairs, and no filter with one cut-off leaves of them what it did: where fewer than
-    three stairs go into a period of ``TEAM_SMOOTH_HZ``, the cut-off falls with their frequency.
+    Readings of a slow joint are stairs, which no fixed cut-off removes. The cut-off therefore falls with the frequency
+    of the stairs where fewer than three of them fit into a period of ``TEAM_SMOOTH_HZ``.
     """
     x, rate_hz = columns_of(signals), signals.rate_hz
     slow = differentiate(low_pass(x, rate_hz, SLOW_HZ), rate_hz)

@@ -1,4 +1,4 @@
-"""Friction at rest and play between its ends, within their tolerances: what they may do to a healthy team's rows."""
+"""Draw the effect of friction at rest and of grasp play, within their tolerances, on the rows of a healthy team."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from estimator.arrays import Array
 from estimator.filtering import differentiate
 
 PLAY_FORCE_N = 0.4
-"""Below which a payload may be anywhere in its play. Chosen."""
+"""Force below which a payload may be anywhere in its play [N]. Chosen."""
 
 REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
-"""Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
+"""Joint speed, and rate of a spring's torque, below which friction counts as noise. Chosen: as in the causes."""
 
 PLAY_KNOTS_S = 0.2
-"""Between knots of the travel that play leaves open at small forces. Chosen."""
+"""Time between the knots of a random position in the play [s]. Chosen."""
 
 DRAWS_AT_A_TIME, DRAWN_TOGETHER = 8, 4.5e5
-"""Most noise draws at a time, and most samples of all robots in them: a limit of memory."""
+"""Largest number of noise draws at a time, and of samples of all robots in them. Chosen: limits memory."""
 
 Moves = Literal["phi", "theta", "tau"]
 KINDS: tuple[tuple[Moves, str, str], ...] = (
@@ -34,14 +34,19 @@ KINDS: tuple[tuple[Moves, str, str], ...] = (
     ("tau", "sea_hysteresis", "friction_Nm"),
     ("theta", "gimbal_friction", "coulomb_Nm"),
 )
-"""What friction is told by, its cause, and the parameter that is its limit."""
+"""Signal whose rate detects rest, its cause, and the parameter that limits the friction torque."""
 HEALTHY = {"joint_friction": 1.0, "gimbal_friction": 1.0, "sea_hysteresis": 1.0, "grasp_play": 1.0}
-"""Kinds that leave something open even where they are within their tolerances, and that spread."""
+"""Causes that act as noise at rest, and the factor by which a healthy team's tolerance is scaled."""
 Tolerances = Mapping[str, Mapping[str, float]]
 
 
 def limits_of(tolerances: Tolerances, resting: Mapping[str, float]) -> Tolerances:
-    """Tolerances of the kinds that leave something open at rest, as many times as wide as each of them scatters."""
+    """Tolerances of the causes that act as noise at rest, scaled by factors.
+
+    Args:
+        tolerances: standard deviations by cause and parameter.
+        resting: factor of each such cause.
+    """
     return {
         cause: {name: factor * value for name, value in tolerances.get(cause, {}).items()}
         for cause, factor in resting.items()
@@ -49,10 +54,10 @@ def limits_of(tolerances: Tolerances, resting: Mapping[str, float]) -> Tolerance
 
 
 class Resting:
-    """Draws of what joints hold while they rest: friction takes any torque up to its limit, another at every rest.
+    """Draws of the torques that friction holds while joints rest, and of positions in the play of grasps.
 
-    While a joint moves, its friction is a cause of the catalogue with columns of its own; at rest it has none, and of a
-    healthy joint it is noise, of the size of the tolerance.
+    Friction at rest takes any torque up to its limit, another one during each rest. A moving joint's friction has
+    columns of its own. At rest it has none, so it counts as noise of the size of its tolerance.
     """
 
     def __init__(self, trial: TrialLinear, tolerances: Tolerances) -> None:
@@ -66,7 +71,7 @@ class Resting:
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
 
     def __call__(self, rng: np.random.Generator, draws: int = 1) -> Array:
-        """Draws of it, shape (draws, n, C)."""
+        """Draw residual rows, shape (draws, n, C)."""
         out = []
         most = draws_at_a_time(self._trial)
         for first in range(0, draws, most):
@@ -75,14 +80,14 @@ class Resting:
         return np.concatenate(out)
 
     def _drawn(self, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-        """Torques of joints and of gimbals at rest [N m], and places in the plays [m], shape (Q, N, 3) each."""
+        """Draw torques of resting joints and gimbals [N m] and positions in the play [m], shape (Q, N, 3) each."""
         driven = self._torque("phi", rng) + self._torque("tau", rng)
         gimbal = self._torque("theta", rng)
         places = [self._between(i, rng) for i in range(self._trial.robots if self._play_m else 0)]
         return driven, gimbal, np.stack(places, axis=1) if places else np.zeros_like(driven)
 
     def _rows(self, driven: Array, gimbal: Array, places: Array) -> Array:
-        """What draws (Q, N, 3, D) of them leave, shape (D, n, C)."""
+        """Residual rows, shape (D, n, C), of draws of shape (Q, N, 3, D)."""
         trial, (samples, N, _, D) = self._trial, driven.shape
         rows = trial.reduction(np.sum([trial.J(i, TAU, driven[:, i]) for i in range(N)], axis=0))
         moment = self._moments @ gimbal.reshape(samples, 3 * N, D)
@@ -93,13 +98,13 @@ class Resting:
 
     @cached_property
     def _moments(self) -> Array:
-        """Moment on the payload in {1} by all gimbal torques, shape (Q, 3, 3 N)."""
+        """Moment on the payload in {1} per unit of each gimbal torque, shape (Q, 3, 3 N)."""
         axes_T = np.swapaxes(rate_matrix(self._trial.s[..., THETA]), -1, -2)
         by_robot = np.moveaxis(self._trial.shared.grasps.R_1i @ np.linalg.inv(axes_T), 1, 2)
         return np.asarray(by_robot.reshape(len(by_robot), 3, -1), dtype=np.float64)
 
     def _between(self, robot: int, rng: np.random.Generator) -> Array:
-        """Place in a grasp's play along the axes of {i} [m] while the force leaves it open, shape (Q, 3); else 0."""
+        """Draw a position in a grasp's play in {i} [m], shape (Q, 3); zero where the force closes the play."""
         trial = self._trial
         time = trial.signals.time
         knots = np.arange(time[0], time[-1] + PLAY_KNOTS_S, PLAY_KNOTS_S)
@@ -108,7 +113,7 @@ class Resting:
         return np.asarray(self._play_m * np.stack(anywhere, axis=1) * between)
 
     def _torque(self, moves: Moves, rng: np.random.Generator) -> Array:
-        """Torque at rest [N m], shape (Q, N, 3); 0 in motion."""
+        """Draw the friction torque at rest [N m], shape (Q, N, 3); zero in motion."""
         rests = self._rests[moves]
         each = self._limit_Nm[moves] * rng.standard_normal((int(rests.max(initial=0)) + 1, *rests.shape[1:]))
         each[0] = 0.0
@@ -116,12 +121,12 @@ class Resting:
 
 
 def draws_at_a_time(trial: TrialLinear) -> int:
-    """How many draws of a trial's noise there may be together."""
+    """Return how many noise draws of a trial fit in memory together."""
     return max(1, min(DRAWS_AT_A_TIME, int(DRAWN_TOGETHER // trial.s[..., 0].size)))
 
 
 def _numbered(signals: Signals, moves: Moves, slow: float) -> NDArray[np.intp]:
-    """Number of the rest that each sample is in, from 1, and 0 in motion, shape (Q, N, 3)."""
+    """Number each joint's rests from 1 and give motion 0, shape (Q, N, 3)."""
     each = [
         [signals.smooth(moves, robot, joint) for joint in range(3)] for robot in range(signals.phi.shape[1])
     ]

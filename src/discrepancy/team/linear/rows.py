@@ -1,4 +1,4 @@
-"""From a trial's samples to its rows: reduction, columns that are there for a while, whitening."""
+"""Reduce the samples of a trial to rows, keep sparse columns as patches, and whiten rows."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import doubtful
 
 PATCH_COLUMNS = 48
-"""Columns of a latent state that are kept together: a compromise of calls and zeros."""
+"""Columns of a latent state that one patch holds. Chosen: few calls against few stored zeros."""
 
 PATCH_SHOWS = 1e-6
-"""Trace of a latent column over the largest below which it is dropped."""
+"""Size of a latent column over the largest, below which it is dropped. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Some columns where they are not zero.
+    """A block of columns, restricted to the rows and channels where they are not zero.
 
     Attributes:
-        rows: in which they are, increasing.
-        first: channel from which on they are.
+        rows: indices of the rows, increasing.
+        first: first channel.
         values: shape (rows, C - first, k).
     """
 
@@ -40,23 +40,23 @@ class Patch:
 
     @cached_property
     def where(self) -> slice | NDArray[np.intp]:
-        """The rows as an index: a slice, which copies nothing, where none is missing between the first and the last."""
+        """The rows as an index. It is a slice, which copies nothing, if the rows are contiguous."""
         whole = len(self.rows) and self.rows[-1] - self.rows[0] + 1 == len(self.rows)
         return slice(int(self.rows[0]), int(self.rows[-1]) + 1) if whole else self.rows
 
     @property
     def flat(self) -> Array:
-        """All their numbers, shape (rows (C - first), k)."""
+        """The values as a matrix, shape (rows (C - first), k)."""
         return self.values.reshape(-1, self.values.shape[2])
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Columns of one trial, shape (n, C, k) if they were dense.
+    """Sparse columns of one trial; their dense shape would be (n, C, k).
 
     Attributes:
         shape: n, C.
-        each: successive columns.
+        each: patches of successive columns.
     """
 
     shape: tuple[int, int]
@@ -64,7 +64,7 @@ class Patches:
 
     @classmethod
     def of(cls, x: Array) -> Patches:
-        """From dense columns, shape (n, C, k)."""
+        """Make a patch from dense columns, shape (n, C, k)."""
         rows = np.flatnonzero(x.any(axis=(1, 2)))
         if not len(rows):
             return cls(x.shape[:2])
@@ -73,15 +73,15 @@ class Patches:
 
     @property
     def width(self) -> int:
-        """How many columns there are, k."""
+        """Number of columns k."""
         return sum(patch.values.shape[2] for patch in self.each)
 
     def beside(self, others: Iterable[Patches]) -> Patches:
-        """These columns, and then others of the same trial."""
+        """Append columns of the same trial."""
         return Patches(self.shape, (*self.each, *(patch for other in others for patch in other.each)))
 
     def together(self, least: int = PATCH_COLUMNS) -> Patches:
-        """The same columns in patches of so many at least, of those that follow each other."""
+        """Merge neighbouring patches until each holds at least ``least`` columns."""
         out: list[Patch] = []
         some: list[Patch] = []
         for patch in self.each:
@@ -92,10 +92,10 @@ class Patches:
         return Patches(self.shape, (*out, *([_joined(some)] if some else [])))
 
     def fewer(self) -> Patches:
-        """As few columns as have the same products with their own transpose, but for what does not show.
+        """Reduce the number of columns and keep the covariance that they imply.
 
-        Normal unknowns of one size that are turned are such unknowns again; of knots closer than rows most show in
-        nothing of their own.
+        Independent unknowns of equal variance stay so under rotation. The rotation lets negligible columns be dropped,
+        for example those of knots that are closer than the rows.
         """
         turned = [np.linalg.eigh(patch.flat.T @ patch.flat) for patch in self.each]
         most = max((squares[-1] for squares, _ in turned), default=0.0)
@@ -106,7 +106,6 @@ class Patches:
 
 
 def _joined(patches: Sequence[Patch]) -> Patch:
-    """Several as one."""
     if len(patches) == 1:
         return patches[0]
     rows = np.unique(np.concatenate([patch.rows for patch in patches]))
@@ -121,41 +120,41 @@ def _joined(patches: Sequence[Patch]) -> Patch:
 
 
 SHORTEST_HOLD_S = 1.2
-"""Left of a hold, to be one row. Chosen."""
+"""Shortest duration of a hold, without its ends, that makes a row [s]. Chosen."""
 
 SETTLING_S = 0.3
-"""Left out at both ends of a hold. Chosen."""
+"""Time left out at both ends of a hold [s]. Chosen."""
 
 HOLD_CUTOFF_HZ = 2.0
-"""Cut-off of the speed that tells rest. Chosen."""
+"""Cut-off of the joint speed that detects rest [Hz]. Chosen."""
 
 STILL_RAD_PER_S = 1e-3
-"""Joints slower than that rest. Derived: twenty times what rounding does below ``HOLD_CUTOFF_HZ``."""
+"""Joint speed below which a joint rests [rad/s]. Derived: 20 times the rounding noise below ``HOLD_CUTOFF_HZ``."""
 
 TEAM_ROWS_HZ = 12.5
-"""Chosen with the cut-off: it leaves filtered noise nearly white."""
+"""Rate of moving rows [Hz]. Chosen: with the cut-off it leaves filtered noise nearly white."""
 
 TEAM_CUTOFF_HZ = 5.0
-"""Cut-off of the rows. Chosen."""
+"""Cut-off of the filter before the rows [Hz]. Chosen."""
 
 TOGETHER = 16
-"""Moving rows that are made at once; of more, a dense matrix would be zero for the most part."""
+"""Moving rows computed by one dense matrix. Chosen: a larger matrix would mostly contain zeros."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """A linear map from the samples of a trial to its rows, the same for residuals and all their columns.
+    """Linear map from the samples of a trial to its rows; the same for residuals and columns.
 
-    In motion the residual is filtered at 5 Hz and taken at 12.5 Hz, which leaves it nearly white. While
-    everything rests, an encoder repeats one rounding error for seconds, so a hold counts as one row: its mean; rests
-    too short for that are left out, and so is every row to which held readings may give more than noise does.
+    During motion the rows are the residual, filtered at 5 Hz and sampled at 12.5 Hz, so their noise is nearly white.
+    During a hold an encoder repeats one rounding error for seconds, so the mean of a hold counts as one row. Shorter
+    rests are left out. Rows are also left out if repeated readings may distort them by more than the noise.
 
     Attributes:
-        operator: rows from samples, shape (n, Q); moving rows first.
+        operator: samples to rows, shape (n, Q); moving rows first.
         time: middle of every row [s], shape (n,).
-        moving: how many rows are in motion.
+        moving: number of rows in motion.
         step: samples between moving rows.
-        sample: middle of every row, index into the samples, shape (n,).
+        sample: sample index of the middle of every row, shape (n,).
     """
 
     operator: csr_array
@@ -166,11 +165,11 @@ class Reduction:
 
     @classmethod
     def none(cls, time: Array) -> Reduction:
-        """Every sample a row, times (Q,) in s."""
+        """Make every sample a row; ``time`` has shape (Q,) [s]."""
         return cls(csr_array(eye_array(len(time), format="csr")), time, len(time), 1, np.arange(len(time)))
 
     def __call__(self, x: Array) -> Array:
-        """Reduce samples, shape (Q, ...) -> (n, ...); what is there for a while only takes as long as that."""
+        """Reduce samples to rows, shape (Q, ...) -> (n, ...). Blocks of rows where the samples are zero are skipped."""
         flat = x.reshape(len(x), int(np.prod(x.shape[1:])))
         rows = np.zeros((len(self.time), flat.shape[1]))
         first, last = 0, self.moving
@@ -188,7 +187,7 @@ class Reduction:
 
     @cached_property
     def _blocks(self) -> list[tuple[slice, int]]:
-        """Moving rows that follow each other at once, ``TOGETHER`` at most, and the first sample of each such block."""
+        """Blocks of at most ``TOGETHER`` consecutive moving rows, and the first sample of each block."""
         gaps = np.flatnonzero(np.diff(self.sample[: self.moving]) != self.step) + 1
         out = []
         for start, stop in pairwise([0, *gaps.tolist(), self.moving]):
@@ -198,7 +197,7 @@ class Reduction:
 
     @cached_property
     def _band(self) -> Array:
-        """Such a block as a dense matrix, shape (TOGETHER, samples): several times as fast as a sparse one."""
+        """Reduction of one block as a dense matrix, shape (TOGETHER, samples); much faster than a sparse one."""
         kernel = np.asarray(self.operator.data[: self.operator.indptr[1]], dtype=np.float64)
         return np.array(
             [np.pad(kernel, (k * self.step, (TOGETHER - 1 - k) * self.step)) for k in range(TOGETHER)]
@@ -206,7 +205,7 @@ class Reduction:
 
     @cached_property
     def _alone(self) -> csr_array:
-        """Means of the holds, rows that stand alone."""
+        """Reduction to the rows of holds."""
         return self.operator[self.moving :]
 
     @cached_property
@@ -220,17 +219,24 @@ class Reduction:
         return np.asarray(self.operator.indices[self.operator.indptr[1 : self.moving + 1] - 1], dtype=np.intp)
 
     def of_pieces(self, direction: Array, pieces: Iterable[tuple[slice, Array]]) -> Patches:
-        """Rows of values that are there for a while each, as many columns as show in any.
+        """Reduce values that are not zero during an interval only.
 
         Args:
-            direction: what a value of 1 is in the samples, shape (Q, C).
-            pieces: samples of an interval, and k columns of values there, shape (s, k).
+            direction: residual per unit value in every sample, shape (Q, C).
+            pieces: samples of each interval, and k columns of values there, shape (s, k). Columns without effect are
+                dropped.
         """
         blocks = ((at, direction[at, :, None] * values[:, None]) for at, values in pieces)
         return self.of_blocks(blocks, direction.shape[1])
 
     def of_blocks(self, blocks: Iterable[tuple[slice, Array]], channels: int) -> Patches:
-        """The same of samples of an interval with all their channels, shape (s, C, k)."""
+        """Reduce residual samples that are not zero during an interval only.
+
+        Args:
+            blocks: samples of each interval, and the residual there, shape (s, C, k). Columns without effect are
+                dropped.
+            channels: C.
+        """
         shape, each = (len(self.time), channels), []
         for at, samples in blocks:
             block = self._by_sample[:, at]
@@ -251,7 +257,7 @@ class Reduction:
 
     @classmethod
     def of(cls, signals: Signals) -> Reduction:
-        """Reduction of one trial, from where its joints move."""
+        """Build the reduction of one trial from the motion of its joints."""
         rate, keep = signals.rate_hz, signals.keep
         kernel = _kernel(rate)
         half = len(kernel) // 2
@@ -282,7 +288,7 @@ class Reduction:
 
 
 def _kernel(rate_hz: float) -> Array:
-    """Impulse response of the zero-phase filter, cut where it has died to 1e-4 of its peak."""
+    """Impulse response of the zero-phase filter, cut where it has decayed to 1e-4 of its peak."""
     half = round(0.8 * rate_hz)
     impulse = np.zeros(4 * half + 1)
     impulse[2 * half] = 1.0
@@ -291,9 +297,9 @@ def _kernel(rate_hz: float) -> Array:
 
 
 def _holds(signals: Signals) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
-    """Spans of samples during which no joint of any robot moves, and all samples at rest, shape (Q,)."""
+    """Sample ranges during which all joints of all robots rest, and all samples at rest, shape (Q,)."""
     rate = signals.rate_hz
-    # Rounding moves a resting joint too; below 2 Hz that is a twentieth of the threshold.
+    # Rounding also moves a resting joint, but below 2 Hz only by a twentieth of the threshold.
     angles = np.concatenate([signals.phi, signals.theta], axis=1).reshape(len(signals.time), -1)
     speed = np.abs(differentiate(low_pass(angles, rate, HOLD_CUTOFF_HZ), rate)).max(axis=1)
     still = speed < STILL_RAD_PER_S
@@ -306,29 +312,29 @@ def _holds(signals: Signals) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
 
 
 SHRINKAGE_SHARE = 0.05
-"""By which the channels' covariance is drawn to its diagonal at least. Chosen."""
+"""Least weight of the diagonal in the shrunk covariance of the channels. Chosen."""
 
 LOUD_POWER = 2.25
-"""Power of a row's noise over the others' from which it has its own weight: four standard errors of 24 draws."""
+"""Noise power over the median row's, above which a row gets its own weight. Derived: 4 standard errors of 24 draws."""
 
 ROWS_PER_COEFFICIENT = 10
-"""A series must have more rows than so many for each coefficient, or stays as it is. Chosen."""
+"""Least number of rows per autoregressive coefficient; shorter series are not whitened along time. Chosen."""
 
 AR_ORDER = 2
-"""Autoregression of whitened channels, unless a rig says otherwise. Chosen: rows are nearly white already."""
+"""Order of the autoregression, unless a rig says otherwise. Chosen: rows are nearly white already."""
 
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Channels are decorrelated at each row, then every channel of the moving rows along time (autoregressive).
+    """Whitening of rows: decorrelate the channels within each row, then each channel along time (autoregression).
 
     Attributes:
-        moving: number of leading rows that follow each other at one rate; the rest stand alone.
+        moving: number of leading rows that form a time series; the others are independent.
         chol_moving, chol_alone: lower Cholesky factors of the channels' covariance, shape (C, C).
-        ar: autoregressive coefficients of every whitened channel, shape (C, p).
-        innovation: standard deviation of what they leave, shape (C,).
-        loudness: standard deviation of every moving row's noise over that of the quiet ones, shape (moving, C); or
-            (1, C), all 1.
+        ar: autoregressive coefficients of every decorrelated channel, shape (C, p).
+        innovation: standard deviation of the autoregression's residual, shape (C,).
+        loudness: noise standard deviation of every moving row over that of a typical row, shape (moving, C); or ones,
+            shape (1, C).
     """
 
     moving: int
@@ -340,15 +346,15 @@ class Whitening:
 
     @classmethod
     def of(cls, draws: Array, moving: int, order: int = AR_ORDER, *, uneven: bool = False) -> Whitening:
-        """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series.
+        """Estimate the whitening from draws of the noise.
 
         Args:
-            draws: of the noise alone.
-            moving: number of leading rows that follow each other.
-            order: of the autoregression.
-            uneven: whether some moving rows may be louder than the others, as where a motion begins and encoders
-                repeat a rounding error that the filter averages out later. They are found in the draws and divided by
-                their own standard deviation first.
+            draws: residual rows of noise alone, shape (D, n, C).
+            moving: number of leading rows that form a time series.
+            order: order of the autoregression.
+            uneven: whether to detect moving rows with more noise than the others and divide them by their own standard
+                deviation. Such rows occur where motion begins, because resting encoders repeat a rounding error that
+                the filter averages out later.
         """
         channels = draws.shape[2]
         loudness = np.ones((1, channels))
@@ -368,7 +374,7 @@ class Whitening:
             for c in range(channels):
                 if lag[0, c] < 1e-12:  # a channel without noise
                     continue
-                ar[c] = solve_toeplitz(lag[:order, c], lag[1:, c])  # Yule and Walker
+                ar[c] = solve_toeplitz(lag[:order, c], lag[1:, c])  # Yule-Walker equations
                 innovation[c] = np.sqrt(max(lag[0, c] - ar[c] @ lag[1:, c], 1e-6))
         return cls(moving, chol_moving, chol_alone, ar, innovation, loudness)
 
@@ -379,31 +385,37 @@ class Whitening:
         return y
 
     def _series(self, z: Array, start: int = 0, first: int = 0) -> Array:
-        """Moving rows made independent, from a row and a channel on before which there is nothing."""
+        """Whiten moving rows along time.
+
+        Args:
+            z: rows with decorrelated channels; what precedes them is zero.
+            start: index of the first row.
+            first: index of the first channel.
+        """
         shape = (1, -1) + (1,) * (z.ndim - 2)
         out, order = z.copy(), self.ar.shape[1]
         for k in range(order):
             out[k + 1 :] -= self.ar[first:, k].reshape(shape) * z[: len(z) - k - 1]
-        # The first rows have no past to predict them from; they keep their own variance of one.
+        # The first rows have no past that predicts them; they keep unit variance.
         early = max(order - start, 0)
         out[:early] = z[:early]
         out[early:] /= self.innovation[first:].reshape(shape)
         return out
 
     def of_patches(self, patches: Patches) -> Patches:
-        """The same of columns that are there for a while."""
+        """Whiten sparse columns."""
         return Patches(patches.shape, tuple(map(self._of_patch, patches.each)))
 
     def _of_patch(self, patch: Patch) -> Patch:
         moves, first = patch.rows < self.moving, patch.first
         alone, rows = patch.rows[~moves], patch.rows[moves]
-        if len(rows):  # what comes after them is told by them, too
+        if len(rows):  # the autoregression also affects the rows that follow
             rows = np.arange(rows[0], min(rows[-1] + 1 + self.ar.shape[1], self.moving))
         series = np.zeros((len(rows), *patch.values.shape[1:]))
         series[patch.rows[moves] - patch.rows[0]] = patch.values[moves]
         if len(self.loudness) > 1:
             series /= self.loudness[rows, first:, None]
-        # Triangular: a channel is told by itself and those before it.
+        # The factor is lower triangular: channels before the first stay zero.
         series = self._whiten_moving[first:, first:] @ series
         if len(rows):
             series = self._series(series, int(rows[0]), first)
@@ -411,7 +423,7 @@ class Whitening:
         return Patch(np.concatenate([rows, alone]), first, np.concatenate([series, others]))
 
     def rows_only(self, x: Array) -> Array:
-        """Decorrelate the channels of every row, not the rows, shape (n, C, ...) -> the same."""
+        """Decorrelate the channels of every row but not the rows, shape (n, C, ...) -> the same."""
         y = np.empty_like(x, dtype=float)
         even = x[: self.moving] / self.loudness.reshape(*self.loudness.shape, *(1,) * (x.ndim - 2))
         y[: self.moving] = _per_row(self._whiten_moving, even)
@@ -444,14 +456,14 @@ def _inverse(chol: Array) -> Array:
 
 
 def _per_row(whiten: Array, x: Array) -> Array:
-    """A matrix (C, C) applied to the channels of every row, shape (n, C, ...)."""
+    """Apply a matrix (C, C) to the channels of every row, shape (n, C, ...)."""
     if not x.size:
         return np.array(x, dtype=np.float64)
     return (whiten @ x.reshape(*x.shape[:2], -1)).reshape(x.shape) if x.ndim > 2 else x @ whiten.T
 
 
 def whitened(whitening: Callable[[Array], Array], columns: Array) -> Array:
-    """A cause's columns whitened, shape (n, C, k): some of its shapes have fewer parameters than others."""
+    """Whiten a cause's columns, shape (n, C, k), and skip those that are zero because a shape lacks the parameter."""
     there = columns.any(axis=(0, 1))
     if there.all():
         return whitening(columns)

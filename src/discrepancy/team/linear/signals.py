@@ -1,4 +1,4 @@
-"""One trial's joint signals as the diagnosis uses them: raw, and gently filtered with derivatives."""
+"""Joint signals of one trial: as measured, and low-pass filtered with their derivatives."""
 
 from __future__ import annotations
 
@@ -15,27 +15,29 @@ from estimator.recording.metadata import Sampling
 from estimator.recording.model import Recording
 
 TEAM_SMOOTH_HZ = 12.0
-"""Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
+"""Cut-off of signals whose rounding is drawn again, and of rates that separate rest from sliding [Hz]. Chosen."""
 
 TEAM_TRIM_S = 2.0
-"""Left out at both ends of a recording. Chosen."""
+"""Time left out at both ends of a recording [s]. Chosen."""
 
 TEAM_PRE_HZ = 20.0
-"""Cut-off before the nonlinear formulas. Derived: high enough that filtering and they commute to within the noise."""
+"""Cut-off before the nonlinear formulas [Hz]. Derived: filter and formulas commute to within the noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Joint signals of one trial, N robots, at the recording's rate and full length.
+    """Joint signals of one trial of N robots, at the recording's rate and full length.
 
     Attributes:
         time: [s], shape (Q,).
-        phi, theta, tau: as the robots' calibration and the causes correct what was recorded, shape (Q, N, 3).
+        phi, theta, tau: recorded signals, corrected by the robots' calibration and by causes, shape (Q, N, 3).
         rate_hz: sampling rate [Hz].
-        sampling: how each robot's sensors were read, where the samples are not as they were read.
-        smooth_hz: cut-off at which rates tell rest from sliding, shape (3, N, 3): phi, theta, tau; None: as usual.
-        pre_hz: cut-off before the nonlinear formulas, above what chatters: the mean of a product is not that of means.
-        doubt: over a reading's rounding, how wrong what stands for held readings may be, shape (Q,); None: none is.
+        sampling: how each robot's sensors were read, if the samples were resampled.
+        smooth_hz: cut-off of rates that separate rest from sliding, shape (3, N, 3): phi, theta, tau; None: the
+            default.
+        pre_hz: cut-off before the nonlinear formulas. It lies above any chatter, because the mean of a product is not
+            the product of the means.
+        doubt: possible error of interpolated readings over the rounding error, shape (Q,); None if no reading was held.
     """
 
     time: Array
@@ -51,9 +53,9 @@ class Signals:
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
-        """The signals of a recording: untouched, or true ones where its metadata know the robots as they are.
+        """Take the signals of a recording, and convert them to true joint values if the robots are calibrated.
 
-        Where an encoder holds its value they are interpolated.
+        Where an encoder holds its value, the signals are interpolated.
         """
         recording, held, doubt = without_held(recording)
         known = recording.metadata
@@ -63,31 +65,31 @@ class Signals:
     def minus(
         self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0
     ) -> Signals:
-        """The signals without an error of the sensors."""
+        """Subtract sensor errors from the signals."""
         return replace(self, phi=self.phi - phi, theta=self.theta - theta, tau=self.tau - tau)
 
     def smooth(self, moves: Literal["phi", "theta", "tau"], robot: int, joint: int) -> Array:
-        """A signal of one joint, filtered so that its rate tells rest from sliding, shape (Q,)."""
+        """Filter one joint's signal so that its rate separates rest from sliding, shape (Q,)."""
         usual, kind = TEAM_SMOOTH_HZ, ("phi", "theta", "tau").index(moves)
         cutoff_hz = usual if self.smooth_hz is None else float(self.smooth_hz[kind, robot, joint])
         which = moves, robot, joint
-        if which not in self._last:  # shapes of one cause are asked for one after the other
+        if which not in self._last:  # successive shapes of a cause ask for the same signal
             self._last.clear()
             self._last[which] = low_pass(getattr(self, moves)[:, robot, joint], self.rate_hz, cutoff_hz)
         return self._last[which]
 
     def with_rates(self, x: Array) -> Array:
-        """Filtered value, rate and acceleration of what goes with the samples, shape (Q, ...) -> (3, Q, ...)."""
+        """Filtered value, rate and acceleration of samples, shape (Q, ...) -> (3, Q, ...)."""
         value = low_pass(x, self.rate_hz, self.pre_hz)
         rate = differentiate(value, self.rate_hz)
         return np.stack([value, rate, differentiate(rate, self.rate_hz)])
 
     @property
     def chatters(self) -> bool:
-        """Whether something oscillates above what is usually let through to the nonlinear formulas."""
+        """Whether the signals oscillate above the usual cut-off ``TEAM_PRE_HZ``."""
         return self.pre_hz > TEAM_PRE_HZ
 
     @property
     def keep(self) -> slice:
-        """Rows left once the filters' transients at both ends are dropped."""
+        """Samples without the filters' transients at both ends."""
         return trim_slice(len(self.time), self.rate_hz, TEAM_TRIM_S)

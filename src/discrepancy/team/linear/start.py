@@ -1,4 +1,4 @@
-"""The unknowns before any cause, at adjusted signals: from the estimate, then Gauss-Newton on the whitened residual."""
+"""Fit the unknowns before any cause is considered, and linearise each trial at adjusted signals."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ from estimator.rigid_team import (
 from estimator.signals import GraspData
 
 INERTIA_OFF = 0.3
-"""Relative error of the inertia up to which noise in moments is not drawn again."""
+"""Relative change of the inertia above which the noise draws are repeated. Chosen."""
 
 
 def held_inertia(p_1i: Array, mass: float, p_1c: Array) -> Array:
-    """Inertia of a payload whose mass lies where it is held, about its centre of mass [kg m^2], shape (3, 3).
+    """Inertia about the centre of mass of a payload whose mass lies at the grasps [kg m^2], shape (3, 3).
 
     Args:
         p_1i: origins of the grasp frames in {1} [m], shape (N, 3).
@@ -64,15 +64,16 @@ def held_inertia(p_1i: Array, mass: float, p_1c: Array) -> Array:
 
 
 def inertia_about_centre(shared: Shared) -> Array:
-    """About the centre of mass, in the axes of {1} [kg m^2], shape (3, 3)."""
+    """Inertia about the centre of mass, in the axes of {1} [kg m^2], shape (3, 3)."""
     mass, c = shared.pi[0], shared.pi[1:4] / shared.pi[0]
     return np.asarray(inertia_matrix(shared.pi[4:]) - mass * (c @ c * np.eye(3) - np.outer(c, c)))
 
 
 def inertia_is_like_held(shared: Shared) -> Array:
-    """Information that an inertia is as it is to within that of a mass where it is held, (6 (N - 1) + 10,).
+    """Prior information (inverse variance) of the shared unknowns, shape (6 (N - 1) + 10,).
 
-    It counts beside what trials tell: axes about which a payload hardly turns keep what was taken for them.
+    It only constrains the inertia, to within that of a mass at the grasps. Axes about which the payload hardly turns
+    thus keep their assumed inertia.
     """
     mass, c = shared.pi[0], shared.pi[1:4] / shared.pi[0]
     size = float(np.trace(held_inertia(shared.grasps.p_1i, mass, c))) / 3.0
@@ -82,31 +83,32 @@ def inertia_is_like_held(shared: Shared) -> Array:
 
 
 def is_another(a: Shared, b: Shared) -> bool:
-    """Whether noise that is turned into moments by a's inertia must be so again, by b's."""
+    """Whether the inertias of a and b differ so much that the noise in moments must be drawn again."""
     first, second = inertia_about_centre(a), inertia_about_centre(b)
     return bool(np.linalg.norm(first - second) > INERTIA_OFF * np.linalg.norm(second))
 
 
 @dataclass(frozen=True, eq=False)
 class SignalNoise:
-    """What a residual tells of the noise of every signal in a trial.
+    """Regression that estimates the noise of every signal in a trial from the residual.
 
     Attributes:
-        told: regression of the signals' noise on the residual's channels, in motion and in holds, (N, 21, C) each.
+        told: regression coefficients of the signals' noise on the residual's channels, in motion and in holds,
+            shape (N, 21, C) each.
     """
 
     told: tuple[Array, Array]
 
     @classmethod
     def of(cls, rows: Array, signals: Array, moving: int) -> SignalNoise:
-        """From draws of the noise alone: residuals (D, n, C), reduced signals (D, n, N, 21)."""
+        """Estimate the regression from draws of the noise: residuals (D, n, C), reduced signals (D, n, N, 21)."""
         kinds = slice(None, moving), slice(moving, None)
         moves, holds = (_regression(rows[:, at], signals[:, at]) for at in kinds)
         return cls((moves, holds))
 
 
 def _regression(rows: Array, signals: Array) -> Array:
-    """E[s r^T] E[r r^T]^-1, shape (N, 21, C); few draws tell of every channel by itself, none of nothing."""
+    """Regression matrix E[s r^T] E[r r^T]^-1, shape (N, 21, C). Few draws shrink the covariance to its diagonal."""
     r, s = rows.reshape(-1, rows.shape[2]), signals.reshape(-1, *signals.shape[2:])
     squares, weight = r.T @ r, min(1.0, r.shape[1] / max(len(r), 1))
     size = np.sqrt(np.maximum(np.diag(squares), 1e-300))
@@ -118,15 +120,15 @@ def _regression(rows: Array, signals: Array) -> Array:
 def with_adjusted_signals(
     linear: TrialLinear, noise: SignalNoise, explained: Array | float = 0.0
 ) -> TrialLinear:
-    """The trial linear at its signals moved the likeliest way that leaves no residual but what causes explain.
+    """Linearise a trial at its most likely true signals, whose residual equals the part that causes explain.
 
-    Columns of scales, lengths and masses are functions of the signals. At measured signals their noise is in column
-    and residual alike and biases them; at adjusted ones it is not (Deming, Statistical Adjustment of Data, 1943).
+    Columns of scales, lengths and masses depend on the signals. At measured signals the same noise is in columns and
+    residual, which biases the estimate. Adjusted signals avoid that (Deming, Statistical Adjustment of Data, 1943).
 
     Args:
         linear: the trial.
-        noise: what its residual tells of its signals.
-        explained: what causes put into every sample's residual, shape (Q, C).
+        noise: regression of its signals' noise on the residual.
+        explained: residual of every sample that the causes explain, shape (Q, C).
     """
     shared, bases, arms = linear.shared, linear.bases, linear.arms
     s = linear.s - _noise_in(linear.data, shared, bases, linear.reduction, noise, explained)
@@ -144,7 +146,10 @@ def with_adjusted_signals(
 def noise_of(
     signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise
 ) -> Signals:
-    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3)."""
+    """Estimate the noise in signals from their residual; angles and torques of shape (Q, N, 3).
+
+    The signals must contain no other errors.
+    """
     data = grasp_data(filtered(signals), linear.arms, signals.rate_hz)
     each = _noise_in(data, shared, bases, linear.reduction, noise)
     phi, theta, tau = (each[..., kind] for kind in (PHI, THETA, TAU))
@@ -152,10 +157,10 @@ def noise_of(
 
 
 def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise) -> Array:
-    """What has to be added to a residual so that its noise is as loud as where the trial is linear, rows (n, C).
+    """Correction of a residual so that its noise equals that at the linearisation point, rows (n, C).
 
-    Noise of accelerations is in the residual as often as there is mass, and that of a spring's reading at the lever of
-    its robot. Elsewhere it would be louder or quieter than its whitening says, and the quieter the likelier.
+    The noise of accelerations enters the residual in proportion to mass, and that of a spring's torque with its lever
+    arm. Without the correction, values that merely reduce the noise would look likelier.
     """
     s = filtered(signals)
     data = grasp_data(s, linear.arms, signals.rate_hz)
@@ -179,7 +184,7 @@ def _noise_in(
     noise: SignalNoise,
     explained: Array | float = 0.0,
 ) -> Array:
-    """Noise of every sample's signals, shape (Q, N, 21)."""
+    """Estimated noise of every sample's signals, shape (Q, N, 21)."""
     residual = _residual(data, shared, bases) - explained
     held = np.zeros(len(residual), dtype=bool)
     held[reduction.operator[reduction.moving :].indices] = True
@@ -188,11 +193,11 @@ def _noise_in(
 
 
 LINEAR_BYTES = 1.5e8
-"""Size of all linear trials from which they are kept in files: seven minutes of three robots."""
+"""Size of all linearised trials [bytes] above which they are kept in files. Chosen: seven minutes of three robots."""
 
 
 def held(trials: Iterable[TrialLinear]) -> tuple[TrialLinear, ...]:
-    """Trials one after the other, in files if together they take more memory than they should."""
+    """Collect trials, and move them to files if together they exceed ``LINEAR_BYTES``."""
     out: list[TrialLinear] = []
     total = 0
     for trial in trials:
@@ -204,7 +209,7 @@ def held(trials: Iterable[TrialLinear]) -> tuple[TrialLinear, ...]:
 
 
 def filed(trial: TrialLinear) -> TrialLinear:
-    """The same trial with its arrays in files."""
+    """Return the same trial with its arrays in files."""
     data, J = trial.data, trial.J
     names = ("R_bi", "p_bi", "twist", "twist_dot", "wrench")
     return replace(
@@ -216,18 +221,18 @@ def filed(trial: TrialLinear) -> TrialLinear:
 
 
 def is_filed(trial: TrialLinear) -> bool:
-    """Whether a trial is in files."""
+    """Whether the arrays of a trial are in files."""
     return is_stored(trial.s)
 
 
 def rested(trial: TrialLinear) -> None:
-    """Let the system take what a trial takes until it is asked for again."""
+    """Release the memory of a trial that is kept in files until it is read again."""
     if is_filed(trial):
         given_back(*_arrays(trial), *(x for x in (trial.__dict__.get("by_wrist"),) if x is not None))
 
 
 class OneByOne(Sequence[Array]):
-    """So many arrays, each made by its number whenever it is asked for."""
+    """A sequence of arrays that computes each array when it is indexed."""
 
     def __init__(self, of: Callable[[int], Array], count: int) -> None:
         self._of, self._count = of, count
@@ -253,14 +258,21 @@ def _reduction(reduction: Reduction) -> Reduction:
 
 
 def _arrays(trial: TrialLinear) -> Iterator[NDArray[np.generic]]:
-    """What is large of a trial."""
+    """The large arrays of a trial."""
     data, of = trial.data, trial.reduction.operator
     yield from (trial.s, trial.by_shared, trial.by_bases, *trial.J.knots, of.data, of.indices)
     yield from (data.R_bi, data.p_bi, data.twist, data.twist_dot, data.wrench)
 
 
 def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) -> TrialLinear:
-    """The trial where its bases fit it on average; without ``full`` the robots' signals are left out."""
+    """Linearise a trial at given shared unknowns, with bases that fit its poses.
+
+    Args:
+        recording: the trial.
+        shared: the shared unknowns, which stay fixed.
+        noise: resolution of the sensors.
+        full: whether to compute derivatives by the robots' signals.
+    """
     signals, arms = noise.known_to(Signals.of(recording)), recording.metadata.arms
     angles = signals.phi[signals.keep], signals.theta[signals.keep]
     bases = start_bases(*poses(*angles, arms), shared)
@@ -268,7 +280,7 @@ def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) 
 
 
 def without_bases(trial: TrialLinear, rows: Array) -> Array:
-    """Rows, shape (n, C), without what the bases' places can explain of them, every channel in its own scale."""
+    """Fit errors of the base poses to rows, shape (n, C), and subtract them. Each channel is scaled by its own rms."""
     if not rows.size:
         return rows
     scale = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
@@ -279,11 +291,11 @@ def without_bases(trial: TrialLinear, rows: Array) -> Array:
 
 
 NOISE_DRAWS = 24
-"""From which the rows' covariance is made. Chosen."""
+"""Number of noise draws that estimate the covariance of the rows. Chosen."""
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
-    """Unknowns from the estimate; an inertia that it does not tell is that of a mass where it is held.
+    """Take the unknowns from the estimate. An undetermined inertia is replaced by that of a mass at the grasps.
 
     Raises:
         InputError: grasps, mass or centre of mass are missing.
@@ -302,13 +314,13 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
 
 @dataclass(frozen=True, eq=False)
 class Sensed:
-    """What noise leaves in the rows of some trials.
+    """Effect of sensor noise on the rows of some trials.
 
     Attributes:
         noise: resolution of the sensors.
         whitening: of every trial.
-        signals: what the residual tells of it in the signals, of every trial.
-        draws: what the sensors' noise alone leaves in the rows of every trial, (D, n, C) each; None where it is long.
+        signals: regression of the signals' noise on the residual, of every trial.
+        draws: residual rows of sensor noise alone, (D, n, C) a trial; None for trials that are kept in files.
     """
 
     noise: Noise
@@ -325,16 +337,16 @@ def linearised_trials(
     sensed: Sensed | None = None,
     explained: Callable[[int, TrialLinear], Array] | None = None,
 ) -> tuple[tuple[TrialLinear, ...], Sensed]:
-    """Every trial linearised around the best unknowns, and what noise and friction at rest leave in its rows.
+    """Linearise every trial at the best unknowns, and find the effect of noise and friction at rest on its rows.
 
     Args:
         recordings: the trials.
         shared: unknowns to start from.
         tolerances: standard deviations by cause and parameter.
         jobs: parallel processes.
-        sensed: what noise leaves, where that is known already.
-        explained: what causes put into every sample's residual of a trial, shape (Q, C); None for none. With causes the
-            shared unknowns stay where they are: those that fit best without them are others.
+        sensed: effect of the noise, if it is already known.
+        explained: residual of every sample of a trial that the causes explain, shape (Q, C); None without causes. With
+            causes the shared unknowns stay fixed, because a fit without the causes would shift them.
 
     Raises:
         InputError: a recording is too short.
@@ -367,7 +379,7 @@ def linearised_trials(
         )
     there = (
         explained(k, t) if explained else 0.0 for k, t in enumerate(linear)
-    )  # one by one: they may be long
+    )  # one by one, to limit memory
     parts = zip(linear, sensed.signals, there, strict=True)
     return held(with_adjusted_signals(*part) for part in parts), sensed
 
@@ -376,7 +388,7 @@ def _processes(jobs: int) -> Parallel:
     prefer = "processes" if jobs > 1 else "threads"
     return Parallel(
         n_jobs=jobs, prefer=prefer, return_as="generator", **ends_with_this()
-    )  # for the sake of memory
+    )  # a generator, to limit memory
 
 
 def _linearised(
@@ -389,7 +401,7 @@ def _linearised(
     *,
     full: bool,
 ) -> tuple[TrialLinear, ...]:
-    """Every trial, linearised where the unknowns are said to be."""
+    """Linearise every trial at the given unknowns."""
     tasks = zip(signals, bases, reductions, strict=True)
     each = run(delayed(linearise)(s, shared, b, arms, r, full=full) for s, b, r in tasks)
     return held(cast("Iterator[TrialLinear]", each))
@@ -402,7 +414,15 @@ def sensed_in(
     jobs: int = 1,
     before: Sensed | None = None,
 ) -> Sensed:
-    """What noise and friction at rest leave in the rows of linearised trials; of the noise, as it was found before."""
+    """Effect of noise and friction at rest on the rows of linearised trials.
+
+    Args:
+        linear: the trials.
+        noise: resolution of the sensors.
+        tolerances: standard deviations by cause and parameter.
+        jobs: parallel processes.
+        before: an earlier result, whose noise draws are reused.
+    """
     told = zip(before.draws, before.signals, strict=True) if before and before.draws else [None] * len(linear)
     tasks = enumerate(zip(linear, told, strict=True))
     left = _processes(jobs)(delayed(what_noise_leaves)(t, noise, k, tolerances, old) for k, (t, old) in tasks)
@@ -418,7 +438,15 @@ def what_noise_leaves(
     tolerances: Tolerances,
     before: tuple[Array | None, SignalNoise] | None = None,
 ) -> tuple[Whitening, SignalNoise, Array | None]:
-    """What noise and friction at rest leave in the rows of trial number k, what it tells of signals, and its draws."""
+    """Return the whitening of trial k, the regression of its signals' noise, and its noise draws.
+
+    Args:
+        trial: linearised.
+        noise: resolution of the sensors.
+        k: number of the trial, which seeds the draws.
+        tolerances: standard deviations by cause and parameter; they size friction at rest and play.
+        before: earlier noise draws and regression to reuse.
+    """
     moving = trial.reduction.moving
     draws, told = before or (None, None)
     if draws is None or told is None:
@@ -438,11 +466,11 @@ def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, r
 def gauss_newton(
     linear: Sequence[TrialLinear], whitening: Sequence[Whitening], known: Array | None = None
 ) -> tuple[Shared, list[Bases]]:
-    """One step of all unknowns, with no cause in the model.
+    """Take one Gauss-Newton step of all unknowns, without causes.
 
     Args:
         linear, whitening: of every trial.
-        known: information beforehand that each shared unknown stays where it is, shape (6 (N - 1) + 10,).
+        known: prior information (inverse variance) of the shared unknowns, shape (6 (N - 1) + 10,).
     """
     own = linear[0].by_bases.shape[2]
     shared_columns = linear[0].by_shared.shape[2]
@@ -465,10 +493,10 @@ def gauss_newton(
 
 
 def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tuple[Array, Array]:
-    """What the sensors' errors alone would leave: residuals (draws, n, C), and signals (draws, n, N, 21)."""
+    """Draw sensor noise and return its residual rows (D, n, C) and reduced signals (D, n, N, 21)."""
     out: list[tuple[Array, Array]] = []
     errors = noise.draws(trial.signals, rng, NOISE_DRAWS)
-    while some := list(islice(errors, draws_at_a_time(trial))):  # not all at once, for the sake of memory
+    while some := list(islice(errors, draws_at_a_time(trial))):  # in batches, to limit memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))
     rows, signals = zip(*out, strict=True)

@@ -1,4 +1,4 @@
-"""One trial, linearised: its residual's derivatives by signals, unknowns and what acts on the payload."""
+"""Linearise one trial: derivatives of the residual by signals, unknowns and wrenches on the payload."""
 
 from __future__ import annotations
 
@@ -40,9 +40,10 @@ Kind = TypeVar("Kind", bound=np.generic)
 
 
 def stored(x: NDArray[Kind]) -> NDArray[Kind]:
-    """The same numbers, to be read only, in a file that is gone with the array; where no file can be, the array.
+    """Move an array to a temporary read-only file, which disappears with the array.
 
-    They lie as they did: where components are apart in memory, sums over them have the same bits.
+    The memory layout stays the same, so that sums keep the same rounding. If no file can be written, the array stays in
+    memory.
     """
     if not x.size or is_stored(x):
         return x
@@ -59,12 +60,12 @@ def stored(x: NDArray[Kind]) -> NDArray[Kind]:
 
 
 def is_stored(x: NDArray[np.generic]) -> bool:
-    """Whether an array, or what it is a view of, is in a file."""
+    """Whether an array, or the array that it is a view of, is in a file."""
     return _pages(x) is not None
 
 
 def given_back(*arrays: NDArray[np.generic]) -> None:
-    """Let the system take the memory of arrays that are stored, until they are read again; others stay."""
+    """Release the memory of stored arrays until they are read again; other arrays stay."""
     for x in arrays:
         pages = _pages(x)
         if pages is not None and hasattr(mmap, "MADV_DONTNEED"):
@@ -72,7 +73,7 @@ def given_back(*arrays: NDArray[np.generic]) -> None:
 
 
 def _pages(x: object) -> mmap.mmap | None:
-    """What an array is a view of, where it is stored."""
+    """The mapped file behind an array, or None."""
     while isinstance(x, np.ndarray):
         x = x.base
     x = x.obj if isinstance(x, memoryview) else x
@@ -80,14 +81,14 @@ def _pages(x: object) -> mmap.mmap | None:
 
 
 STEP = 1e-5
-"""Step of grasps [rad, m], both ways, by which the balance of wrenches is differenced."""
+"""Step of the central differences of the wrench balance by grasps [rad, m]. Chosen."""
 
 
 def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
     """Derivative of the residual's samples by ``Shared.moved``, shape (Q, 6 N, 6 (N - 1) + 10).
 
-    A loop knows its own robot's grasp alone. Its rotation is log(E), and a grasp that turns by d in {1} makes E
-    exp(-R_b1 d) of E.
+    Each loop depends on its own robot's grasp only. Its rotation residual is log(E), and a grasp rotation d in {1}
+    turns E into exp(-R_b1 d) E.
     """
     N, split = data.robots, 6 * (data.robots - 1)
     out = np.zeros((data.samples, 6 * N, split + 10))
@@ -105,7 +106,10 @@ def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
 
 
 def by_bases(data: GraspData, shared: Shared, bases: Bases) -> Array:
-    """The same by ``Bases.moved``, shape (Q, 6 N, 4 (N - 1)); E of a base that turns is exp(yaw z) E."""
+    """Derivative of the residual's samples by ``Bases.moved``, shape (Q, 6 N, 4 (N - 1)).
+
+    A base that turns by yaw turns E into exp(yaw z) E.
+    """
     N = data.robots
     out = np.zeros((data.samples, 6 * N, 4 * (N - 1)))
     for i in range(1, N):
@@ -117,22 +121,22 @@ def by_bases(data: GraspData, shared: Shared, bases: Bases) -> Array:
 
 
 def _channels(robot: int) -> tuple[slice, slice]:
-    """Rotation and position of one robot's loop (from 0)."""
+    """Channels of rotation and position of one robot's loop (robot from 0)."""
     return slice(6 * (robot - 1), 6 * robot - 3), slice(6 * robot - 3, 6 * robot)
 
 
 def _turned(data: GraspData, shared: Shared, bases: Bases, robot: int) -> Array:
-    """e_rot of one robot's loop, shape (Q, 3)."""
+    """Rotation residual e_rot of one robot's loop, shape (Q, 3)."""
     back = data.R_bi[:, 0] @ shared.grasps.R_1i[robot]
     turned = bases.R[robot] @ data.R_bi[:, robot] @ np.swapaxes(back, -1, -2)
     return np.asarray(Rotation.from_matrix(turned).as_rotvec(), dtype=np.float64)
 
 
 SHIFT_REACH_S = 0.5
-"""Before and after a displacement in which its accelerations show. Derived: a filter of 20 Hz has died to 1e-6."""
+"""Time around a displacement in which its accelerations appear [s]. Derived: a 20 Hz filter has decayed to 1e-6."""
 
 CHATTER_JACOBIAN_HZ = 10.0
-"""Cut-off of signals at which slopes are taken where something chatters: below half of their rate."""
+"""Cut-off of the signals at which chattering trials are linearised [Hz]. Derived: below half the rate of the knots."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +144,7 @@ class TrialLinear:
     """Linearisation of one trial around nominal unknowns; samples at the recording's rate, rows reduced.
 
     Attributes:
-        signals: the (corrected) signals.
+        signals: joint signals, corrected by any causes.
         s: filtered signals, shape (Q, N, 21).
         data: data points of all robots.
         shared, bases: nominal unknowns.
@@ -148,8 +152,8 @@ class TrialLinear:
         reduction: samples to rows.
         residual: shape (n, C) with C = 6 N channels.
         J: derivative of the residual's samples by every robot's 21 signals.
-        by_shared: derivative by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
-        by_bases: derivative by ``Bases.moved``, shape (n, C, 4 (N - 1)).
+        by_shared: derivative of the rows by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
+        by_bases: derivative of the rows by ``Bases.moved``, shape (n, C, 4 (N - 1)).
     """
 
     signals: Signals
@@ -166,11 +170,11 @@ class TrialLinear:
 
     @property
     def design(self) -> OmnidDesign:
-        """What the robots are meant to be: good enough for how a cause changes what they do."""
+        """Nominal design of the robots. It is accurate enough for the effect of a cause."""
         return design_of(self.arms)
 
     def arm(self, robot: int) -> Arms:
-        """One robot (from 0) as it is, or as designed."""
+        """Return one robot (from 0) as it is, or as designed."""
         return arm_of(self.arms, robot)
 
     @cached_property
@@ -180,7 +184,7 @@ class TrialLinear:
 
     @cached_property
     def turning(self) -> Array:
-        """By how much more a point of the payload is accelerated the further it is, [alpha] + [omega]^2, (Q, 3, 3)."""
+        """Derivative of a payload point's acceleration by its position, [alpha] + [omega]^2, shape (Q, 3, 3)."""
         turn = skew(self.motion.omega)
         return skew(self.motion.alpha) + turn @ turn
 
@@ -206,17 +210,17 @@ class TrialLinear:
 
     @cached_property
     def adjusted(self) -> Signals:
-        """The signals filtered, and at their adjusted values."""
+        """The filtered signals at their adjusted values."""
         phi, theta, tau = (self.s[..., kind] for kind in (PHI, THETA, TAU))
         return replace(self.signals, phi=phi, theta=theta, tau=tau, sampling=None)
 
     def of_signals(
         self, robot: int, phi: Array | None = None, theta: Array | None = None, tau: Array | None = None
     ) -> Array:
-        """What errors of one robot's readings add to the residual, shape (n, C).
+        """Residual rows caused by errors of one robot's readings, shape (n, C).
 
         Args:
-            robot: index of the robot, from 0.
+            robot: index from 0.
             phi, theta: reading minus truth [rad], shape (Q, 3) or (3,).
             tau: the same [N m].
         """
@@ -235,13 +239,18 @@ class TrialLinear:
         return self.reduction(total)
 
     def of_all_signals(self, phi: Array, theta: Array, tau: Array) -> tuple[Array, Array]:
-        """What errors of all robots' readings add together, many at once, (D, Q, N, 3) each.
+        """Residual rows caused by errors of all robots' readings, for many draws at once.
 
-        To the residual, shape (D, n, C), and to the reduced signals, (D, n, N, 21).
+        Args:
+            phi, theta: reading minus truth [rad], shape (D, Q, N, 3).
+            tau: the same [N m].
+
+        Returns:
+            Residual rows, shape (D, n, C), and reduced signals, shape (D, n, N, 21).
         """
         D, samples, N = phi.shape[:3]
         angles = self.signals.with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0))
-        # (3, Q, N, 2, 3, D) to slots, which are value, rate and acceleration of phi, then of theta, then tau
+        # (3, Q, N, 2, 3, D) to slots: value, rate and acceleration of phi, the same of theta, then tau
         parts = np.concatenate(
             [np.moveaxis(angles, 0, 3).reshape(samples, N, 18, D), np.moveaxis(tau, 0, -1)], axis=2
         )
@@ -251,27 +260,27 @@ class TrialLinear:
         return np.moveaxis(self.reduction(total), -1, 0), np.moveaxis(self.reduction(parts), -1, 0)
 
     def of_wrench(self, force: Array, moment: Array) -> Array:
-        """What an outside wrench at the origin of {1} on the payload, in {1}, adds, shape (n, C).
+        """Residual rows caused by an external wrench on the payload at the origin of {1}, in {1}, shape (n, C).
 
-        The robots then have to exert less: they and the outside together move the payload.
+        The external wrench takes over a part of what the robots exert.
 
         Args:
-            force, moment: [N], [N m], shape (Q, 3); of several wrenches (Q, 3, k), for (n, C, k).
+            force, moment: [N], [N m], shape (Q, 3); shape (Q, 3, k) gives (n, C, k).
         """
         rows = self.reduction(-np.concatenate([force, moment], axis=1))
         none = np.zeros((len(rows), self.channels - 6, *rows.shape[2:]))
         return np.concatenate([none, rows], axis=1)
 
     def of_pose(self, robot: int, rotation: Array | None, displacement: Array | None) -> Array:
-        """What a small motion of robot i's grasp frame as seen from {b1} adds, shape (n, C).
+        """Residual rows caused by a small motion of robot i's grasp frame in {b1}, shape (n, C).
 
-        The poses that the other robots and the joint angles tell of stay as they are; robot 1's own
-        displacement moves all others the opposite way.
+        The poses from the other robots and from the joint angles stay the same. A displacement of robot 1 moves all
+        others the opposite way.
 
         Args:
-            robot: index of the robot, from 0.
+            robot: index from 0.
             rotation: true minus assumed, rotation vector in {b1} [rad], shape (Q, 3) or None.
-            displacement: the same [m]; of several (Q, 3, k), for (n, C, k).
+            displacement: true minus assumed [m], shape (Q, 3) or None; shape (Q, 3, k) gives (n, C, k).
         """
         several = () if displacement is None else displacement.shape[2:]
         total = np.zeros((len(self.signals.time), self.channels, *several))
@@ -284,12 +293,12 @@ class TrialLinear:
         return self.reduction(total)
 
     def of_shifts(self, robot: int, along: Array, pieces: Iterable[tuple[slice, Array]]) -> Patches:
-        """The same of displacements that are there for a while each, as many columns as show.
+        """Residual rows caused by displacements that last for an interval each. Columns without effect are dropped.
 
         Args:
-            robot: index of the robot, from 0.
+            robot: index from 0.
             along: direction in {b1}, shape (Q, 3).
-            pieces: samples of an interval, and k columns of displacements there [m], shape (s, k).
+            pieces: samples of each interval, and k columns of displacements there [m], shape (s, k).
         """
         reach = math.ceil(SHIFT_REACH_S * self.signals.rate_hz)
 
@@ -303,7 +312,7 @@ class TrialLinear:
         return self.reduction.of_blocks(blocks(), self.channels)
 
     def _displaced(self, robot: int, displacement: Array, at: slice) -> Array:
-        """Samples (s, C, k) of displacements (s, 3, k) [m] in {b1}, of some samples."""
+        """Residual samples (s, C, k) caused by displacements (s, 3, k) [m] in {b1}, for the samples ``at``."""
         out = np.zeros((len(displacement), self.channels, displacement.shape[2]))
         for i, sign in self._seen_by(robot):
             out[:, 6 * i + 3 : 6 * i + 6] = sign * displacement
@@ -311,23 +320,23 @@ class TrialLinear:
         return out
 
     def _seen_by(self, robot: int) -> list[tuple[int, float]]:
-        """Pose channels, by number, that a motion of robot i's grasp frame is seen by, and its sign."""
+        """Loops whose pose channels depend on the motion of robot i's grasp frame, and the sign."""
         if robot:
             return [(robot - 1, -1.0)]
         return [(i, 1.0) for i in range(self.robots - 1)]
 
     def _of_wrong_motion(self, robot: int, moved: Array, at: slice) -> Array:
-        """Wrench balance (s, 6, k) of a wrist that moves apart from the payload, by (s, 3, k) [m] in {b1}."""
+        """Wrench balance (s, 6, k) if a wrist moves relative to the payload by (s, 3, k) [m] in {b1}."""
         wrist = self.bases.R[robot].T @ moved
         rates = np.concatenate(self.signals.with_rates(wrist)[1:], axis=1)
         return np.asarray(self.by_wrist[robot, at] @ rates)
 
     @cached_property
     def by_clocks(self) -> Array:
-        """Derivative by offset [s] and drift of every clock that was set by the motion, shape (n, C, 2 k).
+        """Derivative by offset [s] and drift of every clock that was aligned by the motion, shape (n, C, 2 k).
 
-        How well that was done depends on the motion, and so it is left open: the k robots' readings may be those of a
-        moment ago.
+        The accuracy of that alignment depends on the motion, so the offsets and drifts of these k robots are nuisance
+        parameters.
         """
         signals, columns = self.signals, []
         middle = signals.time - signals.time.mean()
@@ -340,10 +349,10 @@ class TrialLinear:
 
     @cached_property
     def by_wrist(self) -> NDArray[np.float32]:
-        """Derivative of the balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
+        """Derivative of the wrench balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
 
-        Only by the payload's motion, which is taken from all wrists; the arm really moves so. In single precision, as
-        it is there for long.
+        It only includes the payload's motion, which is fused from all wrists, because the arm itself does move that
+        way. Single precision saves memory.
         """
         samples, G = len(self.s), fusion_matrix(self.shared.grasps)
         motion = self.data.twist.reshape(samples, -1) @ G.T
@@ -374,10 +383,10 @@ def linearise(
 
     Args:
         signals: of the trial.
-        shared, bases, arms: where.
+        shared, bases, arms: linearisation point.
         reduction: samples to rows.
-        full: whether derivatives by the robots' signals are asked for; J is empty otherwise.
-        known: whether the shared unknowns stay; there are no derivatives by them then.
+        full: whether to compute the derivatives by the robots' signals; J is empty otherwise.
+        known: whether the shared unknowns are fixed; ``by_shared`` then has no columns.
     """
     s = filtered(signals)
     data = grasp_data(s, arms, signals.rate_hz)
@@ -386,7 +395,7 @@ def linearise(
     moved = np.zeros((*residual.shape, 0)) if known else reduction(by_shared(data, shared, bases))
     columns = moved, reduction(by_bases(data, shared, bases))
     at = s, data
-    if full and signals.chatters:  # between its knots J would fold that into slow motion
+    if full and signals.chatters:  # chatter would alias in J, which is interpolated between knots
         calm = filtered(replace(signals, pre_hz=CHATTER_JACOBIAN_HZ))
         at = calm, grasp_data(calm, arms, signals.rate_hz)
     J = by_signals(*at, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
@@ -394,7 +403,7 @@ def linearise(
 
 
 def filtered(signals: Signals) -> Array:
-    """Signals as ``slots`` has them, shape (Q, N, 21)."""
+    """Filter the signals and arrange them in the slots of ``estimator.arm.motion``, shape (Q, N, 21)."""
     Q, N = signals.phi.shape[:2]
     angles = signals.with_rates(signals.phi), signals.with_rates(signals.theta)
     parts = np.concatenate([*angles, signals.with_rates(signals.tau)[:1]])
