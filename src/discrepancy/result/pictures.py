@@ -276,8 +276,8 @@ def save_plots(
         traces: residuals of each trial.
         channels: the residual channels.
         unit: returns the unit of a quantity by name.
-        folder: existing folder for ``residual_<trial>.png``, ``residual_against.png`` and ``evidence.png``. It also gets
-            ``closed_loop.png`` if the closed loop was simulated, and ``law.png`` if there is a law.
+        folder: existing folder for ``residual_<trial>.png``, ``residual_against.png`` and ``evidence.png``. It also
+            gets ``closed_loop.png`` if the closed loop was simulated, and ``law.png`` if there is a law.
     """
     grouped, named = groups(channels), bool(values["causes"])
     paths = []

@@ -140,8 +140,8 @@ def binned(traces: Sequence[Trace], attribute: str, columns: list[int], quantity
 def spectrum(traces: Sequence[Trace], attribute: str, columns: list[int]) -> tuple[Array, Array] | None:
     """Frequencies [Hz] and square root of the power density over that of unit white noise, shape (f,) each.
 
-    Uses only rows in motion of sufficiently long trials with the rate of the first trial. Pauses between rows are ignored.
-    None if there is no such trial.
+    Uses only rows in motion, from sufficiently long trials with the rate of the first trial. Pauses between rows are
+    ignored. None if there is no such trial.
     """
     rate = traces[0].rate_hz
     used = [trace for trace in traces if trace.moving >= LEAST_ROWS and trace.rate_hz == rate]
