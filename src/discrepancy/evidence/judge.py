@@ -67,7 +67,7 @@ class Judge(ABC):
 
     @abstractmethod
     def more(self, group: Group) -> Mapping[str, Any]:
-        """Further attributes of a finding."""
+        """Further attributes of a finding, by name."""
 
     @abstractmethod
     def tolerances(self, group: Group) -> Mapping[str, float]:
@@ -107,7 +107,7 @@ class Judge(ABC):
         }  # fmt: skip
 
     def findings(self, o: Odds, values: Values | None = None) -> list[Finding]:
-        """Findings of one cause: one, or one per outlying member if less than half of an "all joints" cause are off."""
+        """Findings of one cause: one, or one per outlier if less than half of the joints of an "all joints" cause are off."""
         c, probability = o.chosen.group, o.probability
         first = next((r for r in o.rivals if r.probability > o.probability), None)
         if (
@@ -216,7 +216,7 @@ class Judge(ABC):
         ]
 
     def _chi2(self) -> tuple[float, float, float]:
-        """Chi-square per degree of freedom at the noise floor: as modelled, with tolerances, with the causes."""
+        """Reduced chi-square at the noise floor: as modelled, with tolerances, with the causes."""
         plain, p, found = self.nothing[0], self.nothing[1].posterior, self.state.posterior
         kept, out = np.zeros(len(p.prior)), []
         columns = list(self.fitted(plain.problem))
@@ -291,7 +291,7 @@ class Judge(ABC):
 
 
 def is_named(o: Odds) -> bool:
-    """Whether something is there, and the told set contains this cause or the likeliest is unlisted."""
+    """Whether to name a cause: "nothing" is improbable, and ``told`` has this cause or begins with an unlisted one."""
     nothing = sum(r.probability for r in o.rivals if r.group is None)
     own = o.chosen.group
     told = [g for g in o.told() if g]

@@ -54,7 +54,7 @@ class Odds:
 
 
 def without_unfounded(search: Search, state: State) -> State:
-    """Drop causes, weakest first, while they are likelier errors of the other causes' laws."""
+    """Drop causes, weakest first, that are more likely to be errors of the other causes' laws."""
     while len(state.chosen) > 1:
         shorter = [_without(search, state, c) for c in state.chosen]
         k = int(np.argmax([s.evidence for s in shorter]))

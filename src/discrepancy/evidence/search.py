@@ -117,7 +117,7 @@ class Search:
 
     Attributes:
         problem: columns and groups.
-        floor: lower reference of the noise variances, shape (C, bands).
+        floor: noise floor, the prior value of the noise variances, shape (C, bands).
         settings: constants of the search.
         say: receives a line of text about each step.
         stop: returns whether to stop early.
@@ -207,7 +207,7 @@ class Search:
         return self._pruned(self._named(state), fresh=False)
 
     def settled(self, state: State) -> State:
-        """Learn the noise to convergence, so that sets are compared without a head start for the larger one."""
+        """Learn the noise to convergence; otherwise a larger set would gain from additional learning steps alone."""
         for _ in range(self.settings.settle_steps):
             before, state = state.evidence, self.value(state.chosen, state.posterior)
             if abs(state.evidence - before) < 0.1 * self.settings.need_nats:
@@ -265,7 +265,7 @@ class Search:
         return self._pruned(self.settled(parts)) if out else None
 
     def rivals(self, without: State, own: Group) -> list[Chosen]:
-        """Candidates to replace a cause: their linear gain is within ``within_nats`` of its own."""
+        """Candidates to replace a cause: their linear gain is at most ``within_nats`` below its own."""
         gain = without.posterior.gain(own, self.settings.octaves)[0] + own.log_prior - self.against
         least = gain - self.settings.within_nats
         return [
@@ -274,7 +274,7 @@ class Search:
         ]  # fmt: skip
 
     def offers(self, state: State, *, late: bool = False) -> list[tuple[float, Chosen]]:
-        """All groups that fit into the set with their linear gain, largest gain first."""
+        """All groups that fit into the set with their linear gain, the log odds at the present noise; largest first."""
         taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
 
         def fits(g: Group) -> bool:

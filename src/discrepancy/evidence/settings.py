@@ -35,7 +35,7 @@ class Settings:
         apart: standard errors, or learnt tolerances, beyond which a member of a kind is an outlier.
         within_nats: linear gain below that of a cause beyond which an alternative is ignored (15: 3e-7 of its odds).
         most_rivals: alternatives with exact evidence.
-        named: least probability of the told set of a named cause.
+        named: least probability that something is there, for a cause to be named.
         scatter: deviation of a kind in tolerances (root mean square) beyond which a machine is miscalibrated.
         noticed: standard errors beyond the threshold for a detection probability of 90 %: the normal quantile.
         plain: factor on prior standard deviations for reported values, so that the prior does not shrink them.

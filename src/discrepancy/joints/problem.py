@@ -497,7 +497,7 @@ class _Builder:
         return np.array(power) / np.maximum(rows, 1)
 
     def _apart(self, changed: int) -> None:
-        """Restrict causes to the first logs, and add a column for the model error in all logs."""
+        """Restrict each column to the logs before the reference, and add a column that acts in all logs."""
         out, slabs = self.out, np.sqrt(self.out.slabs())
         local = {k for columns, _ in out.resting for k in columns}
         for i in range(len(out.labels)):

@@ -10,7 +10,7 @@ horizons            list, empty without free rollouts, of
     starts                         number of rollouts
     before, after                  {rms, diverged} of the given and of the extended model, lists over the joints.
                                    ``rms`` is the rms position error over the starts at which the joint did not
-                                   diverge, null if it diverged at more than half of them. ``diverged`` is the number
+                                   diverge. It is null if more than half of them diverged. ``diverged`` is the number
                                    of starts at which it did. ``after`` is null without findings
     removed                        share of the rms error removed, over the starts at which the joint diverged with
                                    neither model; null if these are less than half
