@@ -107,7 +107,7 @@ class Judge(ABC):
         }  # fmt: skip
 
     def findings(self, o: Odds, values: Values | None = None) -> list[Finding]:
-        """Findings of one cause: one, or one per outlier if less than half of the joints of an "all joints" cause are off."""
+        """Findings of one cause: one, or one for each outlier if few joints of an "all joints" cause are off."""
         c, probability = o.chosen.group, o.probability
         first = next((r for r in o.rivals if r.probability > o.probability), None)
         if (

@@ -68,7 +68,7 @@ class Parts:
 
     @cached_property
     def prior(self) -> Array:
-        """Prior variances of the columns, shape (K,); those of causes are wide enough to shrink nothing."""
+        """Prior variances of the columns, shape (K,); those of causes are too wide to shrink their values."""
         wide = self.state.posterior.prior.copy()
         for c in self.state.chosen:
             k = list(c.group.columns)

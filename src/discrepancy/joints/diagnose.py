@@ -119,7 +119,7 @@ def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: A
 
 
 def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
-    """Values and standard errors of the chosen causes by column label, fitted with wide priors that shrink nothing."""
+    """Values and standard errors of the chosen causes by column label, fitted with priors too wide to shrink them."""
     state = outcome.state
     prior = state.posterior.prior.copy()
     for c in state.chosen:
