@@ -208,7 +208,7 @@ def write_extended(verdict: JointVerdict, folder: Path) -> None:
     """Write the extended model, which contains the findings, into a new folder.
 
     Raises:
-        InputError: the folder cannot be written, MuJoCo refuses the model, or the model refers to files outside its folder.
+        InputError: the folder cannot be written, MuJoCo refuses the model, or it refers to files outside its folder.
     """
     effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
     spec = load_spec(verdict.model.path)

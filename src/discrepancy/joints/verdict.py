@@ -230,7 +230,7 @@ class _JointJudge(Judge):
     def by_the_others(self, trial: int) -> tuple[Finding, ...]:
         """Findings that a simulation can represent, with values fitted to the other parts.
 
-        Tolerances and law errors are fixed at zero, as in the simulation, so that the findings have to explain all effects.
+        Tolerances and law errors are fixed at zero, as in the simulation. The findings explain all effects.
         """
         named = [o for o in self.named if not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
         prior = self.prior([o.chosen for o in named], tolerated=False)
