@@ -1,1 +1,1 @@
-"""What a simulation gets wrong: residuals, causes, evidence, extended model, gain."""
+"""Diagnose what a simulation gets wrong: residuals, causes, evidence, extended model and gain."""

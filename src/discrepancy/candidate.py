@@ -1,4 +1,4 @@
-"""A cause at a place, with its numbers and, of an event, when it acts."""
+"""A cause at a place with its parameters and, for an event, its time interval."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from estimator.arrays import Array
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a cause.
+    """One parameter of a cause.
 
     Attributes:
-        name: as in the JSON, its unit as suffix.
-        tolerance: standard deviation that is normal for such a rig; 0 where the cause is an event, not a tolerance.
-        scale: a typical size, in which columns are expressed where the tolerance is 0.
+        name: as in the JSON, with the unit as suffix.
+        tolerance: standard deviation in a healthy rig; 0 if a healthy rig lacks the cause.
+        scale: typical size, the unit of columns with tolerance 0.
     """
 
     name: str
@@ -27,18 +27,18 @@ class Parameter:
 
     @property
     def unit(self) -> float:
-        """The size in which the diagnosis counts it."""
+        """Unit of the parameter in the linear problem."""
         return self.tolerance if self.tolerance > 0 else self.scale
 
 
 @dataclass(frozen=True)
 class Transient:
-    """When an event acts.
+    """Time interval of an event.
 
     Attributes:
         trial: index of its trial, from 0.
-        start_s, duration_s: its interval on the trial's clock [s].
-        ramp_s: how long it grows at the start and fades at the end [s].
+        start_s, duration_s: interval on the trial's clock [s].
+        ramp_s: rise time at the start and fall time at the end [s].
     """
 
     trial: int
@@ -53,7 +53,7 @@ class Transient:
         return {"start_s": self.start_s, "duration_s": self.duration_s} | ramp
 
     def acted(self, time: Array) -> Array:
-        """Integral of its share of its full size up to some times [s]."""
+        """Integral of the event's relative amplitude from the start to given times [s]."""
 
         def grown(since: Array) -> Array:
             since = np.maximum(since, 0.0)
@@ -70,15 +70,15 @@ class Candidate:
 
     Attributes:
         cause: name of the cause.
-        family: causes of one family look alike.
-        robot, joint: where, counted from 1; None where the cause has no such place.
-        parameters: its numbers, in the order of its columns.
-        shape: further numbers that change the columns themselves, by name; where ``trial`` and ``last_trial`` (from 1,
-            0: none) are among them, it acts in these only.
-        transient: when it acts, of an event; None of what lasts.
-        where: the place in words, of what sits at no robot and no joint.
+        family: causes of one family have similar traces.
+        robot, joint: place, counted from 1; None if the cause has no such place.
+        parameters: its parameters, in the order of its columns.
+        shape: named parameters that its columns depend on nonlinearly. With ``trial`` and ``last_trial`` (from 1,
+            0: none) it acts in these trials only.
+        transient: time interval of an event; None for a lasting cause.
+        where: the place in words, without robot and joint.
         title: the cause in words (``causes.base.Cause``).
-        among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
+        among: number of candidates of its kind if the problem does not list them; 0 if it does.
     """
 
     cause: str
@@ -93,7 +93,7 @@ class Candidate:
     among: int = 0
 
     def in_shape(self, shape: Mapping[str, float]) -> Candidate:
-        """The same with other numbers of its shape; an event acts when they say."""
+        """Copy with another shape; for an event, with another interval."""
         when = self.transient and replace(self.transient, **shape)
         return replace(self, shape=when.shape if when else dict(shape), transient=when)
 
@@ -106,11 +106,11 @@ class Candidate:
 
     @property
     def of_trials(self) -> bool:
-        """Whether it is there in some trials only, so that the others do not tell of it."""
+        """Whether it acts in some trials only, so that the other trials have no information on it."""
         return self.transient is not None or "trial" in self.shape
 
     def overlaps(self, other: Candidate) -> bool:
-        """Whether both are events of one cause that act at the same time."""
+        """Whether both are events of one cause that overlap in time."""
         a, b = self.transient, other.transient
         if not (a and b) or self.cause != other.cause or a.trial != b.trial:
             return False
@@ -118,12 +118,12 @@ class Candidate:
 
     @property
     def tolerant(self) -> list[bool]:
-        """Whether each parameter has a tolerance; an event is there or not."""
+        """Whether each parameter has a tolerance; parameters of events have none."""
         return [parameter.tolerance > 0 and self.transient is None for parameter in self.parameters]
 
     @property
     def units(self) -> Array:
-        """Unit of every parameter, shape (k,)."""
+        """Unit of each parameter, shape (k,)."""
         return np.array([p.unit for p in self.parameters])
 
     @property
@@ -135,12 +135,12 @@ class Candidate:
 
     @property
     def kind(self) -> str:
-        """The cause in words, wherever it sits: ``friction in a driven joint``."""
+        """The cause in words, without its place: ``friction in a driven joint``."""
         return re.sub(r"\{(.*?)\}", r"a \1", self.title) or self.cause.replace("_", " ")
 
     @property
     def label(self) -> str:
-        """The cause at its place, in words: ``friction in joint 1 of robot 2``."""
+        """The cause with its place in words: ``friction in joint 1 of robot 2``."""
         if "{" not in self.title:
             return f"{self.kind} ({self.place})" if self.robot else self.kind
         return re.sub(r"\{(.*?)\}", lambda part: self._at(part[1]), self.title)
@@ -153,7 +153,7 @@ class Candidate:
 
     @property
     def trace(self) -> tuple[object, ...]:
-        """Identity of what it does where it acts: cause, place, and shape but for the trials."""
+        """Identity of its effect: cause, place, and shape without the trials."""
         return *self.key, *(
             (name, x) for name, x in self.shape.items() if name not in ("trial", "last_trial")
         )

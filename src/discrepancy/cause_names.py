@@ -1,4 +1,4 @@
-"""Names of all causes, which take nothing that their traces need, and files of tolerances."""
+"""Names of all causes, without the imports of their models, and files of tolerances."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TEAM = (
     "slosh",
     "payload_mass",
 )
-"""A team's causes in the order of the documentation: those of ``discrepancy.team.causes``."""
+"""Causes of a team in the order of the documentation, as in ``discrepancy.team.causes``."""
 
 JOINTS = (
     "friction",
@@ -64,14 +64,14 @@ JOINTS = (
     "gravity_compensation",
     "push",
 )
-"""Causes of a robot of joints, as the tables of ``discrepancy.joints.causes`` have them."""
+"""Causes of a robot of joints, as in ``discrepancy.joints.causes``."""
 
 
 def excluded_from(catalogue: Collection[str], names: Iterable[str]) -> frozenset[str]:
-    """The names, all of them in the catalogue.
+    """Check that all names are in the catalogue, and return them.
 
     Raises:
-        InputError: one is not.
+        InputError: a name is not in the catalogue.
     """
     for name in sorted(set(names) - set(catalogue)):
         raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(catalogue)}")
@@ -81,14 +81,14 @@ def excluded_from(catalogue: Collection[str], names: Iterable[str]) -> frozenset
 def read_tolerances(
     path: Path | None, defaults: Mapping[str, Mapping[str, float]]
 ) -> dict[str, dict[str, float]]:
-    """The defaults, with what a TOML file of tables ``[cause]`` and keys ``parameter = value`` changes.
+    """Read tolerances from a TOML file with tables ``[cause]`` and keys ``parameter = value``; the rest are defaults.
 
     Args:
         path: the file, or None.
         defaults: standard deviations by cause and parameter.
 
     Raises:
-        InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.
+        InputError: the file cannot be read, contains an unknown name, or a value is not a number of at least 0.
     """
     tolerances = {cause: dict(values) for cause, values in defaults.items()}
     if path is None:

@@ -1,4 +1,4 @@
-"""Numbers and units as sentences show them."""
+"""Format numbers and units for sentences."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -10,13 +10,13 @@ from estimator.statistics import measured
 
 
 def number(value: float, se: float | None, unit: str, scale: float = 1.0) -> str:
-    """``0.0500 +- 0.0012 N m``: as many digits as the standard error has meaning; without one, three digits.
+    """Format a value as in ``0.0500 +- 0.0012 N m``, with digits by the standard error, or else with three digits.
 
     Args:
         value: in the parameter's own unit.
-        se: its standard error, or None or NaN where it has none.
-        unit: to be shown.
-        scale: shown units per own unit.
+        se: standard error; None or NaN if there is none.
+        unit: displayed unit.
+        scale: displayed units per own unit.
     """
     unit = f" {unit}" if unit else ""
     if se is None or not np.isfinite(se) or se <= 0:
@@ -26,28 +26,28 @@ def number(value: float, se: float | None, unit: str, scale: float = 1.0) -> str
 
 @dataclass(frozen=True)
 class Numbers:
-    """Parameters of one cause, to be put into a sentence.
+    """Parameters of one cause, for use in a sentence.
 
     Attributes:
-        values: by name, units in the names.
-        se: their standard errors; NaN, or no entry, where there is none.
+        values: by name, with units in the names.
+        se: standard errors; NaN or missing if there is none.
     """
 
     values: Mapping[str, float]
     se: Mapping[str, float]
 
     def __call__(self, name: str, unit: str, scale: float = 1.0, *, signed: bool = False) -> str:
-        """One parameter, its sign left to the words around it unless ``signed``; otherwise as ``number``."""
+        """Format one parameter with ``number``; without its sign unless ``signed``."""
         value = self.values[name] if signed else abs(self.values[name])
         return number(value, self.se.get(name), unit, scale)
 
     def vector(self, stem: str, unit: str) -> str:
-        """``({stem}_x_{unit}, y, z) unit``."""
+        """Format a vector as ``({stem}_x_{unit}, y, z) unit``."""
         names = [f"{stem}_{axis}_{unit}" for axis in "xyz"]
         return f"({', '.join(number(self.values[name], self.se.get(name), '') for name in names)}) {unit}"
 
     def either(self, name: str, more: str, less: str) -> str:
-        """The word for the sign of a parameter."""
+        """Select a word by the sign of a parameter."""
         return more if self.values[name] >= 0 else less
 
 
@@ -82,14 +82,14 @@ def parameter(name: str) -> tuple[str, str]:
 
 
 def fitting(unit: str, largest: float) -> Shown:
-    """A unit in which numbers of up to a size are easy to read, and the factor to it."""
+    """Readable unit for numbers up to a size, and the factor to it."""
     if largest < 1e-4 and unit in SMALLER:
         return SMALLER[unit]
     return SMALL[unit] if largest < 0.1 and unit in SMALL else (unit, 1.0)
 
 
 def one_each(sizes: Iterable[tuple[str, float]]) -> dict[str, Shown]:
-    """For every unit of a table the one in which all its numbers are shown: that which fits the largest.
+    """Readable unit for each unit of a table, chosen by its largest number.
 
     Args:
         sizes: unit and number; signs do not matter.
@@ -101,6 +101,6 @@ def one_each(sizes: Iterable[tuple[str, float]]) -> dict[str, Shown]:
 
 
 def three_digits(value: float) -> str:
-    """Three digits, without a power of ten where that is needless: ``0.98``, ``19.1``, ``12200``."""
+    """Format three digits, without a power of ten for large numbers: ``0.98``, ``19.1``, ``12200``."""
     short = f"{value:.3g}"
     return f"{float(short):.10g}" if "e+" in short else short

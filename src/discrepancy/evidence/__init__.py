@@ -1,1 +1,1 @@
-"""The small engine: one linear problem in the frequency domain, causes as groups of columns, exact evidence."""
+"""Search the likeliest set of causes of a linear problem in the frequency domain, by exact evidence."""

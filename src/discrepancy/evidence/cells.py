@@ -1,4 +1,4 @@
-"""Rows of a linear problem by channel and frequency band, and their Gram matrices."""
+"""Rows of a linear problem by channel and frequency band, with their Gram matrices."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from scipy.fft import dct, idct
 from estimator.arrays import Array
 
 Series = Mapping[int, Sequence[Array]]
-"""A column by channel: one time series (W,) a trial."""
+"""A column: for each channel one time series (W,) for each trial."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Which cosine coefficients of a trial are rows, and to which band each belongs.
+    """Rows of the problem: cosine coefficients of each trial, assigned to frequency bands.
 
     Attributes:
-        rates_hz: samples per second of each trial.
-        lengths: samples of each trial.
+        rates_hz: sampling rate of each trial.
+        lengths: number of samples of each trial.
         edges_hz: K + 1 increasing edges of K bands.
-        fade_s: series rise from zero and fall to it for so long: a cut leaks noise from above the bands.
-        kept: weight of each sample, shape (W, C) a trial; empty: all are rows.
+        fade_s: fade-in and fade-out time of each series [s]; abrupt ends would leak noise from above the bands.
+        kept: weight of each sample, shape (W, C) for each trial; empty: all samples count.
     """
 
     rates_hz: Sequence[float]
@@ -36,11 +36,11 @@ class Bands:
     kept: Sequence[Array] = ()
 
     def share(self, channel: int) -> float:
-        """Share of a channel's rows that is left where samples are weighted."""
+        """Effective share of a channel's rows if samples are weighted."""
         return float(np.mean(np.concatenate([w[:, channel] for w in self.kept]) ** 2)) if self.kept else 1.0
 
     def faded(self, x: Array, trial: int) -> Array:
-        """A series of a trial that rises from zero at its first sample and falls to it at its last."""
+        """Fade a series of a trial in from zero and out to zero."""
         place = np.arange(len(x)) + 0.5
         near = np.minimum(place, place[::-1]) / max(self.fade_s * self.rates_hz[trial], 0.5)
         return (x.T * np.sin(0.5 * np.pi * np.minimum(near, 1.0)) ** 2).T
@@ -52,7 +52,7 @@ class Bands:
         return np.searchsorted(self.edges_hz, frequency[:count], side="right") - 1
 
     def spectrum(self, series: Sequence[Array], channel: int) -> Array:
-        """Orthonormal cosine coefficients of one channel's series, all trials after another, shape (n,)."""
+        """Orthonormal cosine coefficients of one channel, concatenated over trials, shape (n,)."""
         out = []
         for t, x in enumerate(series):
             own = x * self.kept[t][:, channel] if self.kept else x
@@ -65,12 +65,12 @@ class Channel:
     """The rows of one channel.
 
     Attributes:
-        y: residual, band after band, shape (n,).
+        y: residual, sorted by band, shape (n,).
         starts: first row of each band, and the end, shape (bands + 1,).
-        columns: indices of the columns that this channel sees, shape (k,).
-        X: their coefficients, shape (n, k).
-        grams, products: of each band, shapes (bands, k, k) and (bands, k).
-        squares: of each band, shape (bands,).
+        columns: indices of the columns that are nonzero in this channel, shape (k,).
+        X: coefficients of these columns, shape (n, k).
+        grams, products: X' X and X' y of each band, shapes (bands, k, k) and (bands, k).
+        squares: y' y of each band, shape (bands,).
     """
 
     y: Array
@@ -84,12 +84,13 @@ class Channel:
 
 @dataclass(eq=False)
 class Cells:
-    """A linear problem y = X x + noise whose noise has one variance for each channel and band.
+    """A linear problem y = X x + noise with one noise variance for each channel and band.
 
     Attributes:
-        bands: of the rows.
-        channels: one each.
+        bands: definition of the rows.
+        channels: rows of each channel.
         count: number of columns.
+        order: permutation that sorts the coefficients of a channel by band.
     """
 
     bands: Bands
@@ -100,7 +101,7 @@ class Cells:
 
     @classmethod
     def of(cls, bands: Bands, residual: Sequence[Array]) -> Cells:
-        """Without columns; ``residual`` has one array (W, C) a trial."""
+        """Build without columns; ``residual`` has one array (W, C) for each trial."""
         band = np.concatenate([bands.of_trial(t) for t in range(len(residual))])
         order = np.argsort(band, kind="stable")
         number = len(bands.edges_hz) - 1
@@ -115,7 +116,7 @@ class Cells:
         return cls(bands, channels, 0, order)
 
     def around(self, residual: Sequence[Array], x: Array) -> Cells:
-        """The same columns where a residual is left at values x, shape (K,): rows are what is left with all at zero."""
+        """Keep the columns and replace the residual, given as what remains at values x, shape (K,)."""
         channels = []
         for c, old in enumerate(self.channels):
             y = self.bands.spectrum([r[:, c] for r in residual], c)[self.order] + old.X @ x[old.columns]
@@ -127,11 +128,11 @@ class Cells:
 
     @property
     def rows(self) -> Array:
-        """Number of rows by channel and band, shape (C, bands); less where samples are left out."""
+        """Number of rows by channel and band, shape (C, bands); less if samples are weighted."""
         return np.array([np.diff(c.starts) * self.bands.share(i) for i, c in enumerate(self.channels)])
 
     def add(self, series: Sequence[Series]) -> list[int]:
-        """Append columns; their indices."""
+        """Append columns, and return their indices."""
         first, self._last = self.count, None
         seen: dict[int, list[tuple[int, Array]]] = {}
         for k, one in enumerate(series):
@@ -143,7 +144,7 @@ class Cells:
         return list(range(first, self.count))
 
     def add_rows(self, X: NDArray[Any]) -> list[int]:
-        """Append columns given by their rows in each channel, in the order of the cells, shape (C, n, k)."""
+        """Append columns given as rows in each channel, sorted by band, shape (C, n, k); return their indices."""
         first, self._last = self.count, None
         for channel, own in zip(self.channels, X, strict=True):
             seen = np.flatnonzero(own.any(axis=0))
@@ -176,7 +177,7 @@ class Cells:
         self.count = count
 
     def only(self, at: NDArray[np.intp]) -> Cells:
-        """The rows with some columns, numbered anew: their Gram matrices only. The last ones are remembered."""
+        """Restrict the problem to some columns and renumber them, without X; the last result is cached."""
         if self._last is None or not np.array_equal(self._last[0], at):
             place, channels, none = np.full(self.count, -1), [], np.zeros((0, 0))
             place[at] = np.arange(len(at))
@@ -190,7 +191,7 @@ class Cells:
         return self._last[1]
 
     def weighted_residual(self, x: Array, variance: Array) -> list[Array]:
-        """Time series of W (y - X x), one array (W, C) a trial: its product with a column is that column's score."""
+        """Time series of W (y - X x), one array (W, C) for each trial; its dot product with a column is the score."""
         spectra = []
         for channel, own in zip(self.channels, variance, strict=True):
             left = channel.y - channel.X @ x[channel.columns]
@@ -208,7 +209,7 @@ class Cells:
         return out
 
     def weighted(self, variance: Array) -> tuple[Array, Array, float]:
-        """X' W X (K, K), X' W y (K,) and y' W y for noise variances (C, bands)."""
+        """Compute X' W X (K, K), X' W y (K,) and y' W y for noise variances (C, bands)."""
         G, b, yy = np.zeros((self.count, self.count)), np.zeros(self.count), 0.0
         for channel, own in zip(self.channels, variance, strict=True):
             weight = 1.0 / own
@@ -219,11 +220,11 @@ class Cells:
         return G, b, yy
 
     def left(self, x: Array, covariance: Array | Sequence[Array]) -> tuple[Array, Array]:
-        """Squares that values leave, and those that their covariance explains besides, shape (C, bands) each.
+        """Squared residuals at given values, and the squares that their covariance explains, shape (C, bands) each.
 
         Args:
             x: values, shape (K,).
-            covariance: of all values, shape (K, K), or of those that each channel sees.
+            covariance: of all values, shape (K, K), or for each channel that of its columns.
         """
         out = np.zeros((2, len(self.channels), len(self.bands.edges_hz) - 1))
         for c, channel in enumerate(self.channels):
@@ -237,7 +238,7 @@ class Cells:
 
     @property
     def owners(self) -> NDArray[np.intp]:
-        """The channel that alone sees a column, -1 of columns that several see, shape (K,)."""
+        """Channel of each column that is nonzero in one channel only, else -1, shape (K,)."""
         out = np.full(self.count, -2)
         for c, channel in enumerate(self.channels):
             out[channel.columns] = np.where(out[channel.columns] == -2, c, -1)

@@ -1,4 +1,4 @@
-"""What a search found, place by place, in physical values, and encoders that hold their last value."""
+"""Findings of a search in physical values, the verdict, and encoders that hold their last value."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Member:
 
     Attributes:
         place: name of the joint, link or base.
-        joint: which joint, from 1; None of links and of the base.
+        joint: number of the joint, from 1; None for links and the base.
         values: by parameter name, with the unit as suffix.
         errors: standard errors by the same names.
     """
@@ -32,12 +32,12 @@ class Member:
 
 @dataclass(frozen=True)
 class Event:
-    """When something acted.
+    """Time interval of an event.
 
     Attributes:
-        trial: which, from 0.
-        start_s: on the trial's log's clock [s].
-        duration_s: [s].
+        trial: index of the trial, from 0.
+        start_s: start on the clock of the trial's log [s].
+        duration_s: duration [s].
     """
 
     trial: int
@@ -47,12 +47,12 @@ class Event:
 
 @dataclass(frozen=True)
 class Rival:
-    """What else may be in a finding's place.
+    """An alternative to a finding.
 
     Attributes:
-        cause, place, joint: as of findings.
-        probability: of it.
-        nats: by how much it is less likely than the finding.
+        cause, place, joint: as in ``Finding``.
+        probability: its probability.
+        nats: log odds of the finding over it.
     """
 
     cause: str
@@ -64,27 +64,27 @@ class Rival:
 
 @dataclass(frozen=True)
 class Finding:
-    """A cause that is there, and why.
+    """A cause in the verdict, with its evidence.
 
     Attributes:
-        cause: name in the tables of causes; ``unlisted`` if none of them is as likely as something else there.
-        place: name of the joint, link or base; ``all joints`` of a kind.
-        joint: which joint, from 1; None of links, the base and a kind.
-        partner: the other joint of a coupled drive, from 1.
-        members: the places with their values; more than one only of a kind.
-        shape: numbers inside its columns, such as ``share`` of the typical speed.
-        of: signal of the joint that something unlisted is a function of; empty where that is not known.
-        law: of something unlisted, what it is a function of, and which.
-        event: when it acted, if it did so once.
-        probability: that it is this cause, at this place.
-        over_nothing: by how much it is likelier than nothing in its place [nats].
-        nothing: probability that nothing is there.
-        unlisted: probability that something is there that no table lists.
-        rivals: what else may be there, the likeliest first.
-        told: causes and places of the smallest set that holds 90 %, the likeliest first.
-        folds: by how much each trial, predicted by the others, is likelier with it beside the findings before [nats].
+        cause: name in the tables of causes; ``unlisted`` if an unlisted effect is likelier than each of them.
+        place: name of the joint, link or base; ``all joints`` for a cause of several members.
+        joint: number of the joint, from 1; None for links, the base and several members.
+        partner: number of the other joint of a coupled drive, from 1.
+        members: places with their values; several only for a cause at all joints.
+        shape: parameters inside its columns, such as ``share`` of the typical speed.
+        of: argument of an unlisted effect, a signal of the joint; empty if unknown.
+        law: formula of an unlisted effect.
+        event: time interval of an event.
+        probability: probability of this cause at this place.
+        over_nothing: log odds over nothing in its place [nats].
+        nothing: probability of nothing.
+        unlisted: probability of an unlisted effect.
+        rivals: alternatives, likeliest first.
+        told: causes and places of the smallest set with 90 % of the probability, likeliest first.
+        folds: log odds that each trial, predicted from the others, gains from it beside the findings before [nats].
         in_sample: share of the model's misfit that it removes beyond the findings before it.
-        held_out: the same in trials predicted by the others; None of a single trial and of events.
+        held_out: the same in trials predicted from the others; None for a single trial and for events.
     """
 
     cause: str
@@ -109,13 +109,13 @@ class Finding:
 
 @dataclass(frozen=True)
 class Scatter:
-    """A kind whose members are off by more than three tolerances, all alike.
+    """A cause whose places all deviate, by more than three tolerances together.
 
     Attributes:
         cause: name in the tables of causes.
-        factor: root mean square of how far they are off over their tolerances.
+        factor: root mean square of the deviations over their tolerances.
         tolerance: by parameter name.
-        members: the farthest off first.
+        members: places, largest deviation first.
     """
 
     cause: str
@@ -126,10 +126,10 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Offer:
-    """What one more cause would gain.
+    """The gain of one more cause.
 
     Attributes:
-        cause, place, joint: as of findings.
+        cause, place, joint: as in ``Finding``.
         nats: log odds over nothing.
     """
 
@@ -141,11 +141,11 @@ class Offer:
 
 @dataclass(frozen=True)
 class Limit:
-    """What would have been noticed nine times in ten.
+    """Size of a cause that the search would detect with 90 % probability.
 
     Attributes:
-        cause, place, joint: as of findings.
-        sizes: by parameter name; None where these logs say nothing of it.
+        cause, place, joint: as in ``Finding``.
+        sizes: by parameter name; None if the logs have no information.
     """
 
     cause: str
@@ -156,22 +156,22 @@ class Limit:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Verdict:
-    """What logs say of a model.
+    """Verdict on a model.
 
     Attributes:
-        trials: their names.
-        reference: names of the trials of the machine while it was well.
+        trials: names of the trials.
+        reference: names of the trials of the machine in a healthy state.
         verdict: one of the five words.
-        findings: in the order of their worth.
-        suspected: those that are too improbable to be named.
-        scatter: kinds that are off everywhere.
-        validated: whether there are two trials at least.
-        chi2_per_n: squares over the noise's variance per row, as modelled, with tolerances, and with the findings.
-        before, after: what one more cause would gain with nothing found, and with what is found.
-        limits: what would have been noticed.
+        findings: named causes, in the order of their evidence.
+        suspected: causes that are too improbable to be named.
+        scatter: causes whose places all deviate.
+        validated: whether there are at least two trials.
+        chi2_per_n: squared residuals over the noise variance, per row: as modelled, with tolerances, with the findings.
+        before, after: gains of one more cause, without and with the findings in the model.
+        limits: detection limits.
         notes: sentences.
-        finished: whether the search came to its end.
-        traces: residuals by trial, for pictures.
+        finished: whether the search completed.
+        traces: returns the residuals by trial, for plots.
     """
 
     trials: tuple[str, ...]
@@ -196,14 +196,14 @@ KIND = "held readings"
 
 @dataclass(frozen=True)
 class HeldReadings:
-    """What one encoder does.
+    """Intervals in which one encoder holds its last value.
 
     Attributes:
-        place, joint: of which joint, from 1.
-        of: what it reads, in words, with its place.
-        events: every time that it holds its value, the first one first.
-        share: of the time of all trials.
-        nats: by how much that is likelier than a joint that moves so.
+        place, joint: its joint, by name and by number from 1.
+        of: its measured quantity and place, in words.
+        events: the intervals, in time order.
+        share: their share of the time of all trials.
+        nats: log odds over a joint that moves like this.
     """
 
     place: str
@@ -215,7 +215,7 @@ class HeldReadings:
 
     @property
     def finding(self) -> Finding:
-        """As a finding."""
+        """Convert to a finding."""
         return Finding(
             cause="unlisted", place=self.place, joint=self.joint, members=(), probability=1.0, nothing=0.0,
             unlisted=1.0, over_nothing=self.nats, event=self.events[0],
@@ -224,7 +224,7 @@ class HeldReadings:
 
     @property
     def note(self) -> str:
-        """A sentence on how often, how long and when."""
+        """A sentence on number, duration and time of the intervals."""
         lengths = [1e3 * event.duration_s for event in self.events]
         first = self.events[0]
         return (
@@ -240,12 +240,12 @@ def held_readings(
     total_s: float,
     words: Callable[[int], tuple[str, int, str]],
 ) -> list[HeldReadings]:
-    """What all encoders do in some trials.
+    """Collect the held readings of all encoders.
 
     Args:
-        found: encoder, events and nats, for each trial.
+        found: encoder index, intervals and log odds, for each trial and encoder.
         total_s: duration of all trials [s].
-        words: place and joint of an encoder, and what it reads.
+        words: returns place, joint and quantity of an encoder.
     """
     events: dict[int, list[Event]] = {}
     nats: dict[int, float] = {}
@@ -260,9 +260,9 @@ def held_readings(
 
 
 def with_held(verdict: V, held: Sequence[HeldReadings]) -> V:
-    """The verdict with a finding and a note for every encoder that holds its value.
+    """Add a finding and a note to the verdict for each encoder that holds its value.
 
-    Rows that held readings reach are none of the verdict's, so that what else it finds is not due to them.
+    The diagnosis already excludes the affected rows, so they do not influence its other findings.
     """
     if not held:
         return verdict
@@ -275,7 +275,7 @@ def with_held(verdict: V, held: Sequence[HeldReadings]) -> V:
 
 
 def words_of(finding: Finding, place: str) -> dict[str, Any]:
-    """What such a finding is, at its place in words; of any other, nothing."""
+    """JSON values in words for a finding of held readings; empty for other findings."""
     if "held" not in finding.shape:
         return {}
     times, share = finding.shape["held"], 100.0 * finding.shape["share"]

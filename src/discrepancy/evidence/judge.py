@@ -1,4 +1,4 @@
-"""From a search to what is told of any machine: causes with probabilities, what they are worth, and what is open."""
+"""Turn a search result into a verdict: causes with probabilities, their worth, and what remains open."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ Side = tuple[Search, State]
 
 
 class Tolerant(Linear, Protocol):
-    """A linear problem with the standard deviations of a healthy machine."""
+    """A linear problem with the prior standard deviations of a healthy machine."""
 
     @property
     def tolerance(self) -> Sequence[float]:
-        """One for each column, 0 where a healthy machine does not have it."""
+        """One for each column; 0 if a healthy machine lacks the column."""
         ...
 
 
 class Judge(ABC):
-    """What one search found, told.
+    """Turn one search result into the fields of a verdict.
 
     Args:
-        problem: linear around what was found.
-        found: the search on it, and the likeliest set.
-        nothing: the search and the state without causes, where the machine is without.
-        parts: of the logs.
-        odds: of every cause of the set.
+        problem: linearised around the result.
+        found: the search and the likeliest set.
+        nothing: the search and the state without causes, linearised around the model as it is.
+        parts: normal equations of the parts of the logs.
+        odds: of every cause in the set.
 
     Attributes:
-        tolerated: whether nats by part are told beside everything that is off within its tolerance.
+        tolerated: whether the log odds by part let all tolerated columns vary, too.
     """
 
     tolerated: ClassVar[bool] = False
@@ -55,44 +55,47 @@ class Judge(ABC):
         self.suspected = [o for o in odds if not is_named(o)]
         self.whole = parts.values(parts.prior)
 
-    # --- what a machine says of its groups
+    # --- machine-specific methods
 
     @abstractmethod
     def joint(self, cause: str, place: str) -> int | None:
-        """Joint of a cause at a place, from 1."""
+        """Number of the joint of a cause at a place, from 1; None if it has no joint."""
 
     @abstractmethod
     def members(self, group: Group, values: Values) -> tuple[Member, ...]:
-        """Places of a group with their physical values."""
+        """Places of a group with their values in physical units."""
 
     @abstractmethod
     def more(self, group: Group) -> Mapping[str, Any]:
-        """Further attributes of a finding."""
+        """Further attributes of a finding, by name."""
 
     @abstractmethod
     def tolerances(self, group: Group) -> Mapping[str, float]:
-        """Standard deviations of a healthy one in physical units."""
+        """Prior standard deviations of a healthy machine's parameters, in physical units."""
 
     @abstractmethod
     def sizes(self, group: Group, sizes: Array, seen: Array) -> Mapping[str, float | None] | None:
-        """Sizes of columns that would be noticed, of those that are seen, in physical units; None: it is not told."""
+        """Convert detectable column sizes to physical units.
+
+        A size that is not ``seen`` becomes None. The result is None if the group has no limit to report.
+        """
 
     def fitted(self, problem: Any) -> Sequence[int]:
-        """Columns that are fitted with the model as it is."""
+        """Columns that are fitted even without causes."""
         return ()
 
     def before(self) -> Side:
-        """The search and the state without causes, beside which each cause's gain is told."""
+        """The search and the state without causes, for the gain of each single cause."""
         return self.nothing
 
     def unseen(self) -> Collection[Group]:
-        """Groups of which limits are told, and that have no columns in the problem."""
+        """Groups with limits to report but without columns in the problem."""
         return ()
 
     # --- the verdict
 
     def told(self) -> dict[str, Any]:
-        """What every verdict has (``evidence.findings.Verdict``), but for trials, notes and traces."""
+        """All fields of a verdict (``evidence.findings.Verdict``) except trials, notes and traces."""
         findings = self._with_worth()
         doubtful = [f for o in self.suspected for f in self.findings(o)]
         scatter, chi2 = self._scatter(), self._chi2()
@@ -104,10 +107,12 @@ class Judge(ABC):
         }  # fmt: skip
 
     def findings(self, o: Odds, values: Values | None = None) -> list[Finding]:
-        """One finding; members of a kind of which less than half are off are findings of their own."""
+        """Findings of one cause: one, or one for each outlier if few joints of an "all joints" cause are off."""
         c, probability = o.chosen.group, o.probability
         first = next((r for r in o.rivals if r.probability > o.probability), None)
-        if first and first.group and first.group.cause == "unlisted":  # what stands for it is not what it is
+        if (
+            first and first.group and first.group.cause == "unlisted"
+        ):  # report the likelier unlisted effect instead
             c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
@@ -137,12 +142,12 @@ class Judge(ABC):
         return [replace(plain, place=m.place, joint=m.joint, members=(m,)) for m in off]
 
     def fit_of(self, group: Group) -> tuple[Array, Array, Array]:
-        """Mean and covariance of a group's values, and the variances, which shrink nothing, of their prior."""
+        """Mean and covariance of a group's values, and their (wide) prior variances."""
         at, (mean, covariance) = self.parts.columns_of(group.columns), self.whole
         return mean[at], covariance[np.ix_(at, at)], self.parts.prior[at]
 
     def _is_off(self, columns: Sequence[int]) -> bool:
-        """Whether a value is beyond its standard error and a healthy machine's tolerance."""
+        """Whether a value exceeds its standard error and the healthy tolerance, combined, by a factor of ``apart``."""
         at, (mean, covariance) = self.parts.columns_of(list(columns)), self.whole
         usual = np.array([self.problem.tolerance[k] for k in columns])
         size = np.sqrt(np.diag(covariance)[at] + usual**2)
@@ -160,10 +165,16 @@ class Judge(ABC):
             return "unexplained"
         return "miscalibrated" if scatter else "consistent"
 
-    # --- what causes are worth
+    # --- worth of the causes
 
     def prior(self, chosen: Sequence[Chosen], *, tolerated: bool = True, events: bool = True) -> Array:
-        """Variances with some of the found causes in the model; without tolerances, or other events, on request."""
+        """Prior variances with the chosen causes in the model, for the active columns, shape (K,).
+
+        Args:
+            chosen: the causes to keep.
+            tolerated: whether columns within a healthy machine's tolerance may vary.
+            events: whether columns of events may vary if ``tolerated`` is false.
+        """
         prior = self.parts.prior.copy()
         own = {k for c in chosen for k in c.group.columns}
         if not tolerated:
@@ -178,7 +189,7 @@ class Judge(ABC):
         return prior
 
     def _with_worth(self) -> list[Finding]:
-        """Findings with the shares of the misfit that they remove one after another, and nats by part."""
+        """Findings with the share of the misfit that each removes in turn, and its log odds by part."""
         parts, kept = self.parts, self.named
         sets = [[o.chosen for o in kept[:k]] for k in range(len(kept) + 1)]
         left = [parts.left(parts.mean(self.prior(own, tolerated=False, events=False))) for own in sets]
@@ -197,7 +208,7 @@ class Judge(ABC):
         return done
 
     def _predicted_each(self, sets: Sequence[Sequence[Chosen]], *, tolerated: bool) -> list[list[float]]:
-        """Squares left in each part, predicted by the others with each of some sets in the model."""
+        """For each set, squared residuals over the noise of each part, predicted from the other parts."""
         priors = [self.prior(own, tolerated=tolerated) for own in sets]
         return [
             [self.parts.left(self.parts.predicted(prior, t), t) for t in range(self.parts.count)]
@@ -205,7 +216,7 @@ class Judge(ABC):
         ]
 
     def _chi2(self) -> tuple[float, float, float]:
-        """Squares left over the floor's variance, per row: as modelled, with tolerances, with the causes."""
+        """Reduced chi-square at the noise floor: as modelled, with tolerances, with the causes."""
         plain, p, found = self.nothing[0], self.nothing[1].posterior, self.state.posterior
         kept, out = np.zeros(len(p.prior)), []
         columns = list(self.fitted(plain.problem))
@@ -218,10 +229,10 @@ class Judge(ABC):
             out.append(float(np.sum(left / search.floor) / free.sum()))
         return out[0], out[1], out[2]
 
-    # --- what else there is to tell
+    # --- scatter, offers and limits
 
     def _scatter(self) -> list[Scatter]:
-        """Kinds whose tolerated members are off by several tolerances, root mean square."""
+        """Causes whose healthy members deviate by several tolerances, root mean square."""
         taken = {k for c in self.state.chosen for k in c.group.columns}
         kinds: dict[str, list[tuple[Group, float]]] = {}
         p, out = self.state.posterior, []
@@ -244,11 +255,11 @@ class Judge(ABC):
         return sorted(out, key=lambda s: -s.factor)
 
     def withheld(self) -> Sequence[Group]:
-        """Causes that were left out, but for their tolerances."""
+        """Excluded causes, whose tolerances stay in the model."""
         return ()
 
     def _shaped(self, group: Group) -> bool:
-        """Whether a group is another shape of one that has the tolerance."""
+        """Whether a group is a variant shape; only the plain shape has a tolerance."""
         return any(v for _, v in group.shape)
 
     def _offers(self, search: Search, state: State) -> Iterator[Offer]:
@@ -257,7 +268,7 @@ class Judge(ABC):
             yield Offer(*key, self.joint(*key), nats)
 
     def _limits(self) -> Iterator[Limit]:
-        """Sizes that would be noticed nine times in ten, with everything else as it was found."""
+        """Sizes that the search would detect with 90 % probability, given what was found."""
         taken, s = {c.group.key for c in self.state.chosen}, self.search.settings
         open_ = s.open_nats if taken else 0.0
         need = np.sqrt(2.0 * (self.search.against + s.need_nats + open_)) + s.noticed
@@ -280,7 +291,7 @@ class Judge(ABC):
 
 
 def is_named(o: Odds) -> bool:
-    """Whether something is there, and it may be the cause whose values were fitted, or is unlisted."""
+    """Whether to name a cause: "nothing" is improbable, and ``told`` has this cause or begins with an unlisted one."""
     nothing = sum(r.probability for r in o.rivals if r.group is None)
     own = o.chosen.group
     told = [g for g in o.told() if g]
@@ -289,7 +300,7 @@ def is_named(o: Odds) -> bool:
 
 
 def _share(left: Sequence[float], k: int, rows: float) -> float:
-    """Share of the misfit above what all leave that one step removes."""
+    """Share of the misfit that step k removes; the misfit that all steps leave does not count."""
     best = np.minimum.accumulate(np.asarray(left))
     room = max(best[0] - min(rows, best[-1]), 1e-9)
     return float(np.clip((best[k] - best[k + 1]) / room, 0.0, 1.0))

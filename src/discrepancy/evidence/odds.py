@@ -1,4 +1,4 @@
-"""How probable each cause of a set is: it is taken out, and everything that could be in its place is weighed."""
+"""Probability of each cause of a set: remove it, and compare everything that could take its place."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from discrepancy.evidence.search import Chosen, Search, State
 
 @dataclass(frozen=True)
 class Rival:
-    """What may be in a cause's place.
+    """An alternative to a cause.
 
     Attributes:
-        group: a cause; None: nothing, or what the other causes' laws leave.
-        probability: of it.
+        group: a cause; None: nothing, or an error of the other causes' laws.
+        probability: its probability.
     """
 
     group: Group | None
@@ -25,13 +25,13 @@ class Rival:
 
 @dataclass(frozen=True)
 class Odds:
-    """A cause of the set.
+    """A cause of the set with its alternatives.
 
     Attributes:
-        chosen: it.
-        probability: that it is what and where it is said to be.
+        chosen: the cause.
+        probability: probability of this cause at this place.
         over_nothing: log odds over nothing in its place [nats].
-        rivals: everything else that was weighed, the likeliest first.
+        rivals: all alternatives, likeliest first.
     """
 
     chosen: Chosen
@@ -40,7 +40,7 @@ class Odds:
     rivals: tuple[Rival, ...]
 
     def told(self, share: float = 0.9) -> tuple[Group | None, ...]:
-        """The smallest set of causes that holds a share of the probability, the likeliest first."""
+        """The smallest set of alternatives that holds a share of the probability, likeliest first."""
         every = sorted([(self.probability, self.chosen.group), *((r.probability, r.group) for r in self.rivals)],
                        key=lambda pair: -pair[0])  # fmt: skip
         total, out = 0.0, []
@@ -54,7 +54,7 @@ class Odds:
 
 
 def without_unfounded(search: Search, state: State) -> State:
-    """The set without causes that are likelier what the other causes' laws leave, the weakest taken out first."""
+    """Drop causes, weakest first, that are more likely to be errors of the other causes' laws."""
     while len(state.chosen) > 1:
         shorter = [_without(search, state, c) for c in state.chosen]
         k = int(np.argmax([s.evidence for s in shorter]))
@@ -65,7 +65,7 @@ def without_unfounded(search: Search, state: State) -> State:
 
 
 def odds_of(search: Search, state: State) -> list[Odds]:
-    """Probabilities of all causes of a set, which a search found."""
+    """Probabilities of all causes of a search result."""
     return [_odds(search, state, c) for c in state.chosen]
 
 
@@ -74,10 +74,11 @@ def _without(search: Search, state: State, own: Chosen) -> State:
 
 
 def _nothing(search: Search, state: State, own: Chosen, without: State) -> float:
-    """Log evidence that a cause is not there: its trace is within its tolerance, or an error of the others' laws.
+    """Log evidence that a cause is absent: its trace is within tolerance, or is an error of the other causes' laws.
 
-    Laws are off by less than they explain. So what the tolerance has to take up is subtracted from their worth.
-    A law that no table lists was fitted, not derived: beside it, events and further such laws must explain more.
+    A law's error explains less than the law, so the worth of the laws is the upper limit of this evidence. It excludes
+    what the tolerance explains. Beside an unlisted law, events and further unlisted laws must explain more, because
+    such a law is fitted, not derived.
     """
     s = search.settings
     room = s.open_nats
@@ -107,12 +108,12 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
     share = np.exp(logs - logs.max())
     share /= share.sum()
     if search.is_within_tolerance(state, own):
-        share = np.eye(len(share))[1]  # what its tolerances are for is no fault
+        share = np.eye(len(share))[1]  # a value within tolerance is no fault
     merged: dict[tuple[str, str] | None, Rival] = {}
     for (_, group), p in zip(weighed, share[1:], strict=True):
         key = None if group is None else group.key
         if key == own.group.key or (group and own.group.columns in group.members):
-            share[0] += p  # another shape of the same cause, or all joints and this one among them
+            share[0] += p  # another shape of the same cause, or the cause at all joints
         elif key not in merged or merged[key].probability < p:
             merged[key] = Rival(group, float(p))
     rivals = sorted(merged.values(), key=lambda r: -r.probability)

@@ -1,4 +1,4 @@
-"""Parts of the logs that predict each other: what each says of a found set's columns, with the noise of the search."""
+"""Normal equations of parts of the logs, for the prediction of each part from the others."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array
 
 Values = tuple[Array, Array]
-"""Values of the active columns, and their covariance, shapes (K,) and (K, K)."""
+"""Values of the active columns (K,) and their covariance (K, K)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Normal equations of each part in its noise.
+    """Normal equations of each of T parts, weighted with the noise learnt in the search.
 
     Attributes:
-        state: what the search found.
+        state: the search result.
         active: indices of the columns, shape (K,).
         grams, products, squares: X' W X, X' W y and y' W y of each part, shapes (T, K, K), (T, K) and (T,).
-        rows: of each part, by channel and band, shape (T, C, bands).
-        local: columns that are each part's own, such as friction at rest, shape (K,).
-        events: those of them that belong to causes that act for a while, shape (K,).
-        unknown: columns that are in the model whatever is found, shape (K,).
+        rows: number of rows of each part by channel and band, shape (T, C, bands).
+        local: columns whose values are specific to a part, such as friction at rest or events, shape (K,).
+        events: columns of events, shape (K,).
+        unknown: nuisance parameters, which are always in the model, shape (K,).
     """
 
     state: State
@@ -47,14 +47,14 @@ class Parts:
         cls, state: State, each: Iterable[tuple[Array, Array, float, Array]], unknown: Collection[int],
         own: Collection[int], events: Collection[int],
     ) -> Parts:  # fmt: skip
-        """From what each part says of the active columns of a state.
+        """Build from the normal equations of each part.
 
         Args:
-            state: what the search found.
-            each: X' W X, X' W y, y' W y and rows by channel and band of each part.
-            unknown: columns of the problem that are in the model whatever is found.
-            own: those of them that are each part's own.
-            events: columns of causes that act for a while.
+            state: the search result.
+            each: X' W X, X' W y, y' W y and number of rows by channel and band of each part, for the active columns.
+            unknown: columns of the problem that are always in the model.
+            own: columns whose values are specific to a part.
+            events: columns of events.
         """
         active = np.flatnonzero(state.posterior.prior)
         G, b, yy, rows = zip(*each, strict=True)
@@ -68,7 +68,7 @@ class Parts:
 
     @cached_property
     def prior(self) -> Array:
-        """Variances of the columns, of causes so wide that they shrink nothing, shape (K,)."""
+        """Prior variances of the columns, shape (K,); those of causes are too wide to shrink their values."""
         wide = self.state.posterior.prior.copy()
         for c in self.state.chosen:
             k = list(c.group.columns)
@@ -76,24 +76,24 @@ class Parts:
         return wide[self.active]
 
     def columns_of(self, chosen: Sequence[int]) -> list[int]:
-        """Places of a problem's columns among these."""
+        """Positions of the problem's columns among the active columns."""
         return np.searchsorted(self.active, chosen).tolist()
 
     def others(self, part: int | None) -> list[int]:
-        """All parts but one, where there is another."""
+        """Indices of all parts but one; of all parts if there is no other."""
         return [k for k in range(self.count) if k != part] or list(range(self.count))
 
     def step(self, x: Array, prior: Array, parts: Sequence[int]) -> Array:
-        """Values x and what they leave in some parts, fitted with variances of the columns, shape (K,)."""
+        """Fit the residual at values x in some parts, and return the updated values, shape (K,)."""
         G, b = self.grams[parts].sum(axis=0), self.products[parts].sum(axis=0)
         return x + _mean(G, b - G @ x, prior)
 
     def mean(self, prior: Array, but: int | None = None) -> Array:
-        """Values of the columns by all parts but one, shape (K,)."""
+        """Values of the columns from all parts but one, shape (K,)."""
         return self.step(np.zeros(len(prior)), prior, self.others(but))
 
     def values(self, prior: Array, but: int | None = None) -> Values:
-        """The same with their covariance."""
+        """The same values with their covariance."""
         on = np.flatnonzero(prior > 0.0)
         s = np.sqrt(prior[on])
         factor = _factor(self.grams[self.others(but)].sum(axis=0)[np.ix_(on, on)], s)
@@ -102,19 +102,19 @@ class Parts:
         return self.mean(prior, but), covariance
 
     def left(self, x: Array, part: int | None = None) -> float:
-        """Squares over the noise's variance that values leave in one part; None: in all."""
+        """Squared residuals over the noise variance at given values, in one part; None: in all parts."""
         at = list(range(self.count)) if part is None else [part]
         G, b, yy = (v[at].sum(axis=0) for v in (self.grams, self.products, self.squares))
         return max(float(yy - 2.0 * b @ x + x @ G @ x), 0.0)
 
     def predicted(self, prior: Array, part: int) -> Array:
-        """Values for one part as the others have them; what is its own comes from itself, shape (K,)."""
+        """Values for one part from the other parts; its local columns are fitted to itself, shape (K,)."""
         x = np.where(self.local, 0.0, self.mean(prior, part))
         return self.step(x, np.where(self.local, prior, 0.0), [part])
 
 
 def _mean(G: Array, b: Array, prior: Array) -> Array:
-    """Values for normal equations, shape (K,); those without prior variance are zero."""
+    """Solve normal equations, shape (K,); values without prior variance are zero."""
     on, out = np.flatnonzero(prior > 0.0), np.zeros(len(b))
     s = np.sqrt(prior[on])
     out[on] = s * cho_solve(_factor(G[np.ix_(on, on)], s), s * b[on])

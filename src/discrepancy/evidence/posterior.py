@@ -1,4 +1,4 @@
-"""What data say of all columns for given priors and noise, and what more variance of a group would gain."""
+"""Posterior of all columns for given priors and noise, and the evidence gain of a group with more prior variance."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ _potrf, _potri, _trtrs = get_lapack_funcs(("potrf", "potri", "trtrs"), (np.zeros
 
 @dataclass(frozen=True)
 class Group:
-    """A cause at a place in one shape: columns whose values have a wide prior if it is there.
+    """A cause at a place in one shape: columns with a wide prior (a slab) if the cause is present.
 
     Attributes:
-        cause, place: what and where; groups of equal cause and place exclude each other.
+        cause, place: groups with equal cause and place exclude each other.
         columns: indices, shape (k,).
         slab: prior standard deviation of each value, shape (k,).
-        log_prior: relative to other groups.
-        shape: numbers inside the columns.
-        least: smallest possible value of each, -inf without a bound; empty where none has a bound.
-        event: whether it acts for a while; its columns exist only while it is in the set.
-        late: whether no table lists it.
-        family: groups of one family span each other and exclude each other; empty of those that have none.
-        members: of a kind, the columns of each of its members; their values are alike by half of their variance.
+        log_prior: log prior probability relative to other groups.
+        shape: named parameters that the columns depend on nonlinearly.
+        least: lower bound of each value, -inf without a bound; empty if no value has a bound.
+        event: whether it acts for a limited time; its columns exist only while it is in the set.
+        late: whether it is an unlisted law, in no table of causes.
+        family: groups of one family explain each other and exclude each other; empty: no family.
+        members: for a cause at all joints, the columns of each joint. Half of the prior variance is common to them.
     """
 
     cause: str
@@ -53,7 +53,7 @@ class Group:
 
     @property
     def second(self) -> bool:
-        """Whether it is offered only where no listed cause that lasts is worth adding."""
+        """Whether the search offers it only if no listed, lasting cause is worth adding."""
         return self.event or self.late
 
     @property
@@ -70,13 +70,13 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """Cholesky factor of I + s G s, whose parts meet only in the columns that come last.
+    """Block Cholesky factor of I + s G s, whose blocks couple only through the last columns.
 
     Attributes:
-        parts: positions of each part.
-        last: positions of the columns that all parts share.
-        own: factor of each part, and the last one's.
-        beside: what each part has in common with the last.
+        parts: positions of each block.
+        last: positions of the columns that all blocks share.
+        own: factor of each block, then of the last columns.
+        beside: coupling of each block with the last columns.
     """
 
     parts: list[NDArray[np.intp]]
@@ -86,7 +86,7 @@ class Arrow:
 
     @classmethod
     def of(cls, G: Array, s: Array, parts: list[NDArray[np.intp]], last: NDArray[np.intp]) -> Arrow:
-        """Factor of I + s G s for the columns' scales s."""
+        """Factor I + s G s with column scales s."""
 
         def block(i: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
             return s[i][:, None] * G[np.ix_(i, k)] * s[k]
@@ -102,7 +102,7 @@ class Arrow:
 
     @property
     def half_log_det(self) -> float:
-        """Half the logarithm of the matrix's determinant."""
+        """Half the log determinant of the matrix."""
         return float(sum(np.sum(np.log(np.diag(L))) for L in self.own))
 
     def forward(self, x: Array) -> Array:
@@ -123,7 +123,7 @@ class Arrow:
         return out
 
     def inverses(self) -> Iterator[tuple[NDArray[np.intp], Array]]:
-        """Positions of each part with the last one, and that block of the inverse."""
+        """For each block, the positions of it and the last columns, and that block of the inverse."""
         last = _inverse(self.own[-1])
         for p, L, B in zip(self.parts, self.own, self.beside, strict=False):
             E = _solved(L, B, trans=1)
@@ -132,7 +132,7 @@ class Arrow:
 
 
 def _factor(A: Array) -> Array:
-    """Cholesky factor of I + A, lower."""
+    """Lower Cholesky factor of I + A."""
     A[np.diag_indices(len(A))] += 1.0
     if not len(A):
         return A
@@ -143,7 +143,7 @@ def _factor(A: Array) -> Array:
 
 
 def _solved(L: Array, x: Array, trans: int = 0) -> Array:
-    """L^-1 x, or L'^-1 x."""
+    """L^-1 x, or L'^-1 x if ``trans`` is 1."""
     return _trtrs(L, x, lower=1, trans=trans)[0] if x.size else x
 
 
@@ -157,12 +157,12 @@ def _inverse(L: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Posterior of columns x ~ N(0, S), with noise of one variance for each channel and band.
+    """Posterior of columns x ~ N(0, S), with one noise variance for each channel and band.
 
     Attributes:
         cells: the problem.
-        prior: variances S, shape (K,); columns with zero are not in the model.
-        variance: of the noise, shape (C, bands).
+        prior: variances S, shape (K,); columns with zero variance are not in the model.
+        variance: noise variances, shape (C, bands).
     """
 
     cells: Cells
@@ -171,7 +171,7 @@ class Posterior:
 
     @cached_property
     def active(self) -> NDArray[np.intp]:
-        """Columns in the model."""
+        """Indices of the columns in the model."""
         return np.flatnonzero(self.prior > 0)
 
     @cached_property
@@ -193,14 +193,14 @@ class Posterior:
 
     @cached_property
     def log_evidence(self) -> float:
-        """Log density of the rows, without the constant of pi."""
+        """Log density of the rows, without the constant in pi."""
         _, L, z = self._factor
         yy = self._weighted[2]
         return float(-0.5 * (np.sum(self.cells.rows * np.log(self.variance)) + yy - z @ z) - L.half_log_det)
 
     @cached_property
     def mean(self) -> Array:
-        """Values of all columns, shape (K,)."""
+        """Posterior mean of all columns, shape (K,)."""
         s, L, z = self._factor
         x = np.zeros(len(self.prior))
         x[self.active] = s * L.backward(z[:, None])[:, 0]
@@ -208,7 +208,7 @@ class Posterior:
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of the values, shape (K, K)."""
+        """Posterior covariance, shape (K, K)."""
         s, L, _ = self._factor
         inverse = L.forward(np.eye(len(s)))
         out = np.zeros((len(self.prior), len(self.prior)))
@@ -217,7 +217,7 @@ class Posterior:
 
     @cached_property
     def _blocks(self) -> list[Array]:
-        """Covariance of the values that each channel sees and that are in the model."""
+        """For each channel, the covariance of its columns in the model."""
         s, L, _ = self._factor
         where, out = np.zeros(len(s), dtype=np.intp), []
         for (k, inverse), channel in zip(L.inverses(), self._own.channels, strict=True):
@@ -228,7 +228,7 @@ class Posterior:
 
     @cached_property
     def variances(self) -> Array:
-        """Variances of the values, shape (K,)."""
+        """Posterior variances, shape (K,)."""
         own, out = np.zeros(len(self.active)), np.zeros(len(self.prior))
         for block, channel in zip(self._blocks, self._own.channels, strict=True):
             own[channel.columns] = np.diag(block)
@@ -237,11 +237,11 @@ class Posterior:
 
     @cached_property
     def left(self) -> tuple[Array, Array]:
-        """Squares that the values leave, and those that their covariance explains besides, shape (C, bands) each."""
+        """Squared residuals at the mean, and the squares that the covariance explains, shape (C, bands) each."""
         return self._own.left(self.mean[self.active], self._blocks)
 
     def worth(self, columns: Sequence[int], less: Array) -> float:
-        """Log evidence that is lost where columns have smaller prior variances, with the same noise."""
+        """Log evidence lost if columns have the smaller prior variances ``less``, at the same noise."""
         s, L, z = self._factor
         k = np.searchsorted(self.active, columns)
         Z = L.forward(np.eye(len(s))[:, k])
@@ -252,39 +252,39 @@ class Posterior:
         return float(0.5 * (h @ (Z.T @ z) - np.linalg.slogdet(C)[1] - kept))
 
     def size(self, columns: Sequence[int]) -> float:
-        """Half the squares over the noise of what columns add with their values."""
+        """Half the squared contribution of columns at their mean, over the noise variance."""
         k = np.searchsorted(self.active, columns)
         x = self.mean[list(columns)]
         return float(0.5 * x @ self._weighted[0][np.ix_(k, k)] @ x)
 
     def possible(self, group: Group, scale: float) -> float:
-        """Log evidence that the bounds of a group's values add, where the group is in the model."""
+        """Log evidence gained from the bounds of a group's values, if the group is in the model."""
         if not group.least:
             return 0.0
         k = list(group.columns)
         return float(_possible(group, self.mean[k], np.sqrt(self.variances[k]), scale))
 
     def better_noise(self, floor: Array, weight: Array | float) -> Array:
-        """Variances by MacKay's step: squares left over rows that are not fitted, about a floor."""
+        """Update the noise by MacKay's step: squared residuals over effective free rows, weighted with the floor."""
         left, fitted = self.left
         free = np.maximum(self.cells.rows - fitted / self.variance, 0.05 * self.cells.rows)
         return (weight * floor + left) / (weight + free)
 
     @cached_property
     def _conditional(self) -> tuple[Array, Array]:
-        """Information matrix R and score Q of all columns beside the active ones' priors, shapes (K, K) and (K,)."""
+        """Information matrix R (K, K) and score Q (K,) of all columns, with the active ones marginalised."""
         s, L, z = self._factor
         G, b, _ = self.cells.weighted(self.variance)
         U = L.forward(s[:, None] * G[self.active])
         return G - U.T @ U, b - U.T @ z
 
     def errors_of(self, columns: Sequence[int]) -> Array:
-        """Standard errors of columns that have no prior of their own, each beside everything else, shape (k,)."""
+        """Standard errors of columns without a prior, each beside the active ones, shape (k,)."""
         R, _ = self._conditional
         return 1.0 / np.sqrt(np.maximum(np.diag(R)[list(columns)], 1e-30))
 
     def gain(self, group: Group, octaves: int) -> tuple[float, float]:
-        """Log evidence that more variance of a group's columns adds, averaged over scales, and the best scale.
+        """Log evidence gained by more prior variance of a group's columns, averaged over scales, and the best scale.
 
         With V the added covariance: (1/2) Q' (V^-1 + R)^-1 Q - (1/2) log |1 + V R|.
         """
@@ -303,7 +303,7 @@ class Posterior:
 
 
 def prior_root(group: Group) -> Array:
-    """B with B B' the prior covariance of a group's values; members of a kind share half of their variance."""
+    """B such that B B' is the prior covariance of a group's values; joints share half of their variance."""
     slab = np.array(group.slab)
     if not group.members:
         return np.diag(slab)
@@ -316,7 +316,7 @@ def prior_root(group: Group) -> Array:
 
 
 def _possible(group: Group, mean: Array, se: Array, scale: Array | float) -> Array:
-    """Log of the share of the posterior that is possible over that of the prior, one value at a time."""
+    """Log of the posterior over the prior probability that the bounds hold, one value at a time."""
     least, slab = np.array(group.least), np.array(group.slab)
     k = np.isfinite(least) & np.all(se > 0.0, axis=tuple(range(se.ndim - 1)))
     share = log_ndtr((mean[..., k] - least[k]) / se[..., k]) - log_ndtr(-least[k] / (slab[k] * scale))

@@ -1,4 +1,4 @@
-"""The likeliest set of causes: add, delete, exchange on exact evidence, with the noise learnt for every set."""
+"""Search the likeliest set of causes: add, delete and exchange by exact evidence, and learn the noise of every set."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """A cause in the model.
+    """A cause in the set.
 
     Attributes:
-        group: what and where.
-        scale: of its prior's standard deviation.
-        forms: columns of its law's error.
+        group: the cause with its place and columns.
+        scale: factor on its prior standard deviation.
+        forms: columns for the error of its law.
     """
 
     group: Group
@@ -35,66 +35,66 @@ class Chosen:
 
     @property
     def open(self) -> Chosen:
-        """The errors of the law without the law: something else that looks like it."""
+        """Only the law error without the law itself: an unknown effect with a similar trace."""
         g = self.group
         nothing = Group("open", g.place, (), (), g.log_prior, event=g.event)
         return replace(self, group=nothing)
 
 
 class Linear(Protocol):
-    """A machine's logs as a linear problem."""
+    """The logs of a machine as a linear problem with K columns and C channels."""
 
     cells: Cells
 
     @property
     def groups(self) -> Sequence[Group]:
-        """Every cause at every place in every shape."""
+        """All causes at all places in all shapes."""
         ...
 
     @property
     def sensors(self) -> Array | None:
-        """Variances of the sensors' noise, shape (C, bands), or None where it is not known."""
+        """Variances of the sensor noise, shape (C, bands); None: unknown."""
         ...
 
     @property
     def families(self) -> Sequence[Sequence[int]]:
-        """Columns of random effects whose common spread is learnt."""
+        """Columns of random effects with a common variance factor to be learnt."""
         ...
 
     @property
     def laws(self) -> Sequence[Sequence[int]]:
-        """Columns of errors of the model's own laws, whose common share is learnt."""
+        """Columns for errors of the model's own laws, with a common variance factor to be learnt."""
         ...
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
-        """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
+        """Prior variances without the chosen causes, shape (K,); they may depend on the causes' ``values``."""
         ...
 
     def proposals(self, posterior: Posterior, *, late: bool = False) -> Sequence[Group]:
-        """Events and shapes whose columns are not in the problem, the likeliest first; ``late``: and laws."""
+        """Events and shapes that have no columns yet, likeliest first; ``late``: include unlisted laws."""
         ...
 
     def place(self, group: Group) -> Group:
-        """Such a group with its columns, which are added to the problem."""
+        """Add the columns of a proposed group to the problem, and return the group with their indices."""
         ...
 
     def nearby(self, group: Group, posterior: Posterior) -> Sequence[Group]:
-        """The same cause in neighbouring shapes: an event a little earlier, later, shorter and longer."""
+        """The same cause in neighbouring shapes: an event slightly earlier, later, shorter and longer."""
         ...
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """What a cause of such values leaves if its law has another form, one standard deviation each."""
+        """Columns for the error of a cause's law at these values, each with a standard deviation of one."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A set of causes with everything else at its likeliest.
+    """A set of causes with its posterior.
 
     Attributes:
         chosen: the causes.
-        posterior: of all columns.
-        evidence: log probability of the set and of the data, up to a constant.
+        posterior: of all columns, with the noise learnt for this set.
+        evidence: log joint probability of the set and the data, up to a constant.
     """
 
     chosen: tuple[Chosen, ...]
@@ -103,12 +103,12 @@ class State:
 
     @property
     def keys(self) -> set[Key]:
-        """What and where the causes are."""
+        """Cause and place of each chosen cause."""
         return {c.group.key for c in self.chosen}
 
 
 Bent = Callable[[State, frozenset[str]], bool]
-"""Whether a problem is not linear any more around a state with some new causes."""
+"""Test whether the problem needs a new linearisation at a state with these new causes."""
 
 
 @dataclass(eq=False)
@@ -117,11 +117,12 @@ class Search:
 
     Attributes:
         problem: columns and groups.
-        floor: of the noise, shape (C, bands).
-        settings: numbers.
-        say: takes a line about each step.
-        stop: whether to end with what there is.
-        best: the last set that was taken, for whoever breaks a search off.
+        floor: noise floor, the prior value of the noise variances, shape (C, bands).
+        settings: constants of the search.
+        say: receives a line of text about each step.
+        stop: returns whether to stop early.
+        best: the last accepted set, for use after an interruption.
+        against: prior log odds against any one cause.
     """
 
     problem: Linear
@@ -136,18 +137,18 @@ class Search:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
     def value(self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None) -> State:
-        """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
+        """Compute the evidence of a set, and learn its noise and the variance factors of its random effects.
 
         Args:
             chosen: the set.
-            near: where learning begins; None begins at the floor.
-            steps: of learning.
+            near: a nearby posterior to start from; None: start from the noise floor.
+            steps: learning steps; None: the default of the settings.
         """
         cells, s = self.problem.cells, self.settings
         nominal = self.prior(chosen, None if near is None else near.mean)
         weight = s.floor_rows
         loose = (*self.problem.laws, *(c.forms for c in chosen if c.forms))
-        free = [k for c in chosen for k in c.group.columns]  # the spread of the healthy ones is theirs alone
+        free = [k for c in chosen for k in c.group.columns]  # learn the spread from healthy columns only
         kin = [(np.setdiff1d(k, free), s.spread_rows, np.inf) for k in self.problem.families]
         kin += [(np.asarray(k), 0.0, s.most_spread) for k in loose]
         kin = [k for k in kin if len(k[0]) and nominal[k[0][0]] > 0]
@@ -174,7 +175,7 @@ class Search:
         return State(tuple(chosen), p, evidence)
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
-        """Variances of all columns with some causes in the model."""
+        """Prior variances of all columns with the chosen causes in the model, shape (K,)."""
         S = np.zeros(self.problem.cells.count)
         base = self.problem.prior(chosen, values)
         S[: len(base)] = base
@@ -184,14 +185,14 @@ class Search:
         return S
 
     def fixed(self, chosen: Sequence[Chosen]) -> State:
-        """A set with its laws' errors, without causes that it is likelier without."""
+        """Compute a fixed set with law errors, then drop causes that lower the evidence."""
         state = self.value([replace(c, forms=()) for c in chosen], None)
         for one in state.chosen:
             state = self._with_errors(state, one)
         return self._pruned(self.settled(state), fresh=False)
 
     def run(self, state: State, bent: Bent = lambda state, new: False) -> State:
-        """The likeliest set from another on; it ends early with a cause from which on the problem is not linear."""
+        """Search from a state for the likeliest set; stop early if ``bent`` asks for a new linearisation."""
         state = self._pruned(self.settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes and not self.stop():
             self.best = state
@@ -199,14 +200,14 @@ class Search:
             grown = self._grown(state) or self._exchanged(state) or self._grown(state, late=True)
             settled = None if grown is None else self.settled(grown)
             if settled is None or settled.evidence < state.evidence + 0.5 * self.settings.need_nats:
-                break  # one objective that rises, or a search would go round in circles
+                break  # require that evidence increases, to prevent cycles
             state, before = settled, state
             if bent(state, frozenset(cause for cause, _ in state.keys - before.keys)):
                 break
         return self._pruned(self._named(state), fresh=False)
 
     def settled(self, state: State) -> State:
-        """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
+        """Learn the noise to convergence; otherwise a larger set would gain from additional learning steps alone."""
         for _ in range(self.settings.settle_steps):
             before, state = state.evidence, self.value(state.chosen, state.posterior)
             if abs(state.evidence - before) < 0.1 * self.settings.need_nats:
@@ -214,7 +215,7 @@ class Search:
         return state
 
     def _exchanged(self, state: State) -> State | None:
-        """A likelier set with another cause in the place of one; None if there is none."""
+        """Replace one cause by another if the evidence increases; otherwise None."""
         cells = self.problem.cells
         for out in state.chosen:
             rest = [c for c in state.chosen if c is not out]
@@ -238,7 +239,7 @@ class Search:
         return None
 
     def _named(self, state: State) -> State:
-        """The set with kinds of which few members stand out named by these, where it is not far less likely."""
+        """Replace each "all joints" cause by its outlying members unless the evidence drops by ``within_nats``."""
         for kind in [c for c in state.chosen if c.group.members]:
             count = self.problem.cells.count
             without = self.value([c for c in state.chosen if c is not kind], state.posterior)
@@ -250,7 +251,7 @@ class Search:
         return state
 
     def _dissolved(self, state: State, without: State, kind: Group) -> State | None:
-        """The set with a kind's members beyond their tolerances in its place; None of more than half of them."""
+        """Replace an "all joints" cause by its members beyond tolerance; None if these are none or more than half."""
         p, healthy, far = state.posterior, self.problem.prior((), None), self.settings.apart**2
         at = [np.array(k) for k in kind.members]
         out = [tuple(k.tolist()) for k in at if np.any(p.mean[k] ** 2 > far * (p.variances[k] + healthy[k]))]
@@ -264,7 +265,7 @@ class Search:
         return self._pruned(self.settled(parts)) if out else None
 
     def rivals(self, without: State, own: Group) -> list[Chosen]:
-        """What may be in a cause's place: its linear gain is near that of the cause, at the noise without either."""
+        """Candidates to replace a cause: their linear gain is at most ``within_nats`` below its own."""
         gain = without.posterior.gain(own, self.settings.octaves)[0] + own.log_prior - self.against
         least = gain - self.settings.within_nats
         return [
@@ -273,7 +274,7 @@ class Search:
         ]  # fmt: skip
 
     def offers(self, state: State, *, late: bool = False) -> list[tuple[float, Chosen]]:
-        """Every group that a set has room for by its linear gain, the likeliest first."""
+        """All groups that fit into the set with their linear gain, the log odds at the present noise; largest first."""
         taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
 
         def fits(g: Group) -> bool:
@@ -282,9 +283,7 @@ class Search:
         cells, p = self.problem.cells, state.posterior
         proposed = [g for g in self.problem.proposals(p, late=late) if fits(g)]
         count, placed = cells.count, [self.problem.place(g) for g in proposed]
-        prior = np.zeros(
-            cells.count
-        )  # a search that was broken off may have left columns, or taken some away
+        prior = np.zeros(cells.count)  # an interrupted search may have left or removed columns
         prior[: len(p.prior)] = p.prior[: cells.count]
         wider = Posterior(cells, prior, p.variance)
         pairs = [*((g, g) for g in self.problem.groups if fits(g)), *zip(proposed, placed, strict=True)]
@@ -296,14 +295,14 @@ class Search:
         return sorted(out, key=lambda offer: -offer[0])
 
     def with_one(self, rest: Sequence[Chosen], chosen: Chosen, near: Posterior) -> State:
-        """A set with one cause more, whose columns are added where they are not in the problem."""
+        """Compute the set with one more cause; add its columns if the problem lacks them."""
         kind = chosen.group.cause if chosen.group.members else None
         if not chosen.group.columns:
             chosen = replace(chosen, group=self.problem.place(chosen.group))
         return self.value((*(c for c in rest if c.group.cause != kind), chosen), near)
 
     def _grown(self, state: State, *, late: bool = False) -> State | None:
-        """A set with one cause more that is likelier, its law's errors included; None if none is."""
+        """Add the best cause, with its law error, if the evidence increases; otherwise None."""
         cells = self.problem.cells
         count, tried = cells.count, []
         for chosen in self._likely(state, late=late):
@@ -324,9 +323,9 @@ class Search:
         return None
 
     def _likely(self, state: State, *, late: bool) -> list[Chosen]:
-        """Causes whose exact evidence is worth computing: the likeliest with the present noise, and with its floor.
+        """Preselect causes for exact evidence by linear gain, at the learnt noise and at the noise floor.
 
-        In a short log a band has few rows, and noise alone explains what a cause would.
+        A band of a short log has few rows, so the learnt noise can absorb the effect of a cause.
         """
         p, s = state.posterior, self.settings
         quiet = replace(state, posterior=Posterior(p.cells, p.prior, np.minimum(p.variance, self.floor)))
@@ -342,12 +341,12 @@ class Search:
         return out
 
     def formed(self, state: State) -> State:
-        """The set with the likeliest shape of its last cause, and its law's errors."""
+        """Refine the shape of the last cause, and add its law error."""
         state = self._moved(state)
         return self._with_errors(state, state.chosen[-1])
 
     def _with_errors(self, state: State, one: Chosen) -> State:
-        """The set with the errors of a cause's law, unless they alone are likelier than with their law."""
+        """Add the law error of a cause, unless the law error alone has the higher evidence."""
         forms = self.problem.forms(one.group, state.posterior.mean)
         if not forms:
             return state
@@ -363,7 +362,7 @@ class Search:
         return state
 
     def _moved(self, state: State) -> State:
-        """The set with its last cause in the likeliest shape nearby."""
+        """Move the last cause to the best neighbouring shape."""
         cells, (*rest, last) = self.problem.cells, state.chosen
         for _ in range(self.settings.event_steps):
             count, tried = cells.count, []
@@ -380,10 +379,12 @@ class Search:
         return state
 
     def _pruned(self, state: State, *, fresh: bool = True) -> State:
-        """The set without causes that it is likelier without; ``fresh``: the last is kept."""
+        """Drop causes while the evidence does not decrease; ``fresh``: keep the last one."""
         while len(state.chosen) > fresh:
             loose = state.chosen[: len(state.chosen) - fresh]
-            if any(c.group.late for c in state.chosen):  # a law of no table takes nothing from a listed cause
+            if any(
+                c.group.late for c in state.chosen
+            ):  # an unlisted law must not displace a clear listed cause
                 small, size = self.settings.within_nats, state.posterior.size
                 loose = tuple(c for c in loose if c.group.late or size(c.group.columns) < small)
             gone = [{c} for c in loose]
@@ -401,7 +402,7 @@ class Search:
         return state
 
     def tolerated(self, state: State, own: Chosen) -> float:
-        """Log evidence that a cause's columns add within their tolerance, at the noise learnt with the cause."""
+        """Log evidence that a cause's columns gain within their tolerance, at the noise learnt with the cause."""
         columns = sorted(own.group.columns)
         healthy = self.prior([c for c in state.chosen if c is not own], None)[columns]
         worth = state.posterior.worth
@@ -412,7 +413,7 @@ class Search:
         )
 
     def is_within_tolerance(self, state: State, own: Chosen) -> bool:
-        """Whether all values of a cause are within three of the tolerances that its kind, or else the machine, has."""
+        """Whether all values of a cause are within ``apart`` tolerances, scaled by the spread of the healthy values."""
         plain = next((g for g in self.problem.groups if g.key == own.group.key), None)
         if plain is None or len(plain.columns) != len(own.group.columns) or own.group.members:
             return False
@@ -426,7 +427,7 @@ class Search:
         return bool(np.all(p.mean[list(own.group.columns)] ** 2 < most))
 
     def _worth(self, state: State, out: Collection[Chosen]) -> float:
-        """Log evidence of causes beyond their odds, at the noise with them."""
+        """Log posterior odds of some causes, at the noise learnt with them."""
         kept = self.prior([c for c in state.chosen if c not in out], None)
         own = sorted({k for c in out for k in (*c.group.columns, *c.forms)})
         odds = sum(c.group.log_prior - self.against for c in out)
@@ -434,20 +435,19 @@ class Search:
 
 
 def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Array:
-    """Variances that the whole dictionary leaves, smoothed over neighbouring bands, shape (C, bands).
+    """Noise variances left by all causes together, smoothed over neighbouring bands, shape (C, bands).
 
     Args:
-        problem: columns.
+        problem: the columns.
         slabs: prior variances with every cause in the model, shape (K,).
-        settings: numbers.
+        settings: constants of the iteration.
     """
     cells = problem.cells
     power = np.array([c.squares for c in cells.channels]) / cells.rows
     least = problem.sensors
     if least is None:
         least = np.broadcast_to(settings.least_floor * power.min(axis=1, keepdims=True), power.shape)
-    # From below: noise that explains everything is a solution, too. Expectation and maximisation: MacKay's step is not
-    # safe with more columns than rows.
+    # Start from the smallest noise. Use expectation maximisation: MacKay's step is unsafe with more columns than rows.
     p = Posterior(cells, slabs, least)
     for _ in range(settings.floor_steps):
         left, fitted = p.left
@@ -462,23 +462,23 @@ def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Ar
 
 @dataclass
 class Until:
-    """When a search ends with what it has: after some time, or when the user breaks it off.
+    """Stop criterion of a search: a time limit or an interruption by the user.
 
     Attributes:
-        end_s: on the monotonic clock [s].
-        broken: whether it has been broken off.
+        end_s: time limit on the monotonic clock [s].
+        broken: whether the search was stopped.
     """
 
     end_s: float = math.inf
     broken: bool = False
 
     def __call__(self) -> bool:
-        """Whether to end."""
+        """Whether to stop."""
         self.broken = self.broken or time.monotonic() > self.end_s
         return self.broken
 
     def run(self, search: Search, state: State, bent: Bent = lambda state, new: False) -> State:
-        """The likeliest set; the best so far where it is broken off."""
+        """Run the search; after an interruption, return the best set so far."""
         try:
             return search.run(state, bent)
         except KeyboardInterrupt:

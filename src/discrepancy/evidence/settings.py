@@ -1,4 +1,4 @@
-"""Every number of the engine that decides."""
+"""Constants of the search."""
 
 from __future__ import annotations
 
@@ -7,39 +7,40 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Settings:
-    """Numbers of the search and of the noise.
+    """Constants of the search and of the noise model.
 
     Attributes:
-        floor_rows: observations that the noise's floor counts (20: a band of 0.25 Hz in 40 s).
-        spread_rows: observations that the nominal spread of a family of random effects counts.
-        least_spread: least learnt variance of random effects over their nominal one.
-        most_spread: most of a law's errors (1: a tenth of its trace).
-        form_share: standard deviation of a law's error, of the law's own trace, in each of its forms.
-        need_nats: log odds by which a set must be likelier to replace another (1: a factor of e).
-        cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
-        open_nats: log odds over nothing of what the laws of other causes leave where one is taken out. Fitted by log
-            score to arms with effects whose laws are not the table's: 9 to 14 score alike.
-        unlisted_share: the same of events and unlisted laws beside other unlisted laws, of what these explain.
+        floor_rows: pseudo-observations behind the noise floor (20: a band of 0.25 Hz in 40 s).
+        spread_rows: pseudo-observations behind the nominal spread of a family of random effects.
+        least_spread: lower limit of the learnt variance factor of random effects.
+        most_spread: upper limit of the variance factor of a law's errors (1: a tenth of its trace).
+        form_share: standard deviation of a law's error in each of its forms, relative to the law's trace.
+        need_nats: log odds by which a set must exceed another to replace it (1: a factor of e).
+        cause_nats: prior log odds against any one cause, in addition to the log of the number of causes.
+        open_nats: log odds over nothing that the errors of other causes' laws can take up if a cause is removed.
+            Fitted by log score to arms whose effects follow other laws than the table: 9 to 14 score alike.
+        unlisted_share: the same for events and unlisted laws beside other unlisted laws, as a share of the log evidence
+            of these laws.
         most_causes: largest set.
-        tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
-        tried_quiet: the same of those that are likeliest with the noise at its floor.
-        octaves: scales of a cause's prior, by halves from the slab down.
-        noise_steps: steps in which noise and spreads are learnt for a candidate.
-        settle_steps: times that is repeated at most for a set that is taken.
-        start_steps: the same where nothing was learnt before.
-        floor_steps: the same for the noise that the whole dictionary leaves.
-        floor_change: relative change of its variances below which that has settled.
-        rounds: times the problem is made linear again.
-        event_steps: times the instants of an event are moved.
-        apart: standard errors, or learnt tolerances, from which one of a kind stands out.
-        within_nats: linear gain below that of a cause beyond which a rival is not weighed (15: 3e-7 of its odds).
-        most_rivals: rivals that are weighed exactly.
-        named: least probability of the told set of a cause that is named.
-        scatter: tolerances (root mean square over a kind) from which a machine is miscalibrated.
-        noticed: standard errors beyond the threshold at which nine in ten are noticed: the normal quantile of 90 %.
-        plain: values are fitted with so many times their prior standard deviation, so that it shrinks nothing.
-        clean_chi2: squares left over the floor's variance, per row, up to which nothing is left to explain.
-        least_floor: least noise variance over the power of the quietest band, where the sensors' noise is not known.
+        tried: candidates with exact evidence in each step, selected by linear gain.
+        tried_quiet: additional candidates, selected by linear gain with the noise at its floor.
+        octaves: number of prior scales for a cause; each is half the one before, starting from the slab.
+        noise_steps: learning steps of noise and spreads for a candidate.
+        settle_steps: largest number of repetitions for an accepted set.
+        start_steps: learning steps without a nearby posterior to start from.
+        floor_steps: largest number of iterations for the noise floor.
+        floor_change: relative change of the floor's variances below which the iteration has converged.
+        rounds: number of repeated linearisations.
+        event_steps: number of refinements of an event's interval.
+        apart: standard errors, or learnt tolerances, beyond which a member of a kind is an outlier.
+        within_nats: linear gain below that of a cause beyond which an alternative is ignored (15: 3e-7 of its odds).
+        most_rivals: alternatives with exact evidence.
+        named: least probability that something is there, for a cause to be named.
+        scatter: deviation of a kind in tolerances (root mean square) beyond which a machine is miscalibrated.
+        noticed: standard errors beyond the threshold for a detection probability of 90 %: the normal quantile.
+        plain: factor on prior standard deviations for reported values, so that the prior does not shrink them.
+        clean_chi2: squared residuals over the floor's variance, per row, up to which the residual counts as noise.
+        least_floor: least noise variance over the power of the quietest band, if the sensor noise is unknown.
     """
 
     floor_rows: float = 20.0
@@ -75,4 +76,4 @@ class Settings:
 
 SETTINGS = Settings()
 ODDS = 0.05
-"""Odds of any cause being there before the data are seen. Derived: exp(-``cause_nats``)."""
+"""Prior odds of any one cause. Derived: exp(-``cause_nats``)."""

@@ -1,1 +1,1 @@
-"""What no table lists, as a formula: functions of one signal, and the law that they tell."""
+"""Formulas for unlisted laws: functions of one signal."""

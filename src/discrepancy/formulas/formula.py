@@ -1,4 +1,4 @@
-"""A formula for a function of one signal that was fitted as a free curve: the fewest terms that say the same."""
+"""Fit a sparse formula to a free curve of one signal."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from discrepancy.numbers import number
 from estimator.arrays import Array
 
 KNOTS, TRIED = 8, 40
-"""Knots of a curve that is told as such; values of a number inside a term that are tried."""
+"""Number of knots of a curve without a formula; number of grid values for a parameter inside a term."""
 STEP_S = 0.05
-"""In which a step is told to rise."""
+"""Rise time of a step [s]."""
 SIGN_SHARES = (0.03, 0.06, 0.12, 0.25, 0.5)
-"""Shares of a signal's spread up to which its sign fades; a curve's terms resolve the first."""
+"""Widths over which a sign term fades, relative to the signal's standard deviation; a curve can resolve the first."""
 Numbers = Sequence[float]
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A term: amplitudes times a function of the signal.
+    """A term of a formula: amplitudes times functions of the signal.
 
     Attributes:
-        name: as in the JSON and in ``mocobot_sim.laws.functions``, but for ``spline`` and ``step``.
-        of: signal (Q,) and numbers inside -> (Q, k), one amplitude each.
-        text: ``a`` is the amplitude, ``x`` the signal, ``n`` the number inside, ``p`` a phase.
-        power: of the signal in the amplitude's unit.
-        width: how many amplitudes.
-        inside: names of the numbers inside.
-        tried: values for them, by the signal.
-        fitted: whether data tell the number inside beside these.
+        name: identifier in JSON and in ``mocobot_sim.laws.functions``, which lacks ``spline`` and ``step``.
+        of: maps the signal (Q,) and the inner parameters to columns (Q, k), one for each amplitude.
+        text: template with amplitude ``a``, signal ``x``, inner parameter ``n`` and phase ``p``.
+        power: power of the signal, for the unit of the amplitude.
+        width: number of amplitudes.
+        inside: names of the inner parameters.
+        tried: returns grid values of the inner parameters for a signal.
+        fitted: whether the inner parameter is refined by a fit.
     """
 
     name: str
@@ -55,7 +55,7 @@ def _plain(name: str, of: Callable[[Array], Array], text: str, power: int) -> Sh
 def _knee(
     name: str, of: Callable[[Array, float], Array], text: str, at: Callable[[Array], Sequence[float]]
 ) -> Shape:
-    """A function with a knee somewhere; ``at``: where it is tried, where it is not fixed."""
+    """A term with a knee; ``at`` returns grid values for its position."""
     return Shape(
         name, lambda x, n: of(x, n[0])[:, None], text, 1, 1, ("knee",), lambda x: [(k,) for k in at(x)], True
     )
@@ -71,7 +71,7 @@ def _hats(x: Array, n: Numbers) -> Array:
 
 
 def _within(x: Array) -> list[float]:
-    """Values within most of those of a signal."""
+    """Grid of values between the 3 % and 97 % quantiles of a signal."""
     return [float(q) for q in np.quantile(x, np.linspace(0.03, 0.97, TRIED))]
 
 
@@ -95,7 +95,7 @@ SIGNED = (
     _plain("signed_square", lambda x: x * np.abs(x), "{a} {x} |{x}|", 2),
     _knee("beyond", _beyond, "{a} ({x} beyond +-{n})", lambda x: _within(np.abs(x))),
 )  # fmt: skip
-"""Terms of a signal that has both signs."""
+"""Terms for a signal with both signs."""
 OF_TIME = (
     Shape("warming", lambda x, n: -np.expm1(-x / n[0])[:, None], "{a} (1 - exp(-{x} / {n} s))", 0, 1, ("time_s",),
           lambda x: [(float(t),) for t in np.max(x) * np.geomspace(0.05, 2.0, TRIED)], fitted=True),
@@ -104,7 +104,7 @@ OF_TIME = (
 )  # fmt: skip
 SINE = Shape("sine", _wave, "{a} sin({n} {x} {p})", 0, 2, ("times",), fitted=True)
 TURNING = replace(SINE, fitted=False)
-"""A sine that comes again with a turn."""
+"""A sine with a whole number of periods in a turn."""
 HUM = Shape(
     "hum", lambda x, n: _wave(2.0 * np.pi * x, n), "{a} sin(2 pi {n} Hz {x} {p})", 0, 2, ("frequency_hz",)
 )
@@ -112,24 +112,24 @@ SPLINE = Shape("spline", _hats, "a curve of {x}", 0, KNOTS, ("low", "step"))
 
 
 MISSING = 0.2
-"""Share of a formula's power from which on the basis does not hold it. Chosen: what is left shows as another term."""
+"""Largest share of a formula's variance outside the span of the basis. Chosen: beyond it, other terms would appear."""
 BEGUN, SAMPLES = 12, 1000
-"""Likeliest terms that a second joins; samples at which formulas are compared."""
+"""Number of best single terms that are combined in pairs; number of samples for comparisons."""
 Kind = Literal["angle", "way", "time", "other"]
 Piece = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A free function of a signal as data have it.
+    """A free function of a signal, fitted to data.
 
     Attributes:
-        x: the signal at samples, shape (Q,).
-        basis: functions of it there, shape (Q, K); a constant is the first of them, or is left out of all.
-        mean, covariance: of their amplitudes, shapes (K,) and (K, K).
-        prior: variances with which these were fitted, shape (K,).
-        kind: of signal. What is a function of an angle [rad] comes again a whole number of times in a turn; on a way or
-            in time [s] it may come again; of others it does not.
+        x: signal at the samples, shape (Q,).
+        basis: basis functions at the samples, shape (Q, K); a constant, if present, is the first.
+        mean, covariance: of the amplitudes, shapes (K,) and (K, K).
+        prior: prior variances of the amplitudes, shape (K,).
+        kind: type of signal. A function of an ``angle`` [rad] is periodic with a turn. A function of a ``way`` [m] or
+            ``time`` [s] may be periodic. Others are not.
     """
 
     x: Array
@@ -141,16 +141,16 @@ class Curve:
 
     @cached_property
     def constant(self) -> bool:
-        """Whether the data tell a constant."""
+        """Whether the basis contains a constant."""
         return bool(np.ptp(self.basis[:, 0]) == 0.0)
 
     @cached_property
     def told(self) -> tuple[Array, Array, float]:
-        """Precision and score of the amplitudes by the data alone, shapes (K, K) and (K,), and what they gain."""
+        """Precision (K, K) and score (K,) of the amplitudes from data alone, and the curve's log-likelihood gain."""
         root = np.sqrt(self.prior)
         inverse = np.linalg.inv(self.covariance / np.outer(root, root))
         size, turn = np.linalg.eigh(inverse - np.eye(len(root)))
-        seen = size > 1.0  # of the others the prior says more than the data
+        seen = size > 1.0  # keep directions in which the data outweigh the prior
         turn = turn[:, seen] / root[:, None]
         precision = (turn * size[seen]) @ turn.T
         score = turn @ (turn.T @ (root**2 * (np.linalg.inv(self.covariance) @ self.mean)))
@@ -158,7 +158,7 @@ class Curve:
 
     @cached_property
     def project(self) -> Array:
-        """Amplitudes of the basis that are nearest to series, shape (K, Q)."""
+        """Least-squares projection of a series onto the basis, shape (K, Q)."""
         if self.constant:
             return np.asarray(np.linalg.pinv(self.basis), dtype=np.float64)
         rows = np.linalg.pinv(np.column_stack([np.ones(len(self.x)), self.basis]))[1:]
@@ -166,17 +166,17 @@ class Curve:
 
     @property
     def thinned(self) -> Curve:
-        """The same at few of its samples, as dense as these."""
+        """The curve at about ``SAMPLES`` of its samples, with the same distribution."""
         few = np.argsort(self.x, kind="stable")[:: max(len(self.x) // SAMPLES, 1)]
         return replace(self, x=self.x[few], basis=self.basis[few])
 
     def rows(self, x: Array) -> Array:
-        """The basis at values of the signal, shape (Q, K)."""
+        """The basis at given values of the signal, shape (Q, K)."""
         order = np.argsort(self.x)
         return np.stack([np.interp(x, self.x[order], b[order]) for b in self.basis.T], axis=1)
 
     def at(self, x: Array) -> tuple[Array, Array]:
-        """The free function and its standard error at values of the signal, shape (Q,) each."""
+        """The curve and its standard error at given values of the signal, shape (Q,) each."""
         rows = self.rows(x)
         return rows @ self.mean, np.sqrt(
             np.maximum(np.einsum("qk,kl,ql->q", rows, self.covariance, rows), 0.0)
@@ -185,15 +185,15 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """Terms with their amplitudes.
+    """A sum of terms with fitted amplitudes.
 
     Attributes:
-        terms: shapes, and the numbers inside each.
-        values: amplitudes of all terms, then a constant where that is told, then the fitted numbers inside.
-        covariance: of these.
-        constant: whether there is one.
-        loss: by how much the free curve is likelier [nats].
-        missing: share of the formula's power that the curve's basis does not hold.
+        terms: shapes with their inner parameters.
+        values: amplitudes of all terms, then the constant if present, then the fitted inner parameters.
+        covariance: covariance of ``values``.
+        constant: whether there is a constant.
+        loss: log-likelihood of the free curve minus that of the formula [nats].
+        missing: share of the formula's variance outside the span of the curve's basis.
     """
 
     terms: tuple[tuple[Shape, Numbers], ...]
@@ -205,20 +205,21 @@ class Formula:
 
     @property
     def function(self) -> str:
-        """Names of the terms."""
+        """Names of the terms, joined by plus signs."""
         return " + ".join(shape.name for shape, _ in self.terms) or "constant"
 
     def at(self, x: Array) -> Array:
-        """Values at those of the signal, shape (Q,)."""
+        """The formula at given values of the signal, shape (Q,)."""
         columns = _columns(self.terms, x, self.constant)
         return columns @ self.values[: columns.shape[1]]
 
     def through(self, x: Array, basis: Array, mean: Array) -> Formula:
-        """The same terms with amplitudes by other data.
+        """Fit the amplitudes of the same terms to another curve.
 
         Args:
-            x: the signal, shape (Q,).
-            basis, mean: functions of it there (Q, K) and their amplitudes (K,); a formula has more than they hold.
+            x: signal, shape (Q,).
+            basis, mean: basis functions (Q, K) and their amplitudes (K,). Only the part of the formula in their span is
+                fitted.
         """
         G = _columns(self.terms, x, self.constant)
         if not self.constant:
@@ -229,7 +230,7 @@ class Formula:
 
     @property
     def _each(self) -> Iterator[tuple[str, Shape, Numbers, slice, Sequence[int]]]:
-        """Ending of a term's names, the term, where its amplitudes and its fitted numbers are."""
+        """For each term: name suffix, shape, inner parameters, amplitude slice, indices of its fitted parameters."""
         k, inside = 0, sum(shape.width for shape, _ in self.terms) + self.constant
         for n, (shape, numbers) in enumerate(self.terms):
             fitted = list(range(inside, inside + len(numbers))) if inside < len(self.values) else []
@@ -238,7 +239,7 @@ class Formula:
 
     @property
     def parameters(self) -> dict[str, tuple[float, float | None]]:
-        """Amplitudes, phases, offset and numbers inside, each with its standard error, None of what was chosen."""
+        """Amplitudes, phases, offset and inner parameters with standard errors; None for those chosen from a grid."""
         out: dict[str, tuple[float, float | None]] = {}
         se = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         for end, shape, numbers, at, fitted in self._each:
@@ -267,7 +268,7 @@ class Formula:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Numbers inside the terms."""
+        """Inner parameters of the terms by name."""
         each = (
             (f"{n}{end}", x)
             for end, shape, numbers, _, _ in self._each
@@ -276,12 +277,12 @@ class Formula:
         return dict(each)
 
     def text(self, symbol: str, *, unit: Callable[[int], str] | None = None, scale: float = 1.0) -> str:
-        """The formula in symbols, or with its amplitudes.
+        """The formula as text, with symbols or with numbers.
 
         Args:
-            symbol: of the signal.
-            unit: of an amplitude by the signal's power that it multiplies; None: amplitudes are symbols.
-            scale: shown units of the error per own one.
+            symbol: symbol of the signal.
+            unit: returns the unit of an amplitude for a power of the signal; None: use symbols for amplitudes.
+            scale: displayed units per own unit.
         """
         known, out = self.parameters, []
 
@@ -299,7 +300,7 @@ class Formula:
         return " + ".join(out)
 
     def pieces(self) -> Iterator[Piece]:
-        """Functions of one amplitude each, as ``mocobot_sim.functions`` has them."""
+        """Split the formula into functions with one amplitude each, for ``mocobot_sim.functions``."""
         for _, shape, numbers, at, _ in self._each:
             a, n = self.values[at], [*numbers, 0.0]
             if len(a) == 2:
@@ -318,14 +319,15 @@ class Formula:
 
 
 def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
-    """The sparsest formula that says what a curve does, about as well; where there is none, the curve by its knots.
+    """Find the sparsest formula that matches a curve; if there is none, return the curve's values at knots.
 
-    As well is within what the curve's further amplitudes cost (half the logarithm of the samples each), or within a
-    law's own error (``form_share``) and what of a formula the basis does not hold.
+    A formula matches if its loss is below the larger of two limits. The first is the cost of the curve's additional
+    amplitudes, each half the logarithm of the number of samples. The second is a share of the curve's log-likelihood
+    gain: the square of ``form_share`` plus the share of the formula outside the span of the basis.
 
     Args:
-        curve: what data have of it.
-        hum_hz: of a sine and a cosine of time that are the basis, their frequency [Hz].
+        curve: the fitted curve.
+        hum_hz: frequency [Hz] if the basis is a sine and a cosine of time; None: any other basis.
     """
     if hum_hz is not None:
         return Formula(((HUM, (hum_hz,)),), curve.mean, curve.covariance, constant=False)
@@ -344,7 +346,7 @@ def formula_of(curve: Curve, hum_hz: float | None = None) -> Formula:
 
 
 def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
-    """The likeliest that is good enough, the plainest of some that are alike; with its numbers inside fitted."""
+    """The best matching formula with refined inner parameters; among nearly equal ones, the first in ``fits``."""
     sizes = [len(f.values) + sum(shape.fitted for shape, _ in f.terms) for f in fits]
     free, seen = curve.told[2], int(np.linalg.matrix_rank(curve.told[0], hermitian=True))
     good = [
@@ -358,11 +360,11 @@ def _best(curve: Curve, fits: Sequence[Formula], cost: float) -> Formula | None:
 
 
 def _terms(curve: Curve) -> Iterator[tuple[Shape, Numbers]]:
-    """Every term with every number inside that is tried."""
+    """All terms at all grid values of their inner parameters."""
     signed = np.min(curve.x) < 0.0 < np.max(curve.x)
     shapes = [*PLAIN, *(OF_TIME if curve.kind == "time" else SIGNED if signed else ()), ABOVE, BELOW]
     yield from ((shape, numbers) for shape in shapes for numbers in shape.tried(curve.x))
-    least = math.pi / max(float(np.ptp(curve.x)), 1e-300)  # half a wave
+    least = math.pi / max(float(np.ptp(curve.x)), 1e-300)  # half a period
     most = least * curve.basis.shape[1]
     if curve.kind == "angle":
         yield from ((TURNING, (float(w),)) for w in np.arange(1.0, most + 1.0))
@@ -376,7 +378,7 @@ def _columns(terms: Sequence[tuple[Shape, Numbers]], x: Array, constant: bool) -
 
 
 def _fitted(curve: Curve, terms: Sequence[tuple[Shape, Numbers]], more: Array | None = None) -> Formula:
-    """Terms with the amplitudes that data give them; ``more``: columns by the numbers inside, shape (Q, m)."""
+    """Fit the amplitudes of terms to the curve; ``more``: derivative columns by inner parameters, shape (Q, m)."""
     G = _columns(terms, curve.x, curve.constant)
     G = G if more is None else np.column_stack([G, more])
     P, (precision, score, free) = curve.project @ G, curve.told
@@ -393,7 +395,7 @@ def _fitted(curve: Curve, terms: Sequence[tuple[Shape, Numbers]], more: Array | 
 
 
 def _settled(curve: Curve, found: Formula, rounds: int = 8) -> Formula:
-    """The same with the numbers inside fitted, by Gauss-Newton steps that do not make it less likely."""
+    """Refine the inner parameters by Gauss-Newton steps while the loss decreases."""
     free = [k for k, (shape, _) in enumerate(found.terms) if shape.fitted]
     for _ in range(rounds if free else 0):
         slopes = [_slope(curve, found, k) for k in free]
@@ -411,7 +413,7 @@ def _settled(curve: Curve, found: Formula, rounds: int = 8) -> Formula:
 
 
 def _slope(curve: Curve, found: Formula, k: int) -> Array:
-    """Change of the formula by the number inside its k-th term, shape (Q,)."""
+    """Derivative of the formula by the inner parameter of its k-th term, shape (Q,)."""
     (shape, numbers), step = (
         found.terms[k],
         1e-4 * (abs(found.terms[k][1][0]) + 1e-3 * float(np.std(curve.x))),
@@ -422,7 +424,7 @@ def _slope(curve: Curve, found: Formula, k: int) -> Array:
 
 
 def _knots(curve: Curve) -> Formula:
-    """The curve by its values at knots."""
+    """The curve as values at equidistant knots."""
     low, high = np.quantile(curve.x, [0.01, 0.99])
     step = float(high - low) / (KNOTS - 1)
     rows = curve.rows(low + step * np.arange(KNOTS))

@@ -1,4 +1,4 @@
-"""What no table lists, told: a function of a signal at a place, by a formula or by its curve."""
+"""An unlisted law: an error that is a function of a signal, given by a formula or a curve."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from discrepancy.numbers import SMALL, fitting
 from estimator.arrays import Array
 
 TRACE_S = 0.3
-"""Between points of a law's trace [s]."""
+"""Time between points of a trace [s]."""
 
 OFF_BY = " is off by "
-"""Between place and formula of a sentence."""
+"""Text between place and formula in a sentence."""
 INSIDE = {"time_s": "s", "at_s": "s", "frequency_hz": "Hz", "times": "rad"}
-"""Units of numbers inside a term; others have the signal's, ``times`` this over the signal's."""
+"""Units of inner parameters; others have the signal's unit, and ``times`` has this unit per signal unit."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Of:
     """A signal.
 
     Attributes:
-        name: as in the JSON and in the simulator.
-        words, symbol, unit: for people.
+        name: identifier in JSON and in the simulator.
+        words, symbol, unit: for display.
     """
 
     name: str
@@ -38,15 +38,15 @@ class Of:
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """An error at a place that is a function of a signal, times another one where one is given.
+    """An error at a place that is a function of one signal, optionally times another signal.
 
     Attributes:
-        place: its name in the JSON; ``robot`` and ``joint`` from 1, or None.
-        target: the simulator's name of what it adds to.
-        unit: of the error.
-        of, times: signals.
-        formula: of the error.
-        traces: by trial ``time_s``, ``signal``, and by component ``error``, ``se`` and ``law``.
+        place: identifier of the place in JSON; ``robot`` and ``joint`` count from 1, or None.
+        target: the simulator's name of the quantity to which the error is added.
+        unit: unit of the error.
+        of, times: argument of the function, and the signal that multiplies it.
+        formula: the function.
+        traces: for each trial ``time_s``, ``signal``, and by component ``error``, ``se`` and ``law``.
     """
 
     place: str
@@ -61,13 +61,13 @@ class Law:
 
     @property
     def numbers(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Its numbers by name, and their standard errors."""
+        """Parameters by name, and their standard errors."""
         known = self.formula.parameters
         errors = {name: se for name, (_, se) in known.items() if se is not None}
         return {name: value for name, (value, _) in known.items()}, errors
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values; ``discrepancy.result.json`` documents the keys."""
+        """Convert to plain JSON values; ``discrepancy.result.json`` documents the keys."""
         text = self.formula.text(self.of.symbol)
         return {
             "place": self.place, "unit": self.unit, "targets": [self.target], "function": self.formula.function,
@@ -77,7 +77,7 @@ class Law:
         }  # fmt: skip
 
     def sentence(self, lead: str) -> str:
-        """What it does, with its numbers; ``lead``: its place in words."""
+        """A sentence with the formula and its numbers; ``lead`` is the place in words."""
         formula, said = self.formula, self.of.words
         signals = [
             s for s in (self.of, self.times) if s and s.name != "time" and formula.function != "constant"
@@ -98,14 +98,14 @@ class Law:
         return f"{lead}{OFF_BY}{f'({text}) {self.times.symbol}' if self.times else text}{where}"
 
     def pieces(self) -> Iterator[Piece]:
-        """The law as functions of one amplitude each, which is how simulators take it."""
+        """Split the law into functions with one amplitude each, in the form that simulators take."""
         for piece in self.formula.pieces():
             times = self.times.name if self.times else ""
             yield {"target": self.target, "of": self.of.name, "times": times} | piece
 
     @property
     def _shown(self) -> tuple[str, float]:
-        """Unit of the error in which amplitudes are easy to read, and the factor to it."""
+        """Readable unit of the error for its amplitudes, and the factor to it."""
         sizes = [
             abs(x) for name, (x, _) in self.formula.parameters.items() if name.startswith(("ampl", "offset"))
         ]
@@ -117,7 +117,7 @@ class Law:
         return fitting(self.unit, max(sizes)) if alone else (self.unit, 1.0)
 
     def _unit_of(self, name: str) -> str:
-        """Unit of a parameter; a pure number has an empty one."""
+        """Unit of a parameter; empty for a pure number."""
         stem, _, end = name.rpartition("_")
         which, stem = (int(end) - 1, stem) if end.isdigit() and stem != "at_knot" else (0, name)
         if stem == "times":
@@ -128,7 +128,7 @@ class Law:
         return "rad" if stem.startswith("phase") else INSIDE.get(stem, self.of.unit)
 
     def _amplitude(self, power: int, unit: str = "") -> str:
-        """Unit of an amplitude by the signal's power that it multiplies."""
+        """Unit of an amplitude that multiplies a power of the signal."""
         above, below = unit or self.unit, [self.of.unit] * power + ([self.times.unit] if self.times else [])
         if self.unit in below and not unit:
             below.remove(self.unit)
@@ -154,15 +154,15 @@ def traces(
     *,
     shift: bool = True,
 ) -> list[dict[str, Any]]:
-    """Traces of a law, a point each ``TRACE_S``.
+    """Sample the curve and the formula of a law every ``TRACE_S``.
 
     Args:
-        time: of each trial [s].
-        x: the signal in all trials one after another, shape (Q,).
-        times: what multiplies the function, shape (Q,).
-        curve, se: the free function and its standard error, shape (Q,).
-        formula: what says it.
-        shift: whether a constant is not the law's own: the formula is shown about its mean, as the curve is.
+        time: sample times of each trial [s].
+        x: signal in all trials, concatenated, shape (Q,).
+        times: signal that multiplies the function, shape (Q,).
+        curve, se: the free curve and its standard error, shape (Q,).
+        formula: the formula of the law.
+        shift: whether to subtract the formula's mean, because the curve has no constant.
     """
     own = formula.at(x)
     series = x, times * curve, np.abs(times) * se, times * (own - float(np.mean(own)) * shift)
@@ -178,5 +178,5 @@ def traces(
 
 
 def _grouped(unit: str) -> str:
-    """In parentheses unless it is one symbol."""
+    """Put a unit into parentheses unless it is one symbol."""
     return unit if unit.isalpha() else f"({unit})"

@@ -1,1 +1,1 @@
-"""Any robot of hinges and slides as a machine of the engine: signals, causes, columns."""
+"""Diagnosis of one robot of revolute and prismatic joints: signals, causes and regressor columns."""

@@ -1,4 +1,4 @@
-"""Causes at a joint, one entry each: what one unit of each number adds to the measured torque."""
+"""Table of causes at a joint with their regressor columns, and of all other causes with their sentences."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ SLIDES = {
     "Nms_per_rad": "Ns_per_m", "Nm_per_rad": "N_per_m", "rad_per_Nm": "m_per_N", "rad_per_s": "m_per_s", "Nm": "N",
     "rad": "m", "kgm2": "kg",
 }  # fmt: skip
-"""Units in names, of a joint that turns and of one that slides."""
+"""Unit suffixes of parameter names: revolute joint to prismatic joint."""
 SHOWN = {
     "N m s/rad": "N s/m", "N m/rad": "N/m", "mrad per N m": "mm per N", "N m": "N", "mrad": "mm", "rad": "m",
     "rad/s": "m/s", "kg m^2": "kg",
 }  # fmt: skip
-"""The same as sentences show them."""
+"""The same for units in sentences."""
 
 
 def parameter_name(name: str, *, slide: bool) -> str:
-    """Name of a parameter with the unit of a joint that turns or slides."""
+    """Convert the unit suffix of a parameter name to that of a prismatic joint if ``slide``."""
     for turning, sliding in SLIDES.items() if slide else ():
         if name.endswith(f"_{turning}"):
             return f"{name.removesuffix(turning)}{sliding}"
@@ -33,18 +33,18 @@ def parameter_name(name: str, *, slide: bool) -> str:
 
 
 def joint_in_words(joint: int, called: str) -> str:
-    """``joint 3 (elbow)``; the number alone where the name says no more."""
+    """A joint in words, as in ``joint 3 (elbow)``; the number alone if the name adds nothing."""
     plain = re.fullmatch(rf"(joint|j|axis|link)?[ _-]?0*{joint}", called, re.IGNORECASE)
     return f"joint {joint}" if plain or not called else f"joint {joint} ({called})"
 
 
 def link_in_words(body: str) -> str:
-    """``link hand``; the name alone where that says it is a link."""
+    """A link in words, as in ``link hand``; the name alone if it contains "link"."""
     return body if re.search(r"\blink", body, re.IGNORECASE) else f"link {body}"
 
 
 def titled(title: str, place: str = "") -> str:
-    """A title such as ``friction in {joint}`` at its place; without one, wherever it is."""
+    """Fill the place into a title such as ``friction in {joint}``; without a place, use "a joint"."""
     return re.sub(r"\{(.*?)\}", lambda part: place or _some(part[1]), title)
 
 
@@ -54,11 +54,11 @@ def _some(part: str) -> str:
 
 @dataclass(frozen=True)
 class Said(Numbers):
-    """Numbers of one cause, to be put into a sentence about its place.
+    """Parameters of one cause for a sentence about its place.
 
     Attributes:
         place: in words.
-        slide: whether its joint slides.
+        slide: whether the joint is prismatic.
         than: what it is compared with, such as ``than modelled``.
     """
 
@@ -73,16 +73,16 @@ class Said(Numbers):
         return super().either(self._name(name), more, less)
 
     def value(self, name: str) -> float:
-        """A number, by its name at a joint that turns; 0 where there is none."""
+        """Value of a parameter by its name for a revolute joint; 0 if it is missing."""
         return self.values.get(self._name(name), 0.0)
 
     def also(self, text: str, name: str, unit: str) -> str:
-        """A text with a number that was chosen, not fitted, in place of ``{}``; nothing where there is none."""
+        """Fill a chosen (not fitted) parameter into a text at ``{}``; empty if the parameter is missing."""
         found = self.values.get(self._name(name))
         return "" if found is None else text.format(number(found, None, self._unit(unit)))
 
     def point(self, unit: str, scale: float) -> str:
-        """``(x, y, z) unit``, of parameters such as ``x_m``."""
+        """Position or force vector ``(x, y, z) unit`` from parameters such as ``x_m``."""
         names = [name for name in self.values if re.fullmatch(r"[xyz]_\w+", name)]
         return f"({', '.join(number(self.values[n], self.se.get(n), '', scale) for n in names)}) {unit}"
 
@@ -96,16 +96,16 @@ class Said(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class JointSignals:
-    """One joint of one log, W samples.
+    """Signals of one joint in one log, W samples.
 
     Attributes:
         q, v, a: position [rad or m] and its derivatives, shape (W,).
-        direction: of the motion, -1 to 1, shape (W,).
-        load: torque that the model asks for without friction and rotor [N m or N], shape (W,).
-        asked: the same with friction, shape (W,).
-        torque: as measured, shape (W,).
+        direction: direction of motion from -1 to 1, shape (W,).
+        load: modelled torque without friction and rotor inertia [N m or N], shape (W,).
+        asked: modelled torque with friction and rotor inertia [N m or N], shape (W,).
+        torque: measured torque, shape (W,).
         t: time [s], shape (W,).
-        span: sizes over all logs.
+        span: typical sizes over all logs.
     """
 
     q: Array
@@ -126,12 +126,12 @@ class JointSignals:
 
 @dataclass(frozen=True)
 class Span:
-    """Sizes of one joint over all logs, which priors are made of.
+    """Typical sizes of one joint over all logs, from which priors are derived.
 
     Attributes:
         torque, speed, acceleration: root mean squares.
-        travel, middle: range of the position, and its middle.
-        until_s: duration of the longest log [s].
+        travel, middle: range of the position, and its centre.
+        until_s: latest sample time in all logs [s].
     """
 
     torque: float
@@ -144,21 +144,21 @@ class Span:
 
 @dataclass(frozen=True)
 class JointCause:
-    """One cause at a joint.
+    """One cause at a joint with k parameters.
 
     Attributes:
-        name: as in results.
-        title: in words; ``{joint}`` is the place.
-        parameters: names with units of joints that turn, k of them.
-        columns: of (signals, shape), k series (W,) in N m or N per unit.
-        slab: of (span, shape), prior standard deviations if the cause is there, k of them.
-        shapes: numbers inside the columns that are tried.
-        positive: parameters that, with the model's own, cannot be negative.
-        kind: whether all joints may have it alike: a cause of the robot.
-        loose: how far its law may be off, over what is usual; friction has no exact law.
-        rubs: of (first parameter, span), how much dry friction that is at rest; None: none.
-        sentence: what it does, with its numbers and place; None for a list of the numbers.
-        separate: the experiment that parts it from what looks like it.
+        name: identifier in results.
+        title: name in words; ``{joint}`` stands for the place.
+        parameters: k parameter names with units of a revolute joint.
+        columns: function of (signals, shape) that returns k series (W,) [N m or N per unit].
+        slab: function of (span, shape) that returns the k prior standard deviations if the cause is present.
+        shapes: shapes to try: parameters that the columns depend on nonlinearly.
+        positive: parameters that cannot be negative in sum with the model's own value.
+        kind: whether all joints may have it alike, as a cause of the whole robot.
+        rubs: function of (first parameter, span) that returns the Coulomb friction at rest; None: no friction at rest.
+        loose: factor on the usual error of its law; friction laws are inexact.
+        sentence: its effect with values and place; None: list the values.
+        separate: experiment that separates it from similar causes.
     """
 
     name: str
@@ -177,7 +177,7 @@ class JointCause:
 
 @dataclass(frozen=True, eq=False)
 class OtherCause:
-    """One cause that is more than columns of one joint; attributes as of ``JointCause``."""
+    """One cause that is more than columns of one joint; attributes as in ``JointCause``."""
 
     name: str
     title: str
@@ -356,7 +356,7 @@ CAUSES = (
         separate="Pass the same way at several speeds: what depends on the place stays there.",
     ),
 )  # fmt: skip
-"""At one joint."""
+"""Causes at one joint."""
 AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
 POINT = ("x_m", "y_m", "z_m")
 OTHERS = (
@@ -448,8 +448,8 @@ OTHERS = (
         "Move this joint alone, at several speeds, in several poses and under several loads.",
     ),
 )  # fmt: skip
-"""At a link, at two joints or on the whole robot, and what no table lists."""
+"""Causes at a link, at two joints or on the whole robot, and the unlisted cause."""
 WORDS: dict[str, JointCause | OtherCause] = {cause.name: cause for cause in (*CAUSES, *OTHERS)}
 """Every cause by its name."""
 LINKS = frozenset(cause.name for cause in OTHERS if "{link}" in cause.title)
-"""Causes whose place is a link, which may be called as a joint is."""
+"""Causes at a link; a link may have the same name as a joint."""

@@ -1,4 +1,4 @@
-"""From logs of a robot's joints to the likeliest causes, and the rows of these in time."""
+"""Find the likeliest causes in the logs of a robot's joints, and express the rows of the result in time."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from mocobot_logs.joints.joint_log import JointLog
 
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
-"""Columns around whose values the problem is made linear again."""
+"""Labels of columns whose values define the linearisation point."""
 CURVED = ("gravity_direction", "joint_zero", "link_length", "torque_delay")
-"""Causes that change torques as a curve: what else there is shows only around their values."""
+"""Causes with nonlinear effects: other causes show only after linearisation around their values."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
-        problem: linear around what was found.
-        search: on it.
+        problem: the problem, linearised around the result.
+        search: the search on this problem.
         state: the likeliest set.
-        nothing: the search on the problem that is linear around the model as it is; None: this one is.
-        finished: whether the search came to its end.
+        nothing: the search on the problem linearised around the model as it is; None: ``search`` is that search.
+        finished: whether the search completed.
     """
 
     problem: JointProblem
@@ -53,18 +53,18 @@ def diagnose(
     model: SerialModel, logs: Sequence[JointLog] | Trials, settings: Settings = SETTINGS,
     say: Callable[[str], object] = lambda _: None, given: Given | None = None, until: Until | None = None,
 ) -> Outcome:  # fmt: skip
-    """The likeliest causes of what a model leaves of its robot's torques.
+    """Find the likeliest causes of the residual torques of a model.
 
-    The problem is made linear again around what was found until the set stays. A set takes another's place only
-    where it is likelier with each linear around itself.
+    The problem is linearised again around the result until the set no longer changes. A set replaces another only
+    if its evidence is higher, with each linearised around itself.
 
     Args:
         model: the robot as described.
-        logs: of its joints, with torques, or trials of them.
-        settings: numbers of the engine.
-        say: takes a line about each step.
-        given: what the problem takes besides.
-        until: when to end with the best so far.
+        logs: joint logs with torques, or trials.
+        settings: constants of the search.
+        say: receives a line of text about each step.
+        given: options of the problem.
+        until: stop criterion.
     """
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
@@ -77,7 +77,7 @@ def diagnose(
 
     first = Outcome(problem, search, until.run(search, search.fixed(()), bent), finished=not until.broken)
     if given.changed is not None or until():
-        return first  # what is wrong in all logs has no values of its own to be linear around
+        return first  # with a reference, the common model error has no linearisation point
     again = partial(_around, smooth=smooth, given=given)
     around = again(first, floor=None)
     for _ in range(settings.rounds):
@@ -88,13 +88,13 @@ def diagnose(
         around = found if found.state.keys == around.state.keys else around
         other = again(found, floor=around.search.floor)
         if other.state.evidence < around.state.evidence + settings.need_nats:
-            break  # linear around itself, the set is no likelier
+            break  # no improvement after linearisation around the set
         around = other
     return replace(around, nothing=search, finished=not until.broken)
 
 
 def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: Array | None) -> Outcome:
-    """The same set, linear around its own values; noise about a floor, or about one of its own."""
+    """Linearise around a result's values and compute its set again; ``floor`` None: compute a new noise floor."""
     x = found.state.posterior.mean
     values = {
         label: float(x[i])
@@ -119,7 +119,7 @@ def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: A
 
 
 def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
-    """Values and standard errors of the chosen causes' columns, by label, fitted with priors that shrink nothing."""
+    """Values and standard errors of the chosen causes by column label, fitted with priors too wide to shrink them."""
     state = outcome.state
     prior = state.posterior.prior.copy()
     for c in state.chosen:
@@ -139,13 +139,13 @@ def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Rows of one part in time.
+    """Rows of one part as time series.
 
     Attributes:
         residual, columns: shapes (n, C) and (n, C, K).
-        time: on the log's clock [s], shape (n,).
-        rate_hz: of the rows.
-        unit: by which they are larger in physical units.
+        time: log time [s], shape (n,).
+        rate_hz: sampling rate of the rows.
+        unit: factor from rows to physical units.
     """
 
     residual: Array
@@ -155,12 +155,12 @@ class Series:
     unit: float
 
     def left(self, x: Array) -> Array:
-        """What values leave, in physical units, shape (n, C)."""
+        """Residual after subtracting the columns at values x, in physical units, shape (n, C)."""
         return (self.residual - self.columns @ x) * self.unit
 
 
 def parts_of(outcome: Outcome, trials: Trials) -> tuple[Parts, tuple[Series, ...]]:
-    """The rows of a search, cut into parts."""
+    """Split the rows of a search result into the parts of the trials."""
     whole, state, problem = outcome.problem.cells, outcome.state, outcome.problem
     active = np.flatnonzero(state.posterior.prior)
     by_run, each, out = _in_time(whole, active), [], []
@@ -171,7 +171,7 @@ def parts_of(outcome: Outcome, trials: Trials) -> tuple[Parts, tuple[Series, ...
     for k, at in trials.parts:
         residual, columns = by_run[k]
         own = trials.runs[k]
-        share = len(residual) / len(own.time)  # fewer samples than the log has
+        share = len(residual) / len(own.time)  # ratio of row samples to log samples
         here = slice(round(at.start * share), max(round(at.stop * share), round(at.start * share) + 2))
         residual, columns = residual[here], columns[here]
         rate = own.rate_hz * share
@@ -185,7 +185,7 @@ def parts_of(outcome: Outcome, trials: Trials) -> tuple[Parts, tuple[Series, ...
 
 
 def _in_time(cells: Cells, active: NDArray[np.intp]) -> list[tuple[Array, Array]]:
-    """Rows of each run as series in time: the residual (n, C) and columns (n, C, K); white noise keeps its variance."""
+    """Transform the rows of each run into time series (n, C) and (n, C, K); white noise keeps its variance."""
     place = {int(k): i for i, k in enumerate(active)}
     counts = [len(cells.bands.of_trial(t)) for t in range(len(cells.bands.lengths))]
     out = [
@@ -205,7 +205,7 @@ def _in_time(cells: Cells, active: NDArray[np.intp]) -> list[tuple[Array, Array]
 
 
 def _cells(residual: Array, columns: Array, seen: Sequence[NDArray[np.intp]], bands: Bands) -> Cells:
-    """Gram matrices of one part's rows in time."""
+    """Gram matrices of one part from its time series."""
     cells = Cells.of(bands, [residual])
     for c, channel in enumerate(cells.channels):
         X = np.asarray(dct(columns[:, c, seen[c]], axis=0, norm="ortho"))[: len(bands.of_trial(0))][

@@ -1,4 +1,4 @@
-"""A verdict on a robot of joints as JSON values with words, text and folder."""
+"""A verdict on joint logs as JSON values with words, as text and as a result folder."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from mocobot_sim.serial.extended import write_extended as write_model
 
 
 def verdict_to_dict(verdict: JointVerdict, rollouts: Mapping[str, Any] | None = None) -> Values:
-    """The verdict as plain JSON values.
+    """Convert the verdict to plain JSON values.
 
     Args:
-        verdict: what was found.
-        rollouts: what rollouts said, or None.
+        verdict: the verdict.
+        rollouts: result of ``rolled.rolled_out``, or None.
     """
     return JointValues(verdict).values(_gain(verdict), rollouts=rollouts)
 
 
 class JointValues(Told):
-    """A verdict on a robot of joints as values with words."""
+    """Converts a verdict on joint logs to JSON values with words."""
 
     machine = "joints"
     verdict: JointVerdict
@@ -48,7 +48,7 @@ class JointValues(Told):
         self.than = "than in the reference" if verdict.reference else "than modelled"
 
     def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
-        """Cause and place, in words too."""
+        """Cause and place as JSON values and in words."""
         title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
         if "{pair}" in title and joint is not None and partner is None:
             partner = joint - 1  # a drive is shared with the joint before
@@ -70,7 +70,7 @@ class JointValues(Told):
         return super().finding(f) | words_of(f, self.where(f.cause, f.place, f.joint))
 
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
-        """What a finding does, with its numbers; for a kind with their medians."""
+        """Sentence on the effect of a finding with its values; for several members, with their medians."""
         if f.law is not None:
             what = "position reading" if f.law.place == "joint position" else "torque"
             return f"{f.law.sentence(f'The {what} of {place}')}."
@@ -107,7 +107,7 @@ class JointValues(Told):
 
 
 def _gain(verdict: JointVerdict) -> Values | None:
-    """Torques predicted without and with the findings."""
+    """Prediction errors without and with the findings, as JSON values."""
     if not verdict.predictions:
         return None
     predictions, known = verdict.predictions, _known(verdict)
@@ -135,12 +135,12 @@ def _gain(verdict: JointVerdict) -> Values | None:
 
 
 def unit_of(model: SerialModel, joint: int) -> str:
-    """Unit of a joint's torque, by its number from 0."""
+    """Unit of a joint's torque; joints count from 0."""
     return "N" if model.slides[joint] else "N m"
 
 
 def _known(verdict: JointVerdict) -> list[int]:
-    """Joints whose torques were predicted in all trials."""
+    """Indices of the joints whose torques were predicted in all trials."""
     sizes = np.array([[f.before, f.after, f.noise, f.torque] for f in verdict.predictions])
     there = np.isfinite(sizes).all(axis=(0, 1)) & (sizes[:, 2:] > 0.0).all(axis=(0, 1))
     return [int(j) for j in np.flatnonzero(there)]
@@ -151,7 +151,7 @@ def _means(each: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def _signature(verdict: JointVerdict, which: str) -> Values:
-    """Where the misfit is, by joint and trial; ``before`` or ``after``."""
+    """Distribution of the misfit by joint and trial, ``before`` or ``after`` the findings."""
     known, joints = _known(verdict) if verdict.predictions else [], verdict.model.joints
     squares: list[Array] = [
         np.square(getattr(f, which) / np.where(f.noise > 0, f.noise, 1.0)) for f in verdict.predictions
@@ -173,10 +173,10 @@ def _signature(verdict: JointVerdict, which: str) -> Values:
 
 @dataclass(frozen=True, eq=False)
 class JointDiagnosed(Diagnosed[JointVerdict]):
-    """A verdict with what rollouts say.
+    """A verdict with the results of rollouts.
 
     Attributes:
-        verdict: of the engine.
+        verdict: the verdict.
         rollouts: plain JSON values, or None.
     """
 
@@ -205,10 +205,10 @@ class JointDiagnosed(Diagnosed[JointVerdict]):
 
 
 def write_extended(verdict: JointVerdict, folder: Path) -> None:
-    """Write the model with the findings in it into a new folder.
+    """Write the extended model, which contains the findings, into a new folder.
 
     Raises:
-        InputError: the folder cannot be written, MuJoCo refuses the model, or files in it are not its own.
+        InputError: the folder cannot be written, MuJoCo refuses the model, or it refers to files outside its folder.
     """
     effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
     spec = load_spec(verdict.model.path)

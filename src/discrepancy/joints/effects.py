@@ -1,4 +1,4 @@
-"""Findings in physical values, as effects of the simulator, and the model with them in it, to take away."""
+"""Convert findings to physical values and to effects of the simulator."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from mocobot_sim.serial.effects import RobotEffect
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
 ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push")
 LEAST_KG = 1e-3
-"""Mass of a payload below which it has no centre."""
+"""Least payload mass with a defined centre of mass [kg]."""
 
 
 def physical(
     problem: JointProblem, group: Group, x: Array, covariance: Array
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Values and standard errors by name.
+    """Values and standard errors of a group's parameters in physical units, by name.
 
     Args:
-        problem: of the group.
-        group: a cause at a place, or one of its members at that.
-        x, covariance: of these columns, shapes (k,) and (k, k).
+        problem: the problem of the group.
+        group: a cause at a place, or at the place of one member.
+        x, covariance: values of its columns and their covariance, shapes (k,) and (k, k).
     """
     names = NAMES[group.cause]
     if group.cause == "link_mass" and len(x) > 1:
@@ -71,7 +71,7 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
 
 
 def axes_of_tilt(gravity: Array) -> Array:
-    """Two horizontal axes: the one nearest to x (to y where that is up), and up times it, shape (2, 3)."""
+    """Two horizontal unit vectors: the one nearest to x (to y if x is vertical), and up times it, shape (2, 3)."""
     up = -gravity / np.linalg.norm(gravity)
     axis = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     first = axis - up * (axis @ up)
@@ -80,7 +80,7 @@ def axes_of_tilt(gravity: Array) -> Array:
 
 
 def load_of(moments: Array) -> Array:
-    """Mass, centre, and inertia about it (xx, yy, zz, xy, xz, yz) from ten parameters about the link's frame."""
+    """Mass, centre of mass and central inertia (xx, yy, zz, xy, xz, yz) from ten parameters about the link frame."""
     m = moments[0] if abs(moments[0]) > LEAST_KG else LEAST_KG
     c = moments[1:4] / m
     about = c @ c * np.eye(3) - np.outer(c, c)
@@ -90,7 +90,7 @@ def load_of(moments: Array) -> Array:
 
 
 def absolute(problem: JointProblem, group: Group) -> dict[str, Any]:
-    """Numbers inside a cause's columns, with those in physical units that simulations need."""
+    """Shape parameters of a cause, with the physical values that a simulation needs."""
     shape: dict[str, Any] = dict(group.shape)
     if group.place not in problem.model.joints:
         return shape
@@ -113,15 +113,15 @@ def absolute(problem: JointProblem, group: Group) -> dict[str, Any]:
 
 LINKS = ("link_mass", "link_com", "link_inertia", "payload")
 LATE = ("gravity_compensation",)
-"""What acts on all masses, and so goes into a model after them."""
+"""Causes that act on all masses, to be applied after those that change masses."""
 
 
 def effects_of(finding: Finding, model: SerialModel) -> list[RobotEffect]:
-    """A finding as the simulator's effects, one a member; one without numbers of what no table lists.
+    """Convert a finding to effects of the simulator, one for each member; an unlisted law gets no parameters.
 
     Args:
         finding: with values in physical units.
-        model: that it is about.
+        model: the diagnosed model.
     """
     members = () if finding.law else finding.members
     members = members or (Member(finding.place, finding.joint, {}, {}),)
@@ -130,18 +130,18 @@ def effects_of(finding: Finding, model: SerialModel) -> list[RobotEffect]:
 
 
 def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[Finding, RobotEffect]]:
-    """Effects in the order in which they go into a model, each with its finding."""
+    """Effects of all findings with their findings, in the order in which they are applied to a model."""
     pairs = [(finding, effect) for finding in findings for effect in effects_of(finding, model)]
     return sorted(pairs, key=lambda pair: pair[1].cause in LATE)
 
 
 def label(finding: Finding) -> str:
-    """The cause and its place in words."""
+    """A cause with its place in words."""
     return titled(WORDS[finding.cause].title, finding.place)
 
 
 def _parts(effect: RobotEffect) -> Iterator[RobotEffect]:
-    """An effect; a link's mass that comes with its centre and its inertia as the three."""
+    """Split a link mass with centre and inertia into its three effects; others stay as they are."""
     numbers = effect.parameters
     if effect.cause != "link_mass" or "x_m" not in numbers:
         yield effect
@@ -152,7 +152,7 @@ def _parts(effect: RobotEffect) -> Iterator[RobotEffect]:
 
 
 def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect:
-    # Shares of what is typical are told beside what they amount to.
+    # ``share`` is relative; its physical value is a parameter of its own.
     numbers = {name: x for name, x in finding.shape.items() if name != "share"} | dict(member.values)
     if finding.event is not None:
         numbers |= {"start_s": finding.event.start_s, "duration_s": finding.event.duration_s}
@@ -164,7 +164,7 @@ def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect
         turned = Rotation.from_rotvec(-way).apply(gravity)
         numbers |= dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, turned), strict=True))
     joint, body = member.joint, ""
-    if finding.cause in LINKS:  # a link may have the name of a joint that moves another one
+    if finding.cause in LINKS:  # a link may have the name of another link's joint
         moved = member.place in model.bodies
         joint, body = (model.bodies.index(member.place) + 1, "") if moved else (None, member.place)
     return RobotEffect(finding.cause, joint, finding.partner, numbers, body)

@@ -1,4 +1,4 @@
-"""Dry friction as a function of the velocity: direction, rests and reversals, and how it may differ from its law."""
+"""Coulomb friction as a function of velocity: direction, rests and reversals, and deviations from its law."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from discrepancy.joints.causes import JointSignals
 from estimator.arrays import Array
 
 MERGE_S = 0.025
-"""Rests that are less apart are one. Derived: a period of the smoothing filter (60 Hz) on either side."""
+"""Longest gap between rests that count as one [s]. Derived: a period of the smoothing filter (60 Hz) on each side."""
 KNOT_S = 0.06
-"""Duration of a rest for each cosine of its friction. Derived: half a period of the rows' highest frequency, 10 Hz."""
+"""Time at rest for each cosine of the friction [s]. Derived: half a period of the rows' highest frequency, 10 Hz."""
 MOST_KNOTS = 12
 
 
 def rests(v: Array, step_s: float, slow: float) -> list[tuple[int, int]]:
-    """Samples of each interval in which a joint may rest or turn round: first, and one past the last.
+    """Find the intervals in which a joint may rest or reverse; return first sample and one past the last.
 
     Args:
         v: velocity, shape (W,).
         step_s: time between samples [s].
-        slow: speed below which its sign says nothing.
+        slow: speed below which the sign of the velocity is unreliable.
     """
     turns = (v[1:] > 0) != (v[:-1] > 0)
     at = np.flatnonzero((np.abs(v) < slow) | np.append(turns, False) | np.append(False, turns))
@@ -33,13 +33,13 @@ def rests(v: Array, step_s: float, slow: float) -> list[tuple[int, int]]:
 
 
 def ends(v: Array, a: int, b: int) -> tuple[float, float]:
-    """Direction before and after a rest."""
+    """Direction of motion before and after a rest."""
     before, after = (np.sign(v[a - 1]) if a else np.nan), (np.sign(v[b]) if b < len(v) else np.nan)
     return (after if np.isnan(before) else before), (before if np.isnan(after) else after)
 
 
 def direction(v: Array, step_s: float, slow: float) -> Array:
-    """Direction of motion; during a rest on the straight line between those before and after, shape (W,)."""
+    """Direction of motion, interpolated linearly during a rest, shape (W,)."""
     out = np.sign(v)
     for a, b in rests(v, step_s, slow):
         before, after = ends(v, a, b)
@@ -51,10 +51,10 @@ def direction(v: Array, step_s: float, slow: float) -> Array:
 
 
 def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, Array]]], list[Array]]:
-    """What friction of one newton metre may do beside its straight line while a joint rests or turns round.
+    """Deviations of a unit Coulomb friction from the linear course during rests and reversals.
 
     Returns:
-        For each rest, pairs of the first sample and a series, the k-th of standard deviation 1 / sqrt(3 (1 + k)); and
+        For each rest, pairs of its first sample and a series, the k-th with standard deviation 1 / sqrt(3 (1 + k)); and
         series (W,) that are common to all reversals.
     """
     own: list[list[tuple[int, Array]]] = []
@@ -74,7 +74,7 @@ def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, 
 
 
 def bent(q: Array, bristle: float) -> Array:
-    """Direction of dry friction that gives way by a small angle first (Dahl, "A solid friction model", 1968)."""
+    """Direction of Coulomb friction with elastic presliding (Dahl, "A solid friction model", 1968)."""
     step = np.diff(q, prepend=q[0])
     side, keep = np.sign(step), np.exp(-np.abs(step) / bristle)
     out, last = np.empty_like(q), 0.0
@@ -96,22 +96,22 @@ def smooth(s: JointSignals) -> list[Array]:
 def other_forms(
     signals: Sequence[JointSignals], coulomb: float, viscous: float, share: float, slow: float
 ) -> Iterator[list[Array]]:
-    """Series of one standard deviation each by which friction of some size may differ from its law.
+    """Series of one standard deviation by which friction may deviate from its law.
 
     Args:
-        signals: of one joint, a log each.
-        coulomb, viscous: the size [N m, N m s/rad].
-        share: of the trace, for smooth functions.
+        signals: signals of one joint, one for each log.
+        coulomb, viscous: size of the friction [N m, N m s/rad].
+        share: deviation relative to the friction.
         slow: the same at low speeds.
     """
-    for bristle in (1e-3, 4e-3):  # gears and greased bearings give way by a few tenths of a mrad to some mrad
+    for bristle in (1e-3, 4e-3):  # presliding of gears and greased bearings: 0.1 mrad to several mrad
         yield [3.0 * share * coulomb * (bent(s.q, bristle) - s.direction) for s in signals]
     for speed in (0.03, 0.1):
         yield [slow * coulomb * s.direction * np.exp(-np.abs(s.v) / (speed * s.span.speed)) for s in signals]
-    for speed in (0.02, 0.06):  # reversals that are rounded
+    for speed in (0.02, 0.06):  # rounded reversals
         yield [slow * coulomb * (np.tanh(s.v / (speed * s.span.speed)) - s.direction) for s in signals]
-    yield [1e-3 * coulomb * np.gradient(s.direction, s.step_s) for s in signals]  # a millisecond
-    each = [smooth(s)[:-3] for s in signals]  # friction by load and by direction are causes of their own
+    yield [1e-3 * coulomb * np.gradient(s.direction, s.step_s) for s in signals]  # a delay of one millisecond
+    each = [smooth(s)[:-3] for s in signals]  # dependence on load and direction has causes of its own
     for i in range(len(each[0])):
         yield [
             0.5 * share * (coulomb * s.direction + viscous * s.v) * f[i]

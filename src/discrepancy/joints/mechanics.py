@@ -1,4 +1,4 @@
-"""Mechanics of a tree of hinges and slides, all samples of a log at once."""
+"""Rigid-body mechanics of a tree of revolute and prismatic joints, vectorised over the samples of a log."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ from estimator.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Bodies in an order in which parents come first; body 0 is the world. B bodies, J joints.
+    """Kinematic tree of B bodies and J joints; parents come before children, and body 0 is the world.
 
     Attributes:
-        parent: of every body, shape (B,).
-        position, rotation: of every body's frame in its parent's, all joints at ``zero``, shapes (B, 3), (B, 3, 3).
-        joint_body: which body a joint moves, shape (J,).
-        slides: whether it slides, shape (J,).
-        anchor, axis: a point on the joint's axis and its direction, in the frame of its body, shapes (J, 3).
-        zero: joint position at which the frames are as said, shape (J,).
+        parent: parent of each body, shape (B,).
+        position, rotation: pose of each body frame in its parent frame at joint position ``zero``, shapes (B, 3) and
+            (B, 3, 3).
+        joint_body: body that each joint moves, shape (J,).
+        slides: whether a joint is prismatic, shape (J,).
+        anchor, axis: a point on the joint axis and its direction, in the frame of its body, shape (J, 3) each.
+        zero: joint position at which the poses hold, shape (J,).
         mass: shape (B,) [kg].
-        com: centres of mass in the frames of their bodies, shape (B, 3) [m].
-        inertia: about the centres of mass, along the bodies' frames, shape (B, 3, 3) [kg m^2].
-        gravity: in the frame of the world, shape (3,) [m/s^2].
-        armature: inertia of the rotors as the joints feel it, shape (J,).
-        coulomb, viscous: dry friction [N m or N] and damping per rad/s or m/s of every joint, shape (J,).
+        com: centres of mass in body frames, shape (B, 3) [m].
+        inertia: about the centres of mass in body axes, shape (B, 3, 3) [kg m^2].
+        gravity: in the world frame, shape (3,) [m/s^2].
+        armature: reflected rotor inertia, shape (J,).
+        coulomb, viscous: Coulomb friction [N m or N] and damping [N m s/rad or N s/m], shape (J,) each.
     """
 
     parent: NDArray[np.intp]
@@ -54,7 +55,7 @@ class Tree:
 
     @classmethod
     def of(cls, model: Any) -> Tree:
-        """From a compiled ``mujoco.MjModel`` of hinges and slides."""
+        """Build from a compiled ``mujoco.MjModel`` of hinge and slide joints."""
         own = _rotations(model.body_iquat)
         return cls(
             parent=np.asarray(model.body_parentid, dtype=np.intp),
@@ -76,7 +77,7 @@ class Tree:
 
     @property
     def moved(self) -> NDArray[np.bool_]:
-        """Which joints move which bodies, shape (J, B)."""
+        """Whether a joint moves a body, shape (J, B)."""
         out = np.zeros((len(self.joint_body), len(self.parent)), dtype=bool)
         for b in range(1, len(self.parent)):
             out[:, b] = out[:, self.parent[b]] | (self.joint_body == b)
@@ -84,33 +85,33 @@ class Tree:
 
     @property
     def last_link(self) -> int:
-        """The joint that moves the last link: the one with the longest way to the base."""
+        """The joint farthest from the base, counted in joints."""
         ways = self.moved[:, self.joint_body].sum(axis=0)
         return int(np.flatnonzero(ways == ways.max())[-1])
 
     @property
     def links(self) -> NDArray[np.intp]:
-        """Bodies that move and have mass: those whose inertias can show."""
+        """Moving bodies with mass: only these have observable inertial parameters."""
         return np.flatnonzero(self.moved.any(axis=0) & (self.mass > 0))
 
 
 def _rotations(quaternions: Array) -> Array:
-    """Rotation matrices of quaternions (w, x, y, z), shape (B, 4) -> (B, 3, 3)."""
+    """Convert quaternions (w, x, y, z) to rotation matrices, shape (B, 4) -> (B, 3, 3)."""
     return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion at Q samples; vectors in the world's axes, origins those of the bodies' frames.
+    """Motion of all bodies at Q samples; vectors in world axes, for the origins of the body frames.
 
     Attributes:
-        tree: what moves.
-        rotation: of every body in the world, shape (B, Q, 3, 3).
+        tree: the kinematic tree.
+        rotation: orientation of each body in the world, shape (B, Q, 3, 3).
         origin: shape (B, Q, 3) [m].
         omega, alpha: angular velocity and acceleration, shape (B, Q, 3).
-        acceleration: of the origins, less gravity's, shape (B, Q, 3) [m/s^2].
-        axis, anchor: of every joint, shape (J, Q, 3).
-        known: what ``regressor`` made of it: torques per unit of a body's numbers, and those of all bodies under None.
+        acceleration: acceleration of the origins minus gravity, shape (B, Q, 3) [m/s^2].
+        axis, anchor: of each joint, shape (J, Q, 3).
+        known: cache of ``body_regressor`` by body, and of ``rigid_torque`` under None.
     """
 
     tree: Tree
@@ -125,7 +126,7 @@ class Motion:
 
     @classmethod
     def of(cls, tree: Tree, q: Array, dq: Array, ddq: Array) -> Motion:
-        """Motion of all bodies from joint positions, velocities and accelerations, shape (Q, J) each."""
+        """Forward kinematics from joint positions, velocities and accelerations, shape (Q, J) each."""
         Q, B, J = len(q), len(tree.parent), len(tree.joint_body)
         R = np.moveaxis(np.zeros((B, 3, 3, Q)), -1, 1)
         p, w, al, a = (vectors(B, Q) for _ in range(4))
@@ -145,7 +146,7 @@ class Motion:
                     ab = ab + rigid(wb, alb, shift) + 2.0 * cross(wb, rate) + s * ddq[:, j, None]
                     pb = pb + shift
                     continue
-                off = tree.anchor[j].any()  # most bodies' frames are on the axis
+                off = tree.anchor[j].any()  # most body frames lie on the joint axis
                 ab = ab + rigid(wb, alb, to) if off else ab
                 alb = alb + s * ddq[:, j, None] + cross(wb, rate)
                 wb = wb + rate
@@ -158,17 +159,17 @@ class Motion:
 
 
 def rigid(omega: Array, alpha: Array, lever: Array) -> Array:
-    """Acceleration of a point over that of another of the same body, alpha x r + omega x (omega x r), shape (Q, 3)."""
+    """Acceleration of a point relative to another on the same body: alpha x r + omega x (omega x r), shape (Q, 3)."""
     return cross(alpha, lever) + cross(omega, cross(omega, lever))
 
 
 def vectors(*shape: int) -> Array:
-    """Vectors of zero, shape (..., Q, 3); a component's samples follow each other: faster for all made of them."""
+    """Zero vectors, shape (..., Q, 3), with contiguous samples of each component for speed."""
     return np.swapaxes(np.zeros((*shape[:-1], 3, shape[-1])), -1, -2)
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross product along the last axis; many times as fast as numpy's."""
+    """Cross product along the last axis; faster than ``numpy.cross``."""
     out = np.empty((3, *np.broadcast_shapes(a.shape, b.shape)[:-1]))
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -183,7 +184,7 @@ def dot(a: Array, b: Array) -> Array:
 
 
 def turned(R: Array, v: Array) -> Array:
-    """R v, shapes (Q, 3, 3), (Q, 3) or (3,) -> (Q, 3)."""
+    """Product R v, shapes (Q, 3, 3) and (Q, 3) or (3,) -> (Q, 3)."""
     out = np.empty((3, len(R)))
     for i in range(3):
         np.multiply(R[:, i, 0], v[..., 0], out=out[i])
@@ -193,20 +194,20 @@ def turned(R: Array, v: Array) -> Array:
 
 
 def times(C: Array, v: Array) -> Array:
-    """C v with one constant C, shapes (3, 3), (Q, 3) -> (Q, 3)."""
+    """Product C v with a constant C, shapes (3, 3) and (Q, 3) -> (Q, 3)."""
     return (C @ v.T).T
 
 
 def turned_frame(R: Array, C: Array) -> Array:
-    """R C with one constant C, shapes (Q, 3, 3), (3, 3) -> (Q, 3, 3)."""
+    """Product R C with a constant C, shapes (Q, 3, 3) and (3, 3) -> (Q, 3, 3)."""
     out = np.zeros((3, 3, len(R)))
-    for k, j in zip(*np.nonzero(C), strict=True):  # most are turns about an axis
+    for k, j in zip(*np.nonzero(C), strict=True):  # most C are sparse: rotations about a coordinate axis
         out[:, j] += R[:, :, k].T * C[k, j]
     return np.moveaxis(out, -1, 0)
 
 
 def _about(R: Array, axis: Array, angle: Array) -> Array:
-    """R turned on about an axis of its own by Rodrigues' formula, shapes (Q, 3, 3), (3,), (Q,) -> (Q, 3, 3)."""
+    """Rotate R about a body-fixed axis (Rodrigues' formula), shapes (Q, 3, 3), (3,) and (Q,) -> (Q, 3, 3)."""
     x, y, z = axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, rest = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]
@@ -214,18 +215,18 @@ def _about(R: Array, axis: Array, angle: Array) -> Array:
 
 
 def inverse_torque(model: mujoco.MjModel, q: Array, dq: Array, ddq: Array) -> Array:
-    """Torques of a motion, shape (Q, J): inertia with armature, gravity and springs, but nothing that rubs.
+    """Inverse dynamics, shape (Q, J): inertia with rotors, gravity and springs, but no friction or damping.
 
-    Contacts, limits and dry friction are constraints of MuJoCo, and off; so is the joints' damping.
+    Contacts, joint limits and Coulomb friction are constraints in MuJoCo and are disabled.
 
     Args:
-        model: compiled, joints of one degree of freedom only.
+        model: compiled model whose joints all have one degree of freedom.
         q, dq, ddq: joint positions and their derivatives, shape (Q, J).
     """
     bare = copy.copy(model)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    bare.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)  # ddq is the motion's, not a step's
+    bare.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)  # ddq is continuous
     bare.dof_damping[:] = 0.0
     data = mujoco.MjData(bare)
     out = np.empty_like(q)
@@ -237,17 +238,17 @@ def inverse_torque(model: mujoco.MjModel, q: Array, dq: Array, ddq: Array) -> Ar
 
 
 PARAMETERS = ("m", "hx", "hy", "hz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
-"""Mass [kg], first moments [kg m] and inertia about the origin of the body's frame [kg m^2], along that frame."""
+"""Mass [kg], first moments [kg m] and inertia about the body frame's origin [kg m^2], in body axes."""
 
 
 def inertial_parameters(mass: float, com: Array, inertia: Array) -> Array:
-    """The ten numbers of a body of a mass, a centre and an inertia about that centre, shape (10,)."""
+    """The ten inertial parameters of a body from its mass, centre of mass and central inertia, shape (10,)."""
     about = inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
     return np.array([mass, *(mass * com), *np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
 
 
 def body_regressor(motion: Motion, body: int) -> Array:
-    """Joint torques per unit of each of a body's ten numbers, shape (Q, J, 10); kept with the motion."""
+    """Joint torques per unit of each inertial parameter of a body, shape (Q, J, 10); cached."""
     if body not in motion.known:
         motion.known[body] = _body_regressor(motion, body)
     return motion.known[body]
@@ -257,7 +258,7 @@ def _body_regressor(motion: Motion, body: int) -> Array:
     tree = motion.tree
     R, a = motion.rotation[body], motion.acceleration[body]
     w, al = motion.omega[body], motion.alpha[body]
-    own = R.swapaxes(1, 2)  # to the body's axes
+    own = R.swapaxes(1, 2)  # to body axes
     wb, alb = turned(own, w), turned(own, al)
     inner = [turned(R, times(E, alb) + cross(wb, times(E, wb))) for E in _unit_inertias()]
     axes = [R[..., k] for k in range(3)]
@@ -279,7 +280,7 @@ def _body_regressor(motion: Motion, body: int) -> Array:
 
 
 def rigid_torque(motion: Motion) -> Array:
-    """Torques of all joints that the tree's rigid bodies need, shape (Q, J); kept with the motion."""
+    """Joint torques that the rigid bodies require, without rotors, shape (Q, J); cached."""
     if None not in motion.known:
         motion.known[None] = _rigid_torque(motion)
     return motion.known[None]
@@ -290,7 +291,7 @@ def _rigid_torque(motion: Motion) -> Array:
     force, moment = vectors(len(tree.parent), samples), vectors(len(tree.parent), samples)
     out = np.zeros((len(tree.joint_body), samples)).T
     for b in range(len(tree.parent) - 1, 0, -1):
-        if tree.mass[b]:  # a fit may pass through masses below zero
+        if tree.mass[b]:  # a fit may pass through negative masses
             R, w, al = motion.rotation[b], motion.omega[b], motion.alpha[b]
             own = R.swapaxes(1, 2)
             lever = turned(R, tree.com[b])
@@ -311,17 +312,17 @@ def _rigid_torque(motion: Motion) -> Array:
 
 
 def torque_of(tree: Tree, q: Array, dq: Array, ddq: Array) -> Array:
-    """The same from joint positions, velocities and accelerations, shape (Q, J) each."""
+    """The torques of ``rigid_torque`` from joint positions, velocities and accelerations, shape (Q, J) each."""
     return rigid_torque(Motion.of(tree, q, dq, ddq))
 
 
 def force_torque(motion: Motion, body: int, point: Array) -> Array:
-    """Joint torques per newton of a force on a body along each of the world's axes, shape (Q, J, 3).
+    """Joint torques per newton of a force on a body along each world axis, shape (Q, J, 3).
 
     Args:
-        motion: of the tree.
-        body: which is pushed.
-        point: where, in the body's frame [m], shape (3,).
+        motion: motion of the tree.
+        body: the body on which the force acts.
+        point: point of attack in the body frame [m], shape (3,).
     """
     tree = motion.tree
     at = motion.origin[body] + turned(motion.rotation[body], point)
@@ -334,13 +335,13 @@ def force_torque(motion: Motion, body: int, point: Array) -> Array:
 
 @cache
 def _unit_inertias() -> list[Array]:
-    """The last six of the parameters, one unit each, as matrices."""
+    """Inertia matrices of one unit of each of the last six inertial parameters."""
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     return [np.array([[float({i, j} == {a, b}) for j in range(3)] for i in range(3)]) for a, b in pairs]
 
 
 def carried(tree: Tree) -> Array:
-    """Which bodies hang on which, each on itself, as 0 and 1, shape (B, B): [upper, lower]."""
+    """Whether a body (column) descends from another (row) or is the same one, as 0 and 1, shape (B, B)."""
     out = np.eye(len(tree.parent))
     for b in range(1, len(tree.parent)):
         out[:, b] += out[:, tree.parent[b]]
@@ -348,9 +349,9 @@ def carried(tree: Tree) -> Array:
 
 
 def by_acceleration(motion: Motion) -> Array:
-    """Joint torques per unit of an acceleration of everything along each of the world's axes, shape (Q, J, 3).
+    """Joint torques per unit of acceleration of the base along each world axis, shape (Q, J, 3).
 
-    Gravity of -1 m/s^2 does the same.
+    Gravity in the opposite direction has the same effect.
     """
     tree = motion.tree
     mass, moment = _masses(motion)
@@ -363,9 +364,9 @@ def by_acceleration(motion: Motion) -> Array:
 
 
 def by_displacement(motion: Motion, body: int) -> Array:
-    """Joint torques per metre by which a body's frame is displaced in its parent's, along its axes, shape (Q, J, 3).
+    """Joint torques per metre of displacement of a body frame along its parent's axes, shape (Q, J, 3).
 
-    All that hangs on it moves along: its accelerations change as the parent turns, and its levers.
+    All descendants are displaced, too. This changes their lever arms and, if the parent rotates, their accelerations.
     """
     tree, up = motion.tree, motion.tree.parent[body]
     mass, moment = _masses(motion)
@@ -389,7 +390,7 @@ def by_displacement(motion: Motion, body: int) -> Array:
 
 
 def _masses(motion: Motion) -> tuple[Array, Array]:
-    """Mass of what hangs on every body, shape (B,), and its first moment about the world's origin, (B, Q, 3)."""
+    """Mass of each body with its descendants (B,), and its first moment about the world origin (B, Q, 3)."""
     tree = motion.tree
     below = carried(tree)
     centres = motion.origin + np.einsum("bqij,bj->bqi", motion.rotation, tree.com)
@@ -397,19 +398,19 @@ def _masses(motion: Motion) -> tuple[Array, Array]:
 
 
 def _force(motion: Motion, body: int) -> Array:
-    """Force that a body's motion needs, shape (Q, 3)."""
+    """Net force that a body's motion requires, shape (Q, 3)."""
     lever = motion.rotation[body] @ motion.tree.com[body]
     a = motion.acceleration[body] + rigid(motion.omega[body], motion.alpha[body], lever)
     return motion.tree.mass[body] * a
 
 
 def horizontal(gravity: Array) -> Array:
-    """Two horizontal axes, shape (2, 3)."""
+    """Two unit vectors orthogonal to gravity, shape (2, 3)."""
     return np.linalg.svd(gravity[None] / max(float(np.linalg.norm(gravity)), 1e-12))[2][1:]
 
 
 def with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[float, Array, Array]:
-    """Mass, centre and inertia about it of a body with more inertial parameters, shape (10,)."""
+    """Mass, centre of mass and central inertia of a body after adding inertial parameters ``load``, shape (10,)."""
     total = max(mass + float(load[0]), 0.05 * mass)
     centre = (mass * com + load[1:4]) / total
     xx, yy, zz, xy, xz, yz = load[4:]

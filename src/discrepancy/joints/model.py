@@ -1,4 +1,4 @@
-"""Read a robot's model, MJCF or URDF, and refuse what is no fixed-base tree of hinges and slides."""
+"""Read a robot model from MJCF or URDF, and reject all but fixed-base trees of hinge and slide joints."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARE
 
 @dataclass(frozen=True, eq=False)
 class SerialModel:
-    """A robot as its maker or owner describes it.
+    """A robot model with J joints.
 
     Attributes:
         path: the file.
-        model: compiled.
-        joints: names in the order of qpos, J of them; each has one position, so nq = nv = J.
+        model: the compiled model.
+        joints: names in the order of qpos; each joint has one degree of freedom, so nq = nv = J.
         bodies: name of the body that each joint moves.
-        slides: whether a joint slides, shape (J,); the others turn.
-        lower: least position [rad or m], -inf where the model gives no range, shape (J,).
-        upper: largest position, inf where it gives none, shape (J,).
-        torque_limit: largest torque of the joint's actuators [N m or N], inf where the model gives none, shape (J,).
+        slides: whether a joint is prismatic, shape (J,); the others are revolute.
+        lower: lower position limit [rad or m], -inf if there is none, shape (J,).
+        upper: upper position limit [rad or m], inf if there is none, shape (J,).
+        torque_limit: largest torque of a joint's actuators [N m or N], inf if there is no limit, shape (J,).
     """
 
     path: Path
@@ -46,12 +46,12 @@ class SerialModel:
 
 
 def load_spec(path: Path | str) -> mujoco.MjSpec:
-    """A model as MuJoCo's editable description; without its meshes if it does not compile with them.
+    """Read a model as an editable ``MjSpec``, without its meshes if it does not compile with them.
 
-    Shapes do not matter to inverse dynamics once inertias are given, and many URDF files come without their meshes.
+    Inverse dynamics needs no meshes if inertias are given, and many URDF files lack their meshes.
 
     Raises:
-        InputError: MuJoCo cannot read the file, or not compile it.
+        InputError: MuJoCo cannot read or compile the file.
     """
     path = Path(path)
     if not path.is_file():
@@ -68,7 +68,9 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
     except (ValueError, RuntimeError, OSError) as error:
         said = _sentence(error)
         if spec.meshes:
-            spec = mujoco.MjSpec.from_file(str(path))  # of one that did not compile, MuJoCo tells no joints
+            spec = mujoco.MjSpec.from_file(
+                str(path)
+            )  # a spec that failed to compile lists no joints, so read it again
             body = _body_of_meshes(spec)
             if body is not None:
                 raise InputError(
@@ -86,7 +88,7 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
 
 
 def _named(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """The same with a name for every body: findings name bodies."""
+    """Give every unnamed body a name, because findings refer to bodies by name."""
     taken = {body.name for body in spec.bodies}
     for k, body in enumerate(spec.bodies):
         if not body.name:
@@ -98,7 +100,7 @@ def _named(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def _body_of_meshes(spec: mujoco.MjSpec) -> str | None:
-    """The first body that moves and has its inertia, or part of it, from a mesh, in words; None if there is none."""
+    """The first moving body whose inertia comes from a mesh, in words; None if there is none."""
     of = spec.compiler
     low, high = of.inertiagrouprange
     for geom in spec.geoms:
@@ -119,7 +121,7 @@ def _body_of_meshes(spec: mujoco.MjSpec) -> str | None:
 
 
 def _moves(body: mujoco.MjsBody) -> bool:
-    """Whether a body, or one that it hangs on, has a joint."""
+    """Whether a body or one of its ancestors has a joint."""
     while body is not None and body.name != "world":
         if body.joints:
             return True
@@ -128,7 +130,7 @@ def _moves(body: mujoco.MjsBody) -> bool:
 
 
 def _without_mass(spec: mujoco.MjSpec) -> None:
-    """Links of a URDF that have no inertial have no mass; MuJoCo would give fixed ones that of their shapes."""
+    """Set URDF links without an inertial to zero mass; MuJoCo would use the mass of the shapes of fixed ones."""
     for body in spec.bodies:
         if not body.explicitinertial and not body.joints:
             for geom in body.geoms:
@@ -136,7 +138,7 @@ def _without_mass(spec: mujoco.MjSpec) -> None:
 
 
 def _drop_meshes(spec: mujoco.MjSpec) -> None:
-    """Leave out meshes and what is drawn with them."""
+    """Delete meshes and the geoms that use them."""
     for geom in [geom for geom in spec.geoms if geom.meshname]:
         spec.delete(geom)
     for mesh in list(spec.meshes):
@@ -144,16 +146,16 @@ def _drop_meshes(spec: mujoco.MjSpec) -> None:
 
 
 def load_model(path: Path | str) -> SerialModel:
-    """A fixed-base tree of hinges and slides.
+    """Read and check the model of a fixed-base tree of hinge and slide joints.
 
     Raises:
-        InputError: MuJoCo cannot read the file, or the model is not of that kind: it has no joints, joints without a
-            name, free or ball joints, equality constraints (closed chains), tendons, or soft bodies.
+        InputError: MuJoCo cannot read the file, or the model is of another kind: without joints, or with unnamed,
+            free or ball joints, equality constraints (closed chains), tendons, soft bodies or plugins.
     """
     model = load_spec(path).compile()
     _check(Path(path), model)
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
-        model.opt.gravity[:] = 0.0  # all that asks for it has to find the same
+        model.opt.gravity[:] = 0.0  # so that no caller needs to check the flag
     joint = range(model.njnt)
     limited = model.jnt_limited.astype(bool)
     return SerialModel(
@@ -195,7 +197,7 @@ def _check(path: Path, model: mujoco.MjModel) -> None:
 
 
 def _torque_limits(model: mujoco.MjModel) -> Array:
-    """By the joints' own limit on actuator forces, and by the force ranges of all actuators of a joint together."""
+    """Torque limit of each joint: its own actuator force range, or the sum of its actuators' force ranges."""
     limits = np.where(model.jnt_actfrclimited.astype(bool), np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
     at_joint = np.isin(model.actuator_trntype, _AT_JOINT)
     for joint in range(model.njnt):
@@ -207,5 +209,5 @@ def _torque_limits(model: mujoco.MjModel) -> Array:
 
 
 def _sentence(error: BaseException) -> str:
-    """MuJoCo's message on one line."""
+    """The message of MuJoCo on one line."""
     return shown(" ".join(str(error).split()), 300) or type(error).__name__

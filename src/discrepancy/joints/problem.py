@@ -1,4 +1,7 @@
-"""Logs of a robot's joints as a linear problem, linear around given values of what is uncertain."""
+"""Build the linear problem of a robot's joint logs: regressor columns, priors and residual torques.
+
+The problem is linearised around given values of the uncertain parameters.
+"""
 
 from __future__ import annotations
 
@@ -37,18 +40,18 @@ from estimator.filtering import low_pass
 
 @dataclass(frozen=True)
 class Given:
-    """What a problem takes besides logs and values.
+    """Options of a linear problem.
 
     Attributes:
-        changed: signals in which causes act; those after them are a reference, in which the model may be wrong, too.
-            None: all.
-        joints: which have torques, from 0; None: all.
-        motors: joints whose torque per unit is fitted to the model.
-        back_emf: joints whose drives lose torque to the speed while they are on.
-        excluded: causes that are left out.
-        tolerances: standard deviations by cause and parameter in place of the usual ones.
-        noise: a draw of what the sensors add to the residual, shape (W, J) each; None: not known.
-        kept: weight of each sample, shape (W, J) a log; empty: all count.
+        changed: number of leading signals in which causes act. The others are a reference, in which the model may be
+            wrong, too. None: causes act in all signals.
+        joints: indices of the joints with torques, from 0; None: all.
+        motors: joints whose torque per unit of the logged signal is identified with the model.
+        back_emf: joints whose drives lose torque in proportion to speed while they are on.
+        excluded: causes to leave out.
+        tolerances: prior standard deviations by cause and parameter that replace the defaults.
+        noise: one sample of the sensor noise in the residual for each log, shape (W, J) each; None: unknown.
+        kept: weight of each sample, shape (W, J) for each log; empty: all samples count.
     """
 
     changed: int | None = None
@@ -62,61 +65,64 @@ class Given:
 
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
-"""Bands of the noise; arms move below 5 Hz, and bend from some 10 Hz on."""
+"""Edges of the noise bands [Hz]. Arm motion is below 5 Hz; structural resonances begin near 10 Hz."""
 TOP_SHARE = 0.15
-"""Highest frequency of a row over the log's rate. Derived: the smoothing filter passes 98 % there."""
+"""Highest frequency of a row, as a share of the log's rate. Derived: the smoothing filter passes 98 % there."""
 MOTOR_SHARE = 0.35
-"""The same over that where a torque per unit is fitted: above some 3.5 Hz a servo's gear sticks and slips."""
+"""Factor on the highest frequency if a torque per unit is identified. Servo gears stick and slip above 3.5 Hz."""
 FADE_S = 0.25
-"""Rows fade in and out: a cut leaks the noise of accelerations far above the bands into all of them."""
+"""Fade-in and fade-out time of each series [s]. Abrupt ends would leak noise from above the bands into all bands."""
 SWAY_HZ, SWAY_S = (1.0, 2.0, 3.0, 4.5, 6.5), 0.5
-"""Free vibrations of what is elastic when a log begins: frequencies, and the time in which they fade."""
+"""Free vibrations of an elastic joint at the start of a log: frequencies [Hz] and decay time [s]."""
 INERTIA, JOINT, ZERO_RAD, LENGTH_M, TILT_RAD, SCALE, DELAY_S = 0.1, 0.03, 2e-3, 1e-3, 5e-3, 0.02, 5e-4
-"""Standard deviations of a healthy robot's numbers; shares of the model's own for inertias, rotors and friction."""
+"""Prior standard deviations of a healthy robot's parameters.
+
+``INERTIA`` and ``JOINT`` are relative to the model's inertia, rotor inertia and friction.
+"""
 UNKNOWN_SCALE = 0.1
-"""The same for a torque per unit that was fitted to the model: as much as the masses."""
+"""Prior standard deviation of the scale if a torque per unit is identified: as uncertain as the masses."""
 LEAST_COM_M = 0.01
 FORM = 0.1
-"""Share of the friction that a model names by which that may differ from its law."""
+"""Prior standard deviation of the error of the model's friction law, as a share of that friction."""
 PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
 PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
 PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
-"""Pushes: tried durations [s] above, prior force [N], frequency whose noise ranks them [Hz], how many are weighed."""
+"""Pushes: durations to try [s], prior force [N], frequency of the noise for ranking [Hz], number of proposals."""
 BEGIN_S = 1.0
-"""Pushes are sought from here on [s]: before, free vibration of a stand or a soft joint looks like one."""
+"""Earliest start of a push [s]. Free vibration at the start of a log looks like a push."""
 READ_RAD = 0.02
-"""Standard deviation of an unlisted error of a position."""
+"""Prior standard deviation of an unlisted position error [rad]."""
 UNLISTED_NATS = 5.0
-"""Log odds of a listed cause over something that no table lists."""
+"""Prior log odds of a listed cause over an unlisted one."""
 REST = 1.5
-"""Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
+"""Speed threshold for rest, in units of the speed below which the friction direction fades (``Signals.slow``)."""
 
 Values = Mapping[str, float]
 
 
 @dataclass(eq=False)
 class JointProblem:
-    """A linear problem; see ``evidence.search.Linear``.
+    """A linear problem that implements ``evidence.search.Linear``.
 
     Attributes:
         model: the robot as described.
-        parts: smoothed logs, around which columns are made.
-        cells, groups, families, laws: of the engine.
-        withheld: groups of causes that are left out, whose tolerances stay.
+        parts: smoothed logs at the linearisation point.
+        cells, groups, families, laws: see ``evidence.search.Linear``.
+        withheld: groups of excluded causes; their tolerances stay in the prior.
         labels: names of the columns.
-        tolerance: standard deviations of a healthy robot, shape (K,).
-        series: the columns.
+        tolerance: prior standard deviations of a healthy robot, shape (K,); 0 if it lacks the column.
+        series: the columns as time series by joint.
         joints: signals by joint and log.
-        dry: dry friction that the model names, shape (J,).
-        pushed: torques per newton on the last link along the world's axes, shape (W, J, 3) a log; empty: none is looked
-            for.
-        resting: columns of friction at rest by joint, and their standard deviations per newton metre.
-        residual: measured torques less those of the model as it is, shape (W, J) a log.
-        sensors: variances of their noise, shape (C, bands); None: not known.
-        channel: of each joint with torques.
-        changed: number of logs in which something may have acted; None: all.
-        dry_in_all: by joint, the column of dry friction that a reference has, too.
+        dry: Coulomb friction in the model, shape (J,).
+        pushed: joint torques per newton on the last link along the world axes, shape (W, J, 3) for each log; empty: do
+            not look for pushes.
+        resting: for each joint, the columns of friction at rest and their standard deviations per newton metre.
+        residual: measured minus modelled torques, shape (W, J) for each log.
+        sensors: variances of the sensor noise, shape (C, bands); None: unknown.
+        channel: channel index of each joint with torques.
+        changed: number of leading logs in which causes may act; None: all.
+        dry_in_all: for each joint, the Coulomb friction column that also acts in the reference.
     """
 
     model: SerialModel
@@ -140,11 +146,11 @@ class JointProblem:
     dry_in_all: dict[int, int] = field(default_factory=dict)
 
     def rows(self, series: Sequence[Series]) -> list[Series]:
-        """Columns by channel from columns by joint: joints without torques have none."""
+        """Convert columns from joints to channels. Joints without torques have no channel."""
         return [{self.channel[j]: x for j, x in by.items() if j in self.channel} for by in series]
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
-        """Variances of what is always in the model; friction at rest follows the friction there is."""
+        """Prior variances without the chosen causes; friction at rest scales with Coulomb friction."""
         S = np.array(self.tolerance) ** 2
         rubs = self.dry.copy()
         if values is not None:
@@ -157,7 +163,7 @@ class JointProblem:
                     members = c.group.members or (c.group.columns,)
                     places = known if c.group.members else (c.group.place,)
                     for place, member in zip(places, members, strict=True):
-                        j = index[place]  # with its sign: terms share one torque
+                        j = index[place]  # keep the sign: several terms add up to one torque
                         rubs[j] += dry(float(values[member[0]]), self.joints[j][0].span)
             for j, k in self.dry_in_all.items():
                 rubs[j] += values[k]
@@ -166,11 +172,11 @@ class JointProblem:
         return S
 
     def slabs(self) -> Array:
-        """Prior variances with every listed cause in the model, shape (K,)."""
+        """Prior variances if every listed cause is in the model, shape (K,)."""
         S = np.array(self.tolerance) ** 2
         for g in self.groups:
             if g.cause == "unlisted":
-                continue  # such functions explain a short log's noise
+                continue  # unlisted functions can explain the noise of a short log
             k = list(g.columns)
             S[k] = np.maximum(S[k], np.array(g.slab) ** 2)
         for j, (columns, unit) in enumerate(self.resting):
@@ -180,7 +186,7 @@ class JointProblem:
         return S
 
     def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
-        """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
+        """Find the likeliest push for each duration: a half-sine force on the last link along the world axes."""
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]
@@ -214,12 +220,12 @@ class JointProblem:
         return Group("push", place, (), (PUSH_N,) * 3, log_prior, shape, event=True)
 
     def place(self, group: Group) -> Group:
-        """A push with its columns: force along the world's axes, half a sine long."""
+        """Add the columns of a push: a half-sine force along each world axis."""
         columns = self.cells.add(self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)]))
         return replace(group, columns=tuple(columns))
 
     def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
-        """The same push a little earlier, later, shorter and longer."""
+        """Variants of a push: slightly earlier, later, shorter and longer."""
         if not group.event:
             return []
         shape = dict(group.shape)
@@ -242,7 +248,7 @@ class JointProblem:
         return out
 
     def _swaying(self, group: Group, compliance: float) -> list[Series]:
-        """Free vibrations of an elastic joint at the begin of each log, as large as it gives way under its torque."""
+        """Free vibrations of an elastic joint at the start of each log, scaled by its deflection under load."""
         joint, out = self.model.joints.index(group.place), []
         for t, s in enumerate(self.parts):
             time = np.maximum(s.time - s.time[0], 0.0)
@@ -255,14 +261,14 @@ class JointProblem:
         return out
 
     def displaced(self, joint: int, way: Sequence[Array]) -> Series:
-        """Torques of a joint that is where the model does not have it, a series (W,) a log."""
+        """Torque change if a joint's true position differs from the model by ``way``, one array (W,) for each log."""
         moved = [along(s, joint, x) for s, x in zip(self.parts, way, strict=True)]
         return {
             c: [m[:, c] for m in moved] for c in range(len(self.joints)) if any(m[:, c].any() for m in moved)
         }
 
     def _push(self, group: Group, force: Array, wave: int) -> Series:
-        """Torques of a force during a push, ``wave`` half sines long."""
+        """Torques of a push whose force profile has ``wave`` half sines."""
         shape = dict(group.shape)
         trial = int(shape["trial"])
         rate = self.cells.bands.rates_hz[trial]
@@ -275,7 +281,11 @@ class JointProblem:
         return by
 
     def forms(self, group: Group, values: Array) -> list[Series]:
-        """Traces of a cause times smooth functions; an encoder's disc may be off its axis; inertia has no forms."""
+        """Columns for the error of a cause's law: its trace times smooth functions of the joint state.
+
+        A joint offset varies with the angle, as with an off-centre encoder disc.
+        Inertial causes have exact laws and no forms.
+        """
         if group.event:
             force = 3.0 * values[list(group.columns)]
             return self.rows([self._push(group, force, wave) for wave in (2, 3, 4)])
@@ -318,7 +328,7 @@ class JointProblem:
 def joint_problem(
     model: SerialModel, smooth: Sequence[Signals], values: Values | None = None, given: Given | None = None
 ) -> JointProblem:
-    """The linear problem around some values of its columns, by label; None: the model as it is."""
+    """Build the problem, linearised around ``values`` by column label; None: around the model as it is."""
     return _Builder(model, list(smooth), values or {}, given or Given()).built()
 
 
@@ -333,7 +343,7 @@ class _Builder:
         for s in smooth:
             q, inverse = s.q + zero, s.inverse
             if values:
-                # What a model has besides rigid bodies, such as springs, stays as it is.
+                # Keep model terms beyond rigid bodies, such as springs.
                 inverse = inverse + torque_of(self.tree, q, s.dq, s.ddq) - rigid_torque(s.motion)
             self.parts.append(replace(s, tree=self.tree, q=q, inverse=inverse))
         self.slow = REST * self.parts[0].slow
@@ -354,7 +364,7 @@ class _Builder:
             model, self.parts, self._cells(residual), joints=self.joints, channel=self.channel
         )
         self.out.dry = np.array(self.given.coulomb)
-        for j in more.motors:  # a servo that sticks gives what its error asks for, which is no load
+        for j in more.motors:  # a stuck servo's torque follows its position error, not the load
             self.out.dry[j] = max(self.out.dry[j], self.spans[j].torque)
 
     def _tree(self) -> Tree:
@@ -404,7 +414,7 @@ class _Builder:
         asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
         load = s.inverse - self.given.armature * s.ddq
-        load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # noise has no sign
+        load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # filter: noise has no direction
         for j in range(self.J):
             own = (x[:, j] for x in (s.q, s.dq, s.ddq, side, load, asked, torque))
             self.joints[j].append(JointSignals(*own, t=s.time, span=self.spans[j]))
@@ -422,14 +432,13 @@ class _Builder:
         return len(self.out.labels) - 1
 
     def wide(self, of: Callable[[Signals], Array]) -> Series:
-        """A column of all joints."""
         done = [of(s) for s in self.parts]
         return {j: [d[:, j] for d in done] for j in range(self.J) if any(d[:, j].any() for d in done)}
 
     def group(
         self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float] | Array, **more: Any
     ) -> None:
-        # Between two days a link carries more or less, and is what it was.
+        # Link inertias do not change between reference and later logs; only the payload does.
         same = (
             self.more.changed is not None and more.get("family", "").startswith("load") and cause != "payload"
         )
@@ -458,10 +467,12 @@ class _Builder:
         out = self.out
         out.changed = self.more.changed
         body = int(self.tree.joint_body[self.tree.last_link])
-        none = self.more.motors or "push" in self.more.excluded  # a gear that sticks looks like a push
+        none = self.more.motors or "push" in self.more.excluded  # a sticking gear looks like a push
         for s in () if none else self.parts:
             out.pushed.append(force_torque(s.motion, body, self.tree.com[body]))
-        for i, label in enumerate(out.labels):  # from the model, not from where columns are linear
+        for i, label in enumerate(
+            out.labels
+        ):  # residual relative to the model, not to the linearisation point
             if self.values.get(label):
                 for c, x in out.series[i].items():
                     for t, own in enumerate(x):
@@ -476,7 +487,6 @@ class _Builder:
         return out
 
     def _sensors(self, noise: Sequence[Array]) -> Array:
-        """Variances of the sensors' noise by channel and band, shape (C, bands)."""
         band = np.concatenate([self.bands.of_trial(t) for t in range(len(noise))])
         rows = np.bincount(band, minlength=len(self.bands.edges_hz) - 1)
         power = [
@@ -487,7 +497,7 @@ class _Builder:
         return np.array(power) / np.maximum(rows, 1)
 
     def _apart(self, changed: int) -> None:
-        """Causes act in the first signals only; what may be wrong with the model in all is a column besides."""
+        """Restrict each column to the logs before the reference, and add a column that acts in all logs."""
         out, slabs = self.out, np.sqrt(self.out.slabs())
         local = {k for columns, _ in out.resting for k in columns}
         for i in range(len(out.labels)):
@@ -515,7 +525,7 @@ class _Builder:
         return self.sd(cause, parameter, usual)
 
     def sd(self, cause: str, parameter: str, usual: float) -> float:
-        """Standard deviation of a healthy robot's number."""
+        """Prior standard deviation of a healthy robot's parameter: the option if given, else ``usual``."""
         return self.more.tolerances.get(cause, {}).get(parameter, usual)
 
     def _joint(self, j: int) -> None:
@@ -547,7 +557,7 @@ class _Builder:
         for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
             if signal == "neighbour's torque" and not j:
                 continue
-            # Gravity bends an elastic joint by a function of its position: an error of the reading spans that.
+            # Gravity deflects an elastic joint by a function of its position, as a reading error does.
             read, slab = signal == "reading", READ_RAD if signal == "reading" else self.spans[j].torque
             index = [
                 self.add(f"{n} unlisted {signal} {k}", 0.0, self.out.displaced(j, x) if read else {j: x})
@@ -563,7 +573,7 @@ class _Builder:
                 self.add(f"{n} form {i}", 1.0, {j: x})
 
     def _kinds(self) -> None:
-        """Causes of all joints alike: a common part and deviations."""
+        """Add the causes that affect all joints alike: a common part and a deviation for each joint."""
         for cause in (c for c in CAUSES if c.kind):
             members = [g for g in self.out.groups if g.cause == cause.name and not any(v for _, v in g.shape)]
             if len(members) < 2:
@@ -632,7 +642,7 @@ class _Builder:
         self.group("gravity_compensation", "robot", [share], [0.5])
 
     def _link(self, body: int) -> None:
-        # Torques are linear in moments, which are products of mass and centre: columns around their values.
+        # Torques are linear in mass times centre of mass, so linearise both around their current values.
         n, t, zero = self.model.model.body(body).name, self.given, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
         m, c = t.mass[body], t.com[body]
@@ -643,7 +653,9 @@ class _Builder:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         spread = self.sd("link_mass", "excess_kg", INERTIA * float(m)) / max(float(m), 1e-9)
-        moved = {} if loaded else self.values  # a load has columns of its own, which are exact
+        moved = (
+            {} if loaded else self.values
+        )  # payload columns are exactly linear and need no linearisation point
         at = c + [moved.get(f"{n} com {x}", 0.0) for x in "xyz"]
         mass = column(f"{n} mass share", spread, inertial_parameters(m, at, zero))
         half, heavy = -math.log(2.0), m * max(1.0 + moved.get(f"{n} mass share", 0.0), 0.05)
@@ -683,7 +695,7 @@ class _Builder:
                     by[t][first : first + len(x)] = x
                     columns.append(self.add(f"{self.names[j]} rest {t} {number} {k}", 0.0, {j: by}))
                     unit.append(1.0 / np.sqrt(3.0 * (1 + k)))
-                    if 0 < first < len(by[t]) - len(x):  # one that stands as a log begins may be stuck anyhow
+                    if 0 < first < len(by[t]) - len(x):  # a joint at rest from the start may be stuck
                         turns.append(columns[-1])
         if turns:
             self.out.families.append(turns)

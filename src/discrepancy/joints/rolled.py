@@ -1,28 +1,28 @@
-"""The model and the extended model simulated, and held against the logs: rollouts and the closed loop.
+"""Simulate the model and the extended model, and compare them with the logs: free rollouts and the closed loop.
 
-The key ``rollouts`` of a diagnosis, null of other machines and where it was left out on request:
+The key ``rollouts`` of a diagnosis. It is null for other machines and if the rollouts were skipped on request:
 
-joints, units       names in the model's order, and ``rad`` or ``m``
-validated           false for a single trial, to which everything was fitted
-why_not             why there are no free rollouts, or null
-horizons            list, empty where there are none, of
-    seconds                        how far ahead
-    starts                         how many rollouts there are
-    before, after                  {rms, diverged} of the given and of the extended model, lists over the joints: rms
-                                   position error over the starts at which the joint did not diverge (null: it did at
-                                   more than half of them), and at how many it did; ``after`` is null where nothing is
-                                   named
-    removed                        share of the rms removed, over the starts at which the joint diverged in neither;
-                                   null where these are less than half
+joints, units       joint names in the model's order, and ``rad`` or ``m``
+validated           false for a single trial, because all values were fitted to it
+why_not             reason why there are no free rollouts, or null
+horizons            list, empty without free rollouts, of
+    seconds                        length of each rollout
+    starts                         number of rollouts
+    before, after                  {rms, diverged} of the given and of the extended model, lists over the joints.
+                                   ``rms`` is the rms position error over the starts at which the joint did not
+                                   diverge. It is null if more than half of them diverged. ``diverged`` is the number
+                                   of starts at which it did. ``after`` is null without findings
+    removed                        share of the rms error removed, over the starts at which the joint diverged with
+                                   neither model; null if these are less than half
 not_simulated       named causes that the rollouts lack
-refused             what MuJoCo said of extended models that it does not compile, by trial
+refused             MuJoCo's messages on extended models that do not compile, by trial
 commanded           the closed loop:
-    why_not                        why there is none, or null
-    joints                         whose loops are closed, from 1; the others get their logged torques
+    why_not                        reason why there is none, or null
+    joints                         joints with a closed loop, from 1; the others get their logged torques
     blocks                         list of {name, seconds, motion, before, after}: rms position error over the trial and
-                                   standard deviation of the measured motion, lists over the joints; null where a joint
-                                   diverged, ``after`` null where nothing is named
-    before, after, removed         the same over all trials in which a joint diverged in neither
+                                   standard deviation of the measured motion, lists over the joints; null if a joint
+                                   diverged, ``after`` null without findings
+    before, after, removed         the same over all trials in which the joint diverged with neither model
 """
 
 from __future__ import annotations
@@ -50,23 +50,24 @@ from mocobot_sim.serial.extended import Drive, Start, rollout
 from mocobot_sim.serial.mjcf import Built, build
 
 LONGEST_STEP_S = 1e-3
-"""Longest step of MuJoCo's integration [s]. Chosen: a twentieth of the shortest period that smoothing leaves."""
+"""Longest integration step of MuJoCo [s]. Chosen: 1/20 of the shortest period after smoothing."""
 KNOWN = ("torque_offset", "torque_scale", "torque_delay", "back_emf")
-"""Causes that make a logged torque another than the joint has."""
+"""Causes that make the logged torque differ from the torque at the joint."""
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """A logged torque is ``scale`` times the joint's and ``squared`` times its square, plus ``offset``, so much late.
+    """How a logged torque relates to the torque at the joint; arrays of shape (J,).
 
-    All of shape (J,). The square has the torque's sign: a scale may depend on the load.
+    Logged torque = ``scale`` x + ``squared`` x |x| + ``offset`` for a joint torque x, logged ``delay_s`` late. The
+    quadratic term describes a scale that depends on the load.
 
     Attributes:
         offset: [N m or N].
-        scale: 1 where it is right, at no load.
-        squared: by which it grows per load [1/(N m) or 1/N].
-        delay_s: by which it comes late.
-        braking: torque lost to the speed while the drive is on [N m s/rad or N s/m].
+        scale: scale at zero load; 1 if it is correct.
+        squared: increase of the scale per load [1/(N m) or 1/N].
+        delay_s: delay of the logged torque [s].
+        braking: torque loss per speed while the drive is on (back-EMF) [N m s/rad or N s/m].
     """
 
     offset: Array
@@ -77,7 +78,7 @@ class Readings:
 
     @classmethod
     def of(cls, effects: Sequence[RobotEffect], joints: int) -> Readings:
-        """Readings from causes in ``KNOWN``, joints counted from 1."""
+        """Build from effects with causes in ``KNOWN``; joints count from 1."""
         out = cls(np.zeros(joints), np.ones(joints), *np.zeros((3, joints)))
         for effect in effects:
             assert effect.joint is not None
@@ -95,12 +96,15 @@ class Readings:
         return out
 
     def real(self, told: Array, dq: Array, on: Array | float) -> Array:
-        """Torques at the joints by those that the log would have, velocities, and whether the drives are on.
+        """Convert logged torques to torques at the joints.
 
-        Shapes (..., J), (..., J), and (..., 1) or ().
+        Args:
+            told: torques as logged, shape (..., J).
+            dq: joint velocities, shape (..., J).
+            on: whether the drives are on, shape (..., 1) or ().
         """
         read = told - self.offset * on
-        # The root of squared x^2 + scale x = |read|, in a form that has no zero below it.
+        # Root of squared x^2 + scale x = |read|, in the form that is valid for squared = 0.
         root = np.sqrt(np.maximum(self.scale**2 + 4.0 * self.squared * np.abs(read), 0.0))
         real = 2.0 * read / (self.scale + root)
         return real - on * self.braking * dq if self.braking.any() else real
@@ -108,12 +112,12 @@ class Readings:
 
 @dataclass(frozen=True, eq=False)
 class LoggedTorques:
-    """The torques of a log as drives of a simulation, interpolated linearly between samples.
+    """Logged torques that drive a simulation, interpolated linearly between samples.
 
     Attributes:
-        time: of the samples, even [s], shape (Q,).
-        torque: at standstill, shape (Q, J); read where it was known only.
-        braking: what is lost to the speed, shape (Q, J); None where nothing is.
+        time: equidistant sample times [s], shape (Q,).
+        torque: torques at zero speed, shape (Q, J).
+        braking: torque loss per speed, shape (Q, J); None: no loss.
     """
 
     time: Array
@@ -122,11 +126,11 @@ class LoggedTorques:
 
     @classmethod
     def of(cls, log: JointLog, readings: Readings) -> LoggedTorques:
-        """Torques of a log that has them."""
+        """Build from a log with torques."""
         assert log.torque is not None
         on = np.ones(len(log.time)) if log.enabled is None else log.enabled.astype(float)
         torque = log.torque.copy()
-        for j in np.flatnonzero(readings.delay_s):  # what was read late was there before
+        for j in np.flatnonzero(readings.delay_s):  # undo the delay
             good = np.isfinite(log.torque[:, j])
             torque[:, j] = np.interp(log.time + readings.delay_s[j], log.time[good], log.torque[good, j])
         braking = on[:, None] * readings.braking if readings.braking.any() else None
@@ -143,13 +147,13 @@ class LoggedTorques:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A model with findings in it, for one trial.
+    """A model with findings, ready to simulate one trial.
 
     Attributes:
-        built: the robot.
-        readings: what torques are really, by what the log says.
-        every: steps of the integration between samples.
-        left_out: findings that are in neither, in words.
+        built: the compiled robot.
+        readings: relation between logged torques and torques at the joints.
+        every: integration steps between two samples.
+        left_out: names of findings that neither the robot nor the readings contain.
     """
 
     built: Built
@@ -159,10 +163,10 @@ class Robot:
 
     @classmethod
     def of(cls, model: SerialModel, findings: Sequence[Finding], rate_hz: float) -> Robot:
-        """The model with findings, for samples of some rate.
+        """Build the model with findings for a sample rate.
 
         Raises:
-            InputError: MuJoCo refuses the model with the findings in it.
+            InputError: MuJoCo refuses the model with these findings.
         """
         pairs = all_effects(findings, model)
         acting = [pair for pair in pairs if pair[1].cause not in KNOWN]
@@ -175,14 +179,14 @@ class Robot:
     def errors(
         self, s: Signals, piece: slice, drive: Drive, limit: Array, tick: Callable[[float], object] = lambda _: None
     ) -> Array:  # fmt: skip
-        """Simulated minus measured positions, shape (n, J); NaN of a joint from where it is off by more than it may.
+        """Simulated minus measured positions, shape (n, J); NaN for a joint from the sample at which it diverges.
 
         Args:
             s: the trial.
-            piece: of its samples, from the start on.
-            drive: what the drives give.
-            limit: how far off a joint may be, shape (J,).
-            tick: takes the time on the log's clock, at every step.
+            piece: samples to simulate.
+            drive: joint torques as a function of time and state.
+            limit: error at which a joint counts as diverged, shape (J,).
+            tick: receives the log time at every step.
         """
 
         def watched(time: float, q: Array, dq: Array) -> Array:
@@ -199,26 +203,26 @@ class Robot:
 
 
 HORIZONS_S = (0.1, 0.2, 0.5)
-"""How far ahead a robot is rolled out. Chosen: from where friction tells to where an arm has turned round."""
+"""Rollout lengths [s]. Chosen: from the effect of friction to the time in which an arm reverses."""
 MOST_STARTS = 60
-"""Most rollouts in all trials together: root mean squares are known to a tenth then."""
+"""Upper limit of rollouts over all trials. Chosen: root mean squares are then accurate to a tenth."""
 MOST_DIVERGED = 0.5
-"""Share of the starts at which a joint may diverge and still have an error: those left are the easy ones."""
+"""Largest share of diverged starts for which a joint still has an rms error; beyond it, only easy starts remain."""
 EDGE_PERIODS = 2.5
-"""Usable samples before a start and after an end, in periods of the smoothing. Derived: its filter remembers that."""
+"""Usable samples required around a rollout, in periods of the smoothing. Derived: length of the filter's response."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One trial, ready to be rolled out.
+    """One trial, ready for rollouts.
 
     Attributes:
-        signals: smoothed.
-        given: the model.
-        found: with findings in it; None where MuJoCo refuses that.
-        limit: how far off a joint may be before it has diverged [rad or m], shape (J,).
-        events: that act in it; they are not simulated.
-        tick: takes the time on the log's clock, at every step.
+        signals: smoothed log.
+        given: the model as described.
+        found: the extended model; None if MuJoCo refuses it.
+        limit: error at which a joint counts as diverged [rad or m], shape (J,).
+        events: events in this trial; they are not simulated.
+        tick: receives the log time at every step.
     """
 
     signals: Signals
@@ -229,7 +233,7 @@ class Trial:
     tick: Callable[[float], object] = lambda _: None
 
     def both(self, run: Callable[[Robot], Array], shape: tuple[int, ...]) -> tuple[Array, Array]:
-        """What comes of the given model and of the extended one; NaN of one that MuJoCo refuses."""
+        """Run the given and the extended model; NaN if MuJoCo refuses the latter."""
         before = run(self.given)
         if self.found is self.given:
             return before, before
@@ -238,7 +242,7 @@ class Trial:
 
 @dataclass(eq=False)
 class Horizon:
-    """Position errors so far ahead of all starts: of the given and of the extended model, one (J,) a start.
+    """Position errors after a fixed time, one array (J,) for each start, for the given and the extended model.
 
     NaN where a joint diverged.
     """
@@ -249,14 +253,14 @@ class Horizon:
 
 
 def diverged(errors: Array) -> Array:
-    """How often every joint diverged, shape (J,)."""
+    """Number of starts at which each joint diverged, shape (J,)."""
     return np.isnan(errors).sum(axis=0)
 
 
 def rms(errors: Array) -> Array:
-    """Root mean square by joint over the starts at which it did not diverge, shape (J,).
+    """Rms error of each joint over the starts at which it did not diverge, shape (J,).
 
-    NaN where it diverged at more than ``MOST_DIVERGED`` of them.
+    NaN if it diverged at more than ``MOST_DIVERGED`` of the starts.
     """
     good = np.isfinite(errors)
     count = good.sum(axis=0)
@@ -266,21 +270,21 @@ def rms(errors: Array) -> Array:
 
 
 def in_neither(before: Array, after: Array) -> tuple[Array, Array, Array]:
-    """Root mean squares over where a joint diverged in neither, and the share that is gone, shape (J,) each."""
+    """Rms errors over starts at which a joint diverged with neither model, and the share removed, shape (J,) each."""
     both = np.isfinite(before) & np.isfinite(after)
     first, second = (rms(np.where(both, errors, np.nan)) for errors in (before, after))
     return first, second, 1.0 - second / np.where(first > 0, first, np.nan)
 
 
 def usable(s: Signals, events: Sequence[Event] = ()) -> NDArray[np.bool_]:
-    """Samples whose torques and motion are known at all joints, with all that the smoothing has seen, shape (W,).
+    """Samples at which the motion and all torques are known within the reach of the smoothing filter, shape (W,).
 
     Args:
         s: one trial.
-        events: in whose time nothing is usable.
+        events: intervals to exclude.
     """
     margin = math.ceil(EDGE_PERIODS / smoothing_hz(s.log.rate_hz) * s.rate_hz)
-    bad = np.pad(np.logical_not(s.usable).any(axis=1), margin)  # the ends of a trial are not spoilt
+    bad = np.pad(np.logical_not(s.usable).any(axis=1), margin)  # the ends of a trial are valid
     out = np.convolve(bad, np.ones(2 * margin + 1), mode="valid") < 0.5
     for event in events:
         out &= (s.time < event.start_s) | (s.time > event.start_s + event.duration_s)
@@ -290,32 +294,32 @@ def usable(s: Signals, events: Sequence[Event] = ()) -> NDArray[np.bool_]:
 def starts(
     good: NDArray[np.bool_], first: int, apart: int, longest: int, least: int
 ) -> list[tuple[int, int]]:
-    """Starts every so many samples, and how many samples each of them reaches.
+    """Start samples of rollouts, and the number of samples that each can cover.
 
     Args:
-        good: samples of a trial that can be used.
+        good: usable samples of a trial.
         first: sample of the first start.
         apart: samples between starts.
         longest: samples of the longest rollout.
-        least: of the shortest that is of use.
+        least: samples of the shortest useful rollout.
     """
     ends = np.append(np.flatnonzero(~good), len(good))
     out = []
     for a in range(first, len(good), apart):
-        reach = int(ends[np.searchsorted(ends, a)]) - a - 1  # the last sample before what cannot be used
+        reach = int(ends[np.searchsorted(ends, a)]) - a - 1  # up to the last usable sample
         if reach >= least:
             out.append((a, min(reach, longest)))
     return out
 
 
 def roll_freely(trial: Trial, horizons: Sequence[Horizon], passed_s: float, total_s: float) -> None:
-    """Roll out from starts in one trial, and add the errors to the horizons.
+    """Simulate one trial from many starts, and append the errors to the horizons.
 
     Args:
-        trial: whose torques are known at all joints.
-        horizons: from the shortest on.
-        passed_s: how long the trials before it are: starts are as if all trials were one.
-        total_s: how long all trials are.
+        trial: a trial with torques of all joints.
+        horizons: sorted from shortest to longest.
+        passed_s: total duration of the trials before it [s]; starts are equidistant over all trials together.
+        total_s: total duration of all trials [s].
     """
     s = trial.signals
     ahead = [max(1, round(h.seconds * s.rate_hz)) for h in horizons]
@@ -336,18 +340,18 @@ def roll_freely(trial: Trial, horizons: Sequence[Horizon], passed_s: float, tota
 
 
 MOST_LOOP_S = 100.0
-"""Longest closed loops in all trials together, equally long in each [s]."""
+"""Longest closed-loop simulation over all trials together, with equal shares [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopRun:
-    """One trial under its commands.
+    """Closed-loop simulation of one trial.
 
     Attributes:
-        joints: of which the loop is closed, from 0; the others get their logged torques.
-        seconds: how much of the trial.
+        joints: joints with a closed loop, from 0; the others get their logged torques.
+        seconds: simulated duration [s].
         motion: standard deviation of the measured positions [rad or m], shape (J,).
-        before, after: rms of simulated minus measured positions, shape (J,), NaN of a joint that diverged.
+        before, after: rms of simulated minus measured positions, shape (J,); NaN for a joint that diverged.
     """
 
     joints: tuple[int, ...]
@@ -359,13 +363,13 @@ class LoopRun:
 
 @dataclass(frozen=True, eq=False)
 class LoopDrive:
-    """What drives give: by their loops where they have one, else as logged.
+    """Joint torques from the closed loops, and from the log for joints without a loop.
 
     Attributes:
         commanded: the loops.
-        logged: torques of the other joints; None where all have loops.
-        readings: what is wrong with logged torques, and so with what a duty is taken to give; delays are left out, as a
-            loop cannot know its own torque before.
+        logged: torques of the other joints; None if all joints have loops.
+        readings: relation between logged torques and torques at the joints. It also applies to the torque of a duty.
+            Delays are ignored because a loop does not know its past torque.
     """
 
     commanded: Commanded
@@ -374,7 +378,7 @@ class LoopDrive:
 
     @classmethod
     def of(cls, log: JointLog, servos: Sequence[Servo], readings: Readings) -> LoopDrive:
-        """The drives of one log."""
+        """Build the drives of one log."""
         every = len(servos) == log.q.shape[1]
         return cls(Commanded.of(log, servos), None if every else LoggedTorques.of(log, readings), readings)
 
@@ -393,14 +397,14 @@ class LoopDrive:
 def loop_run(
     trial: Trial, joints: Sequence[str], motors: Sequence[Motor], laws: Sequence[LoopLaw], most_s: float
 ) -> LoopRun | str:
-    """Run a trial's commands for as long as all is known; or why that cannot be done.
+    """Simulate a trial under its commands over the longest stretch with known signals, or return why not.
 
     Args:
-        trial: with its models.
-        joints: names.
-        motors: what drives that are told by duties give.
-        laws: of firmware's loops, by the other trials.
-        most_s: how much of it at most.
+        trial: the trial with its models.
+        joints: joint names.
+        motors: torque per unit of duty of drives without torque readings.
+        laws: firmware loops, fitted to the other trials.
+        most_s: longest duration to simulate [s].
     """
     s = trial.signals
     if s.log.drive.command == "none" or s.log.command is None:
@@ -425,7 +429,7 @@ def loop_run(
 
 
 def laws_without(parts: Sequence[Signals], trial: int) -> list[LoopLaw]:
-    """Laws of loops by all trials but one; by that, if there is no other."""
+    """Fit firmware loops to all trials but one; to this one if there is no other."""
     own, logs = parts[trial], {id(s.log): s.log for s in parts}
     if len(parts) > 1:
         log = own.log
@@ -445,7 +449,7 @@ def longest(good: NDArray[np.bool_]) -> slice:
 
 
 def _known(s: Signals, servos: Sequence[Servo]) -> NDArray[np.bool_]:
-    """Samples whose motion and commands are known, and the torques of joints without a loop, shape (W,)."""
+    """Samples with known motion and commands, and known torques of joints without a loop, shape (W,)."""
     log = s.log
     assert log.command is not None
     at = [servo.joint for servo in servos]
@@ -458,21 +462,22 @@ def _known(s: Signals, servos: Sequence[Servo]) -> NDArray[np.bool_]:
 
 
 DIVERGED_RAD = math.pi
-"""How far off a joint that turns may be. Derived: from half a turn on its angle says nothing of where the link is.
-A joint that slides may be off by the extent of the model, or by its own travel in the log if that is more."""
+"""Position error at which a revolute joint has diverged [rad]. Derived: the angle is ambiguous beyond half a turn.
+
+For a prismatic joint it is the extent of the model or the joint's travel in the log, whichever is larger.
+"""
 TOLD_S = 2.0
-"""Between lines of progress."""
+"""Time between progress messages [s]."""
 
 
 def rolled_out(verdict: JointVerdict, say: Callable[[str], object] = lambda _: None) -> dict[str, Any] | None:
-    """Free rollouts and the closed loop, as documented above; None with a reference.
+    """Run free rollouts and the closed loop, and return the values documented above; None with a reference.
 
-    With a reference what is wrong on both days has no values of its own, so no model has it, and it would hide what has
-    changed.
+    With a reference, the model error common to all logs has no fitted values. It would hide the change.
 
     Args:
-        verdict: each trial is rolled out with findings that are fitted to the others.
-        say: takes a line of progress.
+        verdict: the diagnosis; each trial is simulated with findings fitted to the other trials.
+        say: receives progress messages.
     """
     if verdict.reference:
         return None
@@ -519,7 +524,7 @@ def rolled_out(verdict: JointVerdict, say: Callable[[str], object] = lambda _: N
 
 
 class _Progress:
-    """Says now and then how far a trial is."""
+    """Reports the simulated time of a trial at intervals."""
 
     def __init__(self, say: Callable[[str], object], what: str) -> None:
         self._say, self._what = say, what

@@ -1,4 +1,4 @@
-"""Drives that tell no torque: what a motor makes of its voltage or current, and what the loop makes of an error."""
+"""Drives without torque readings: torque per voltage or current, and the proportional law of a position loop."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from estimator.statistics import measured
 from mocobot_logs.joints.joint_log import JointLog
 
 MOTOR_SHARE, MOVES_THROUGHOUT = 0.5, 0.98
-"""Cut-off of the fit over the rows', and the share of its filter's window in which the joint moves."""
+"""Cut-off of the fit relative to the rows; minimum share of the filter's window in which the joint must move."""
 LEAST_DRIVEN_SHARE = 0.1
-"""Least share of the drive's input squared that the model's torque explains: otherwise the joint only rubs."""
+"""Least share of the squared drive input that the modelled torque must explain; below it, friction dominates."""
 
 
 @dataclass(frozen=True)
 class Motor:
-    """What a drive gives per unit of what the logs have.
+    """Torque of a drive per unit of its logged input.
 
     Attributes:
-        joint: which, from 0.
-        torque_per_unit: at standstill, at the joint [N m or N per ``unit``].
+        joint: index, from 0.
+        torque_per_unit: at the joint and at zero speed [N m or N per ``unit``].
         unit: ``V``, ``full duty`` or ``A``.
     """
 
@@ -39,7 +39,7 @@ class Motor:
     unit: str
 
     def sentence(self, name: str) -> str:
-        """What is to be said of it."""
+        """A sentence for the notes of a diagnosis."""
         speed = "" if self.unit == "A" else "; what that loses to speed counts as viscous, or as back-EMF"
         return (
             f"Torques of joint {name} are taken as {self.torque_per_unit:.4g} (N m, or N of a slide) per {self.unit} "
@@ -50,17 +50,17 @@ class Motor:
 def with_torques(
     model: SerialModel, logs: Sequence[JointLog]
 ) -> tuple[tuple[JointLog, ...], tuple[Motor, ...]]:
-    """The logs with torques of every joint that has a duty or a current in all of them, and what these are worth.
+    """Add torques to the logs for joints with only a duty or a current, and return the identified motors.
 
-    A voltage gives a torque at standstill that is in proportion to it; what it loses to the speed (back-EMF) is left to
-    the causes. How much per volt follows from the model: with masses as drawn, or as wrong as these are.
+    The torque at zero speed is proportional to the voltage. The loss with speed (back-EMF) is left to the causes. The
+    torque per volt follows from the model's masses, so it inherits their common scale error.
 
     Args:
         model: the robot as described.
-        logs: of it, those of the reference included.
+        logs: all logs of the robot, with those of the reference.
 
     Raises:
-        InputError: a drive does not go with what the model asks for.
+        InputError: the input of a drive does not correlate with the modelled torque.
     """
     raw, unit = _raw(logs, len(model.joints))
     unknown = [j for j, name in enumerate(unit) if name]
@@ -81,14 +81,14 @@ def with_torques(
 
 
 def driven_by_voltage(motors: Sequence[Motor], joints: int) -> np.ndarray:
-    """Which joints' torques come from a voltage or a duty, so that speed costs torque, shape (J,)."""
+    """Whether a joint's torque comes from a voltage or a duty and so falls with speed, shape (J,)."""
     out = np.zeros(joints, dtype=bool)
     out[[motor.joint for motor in motors if motor.unit != "A"]] = True
     return out
 
 
 def _raw(logs: Sequence[JointLog], joints: int) -> tuple[list[Array], list[str]]:
-    """What drives of unknown constants were given in every log (Q, J), and its unit; empty where torques are known."""
+    """Logged inputs (Q, J) of each log, and the unit of each joint's input; an empty unit if torques are known."""
     volts = all(log.drive.supply_V is not None for log in logs)
     unit = []
     for j in range(joints):
@@ -115,16 +115,17 @@ def _raw(logs: Sequence[JointLog], joints: int) -> tuple[list[Array], list[str]]
 
 
 def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
-    """By least squares: what the drive was given is torque over its constant, plus friction, back-EMF, rotor, offset.
+    """Identify a motor by least squares: input = torque / constant + friction + back-EMF + rotor inertia + offset.
 
-    Friction by load is among them, or a servo that mostly lifts would seem to give less. At rest friction is anything.
+    Load-dependent friction is included because it would bias a joint that mostly lifts. Samples at rest are left out:
+    friction at rest is indeterminate.
     """
     left, right = [], []
     for s in signals:
         side, load, speed = np.clip(s.dq[:, j] / s.slow[j], -1.0, 1.0), s.inverse[:, j], s.dq[:, j]
         on = np.ones(len(speed)) if s.enabled is None else s.enabled
         cutoff = MOTOR_SHARE * s.cutoff_hz
-        # Noise has no sign, and would be a load where there is none.
+        # Filter: noise has no direction and would add to the absolute load.
         passed = np.abs(low_pass(load, s.rate_hz, cutoff))
         each = [
             load,
@@ -155,32 +156,32 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
 
 
 MOST_LOOP_SHARE = 0.1
-"""Share of a duty's variance that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
+"""Largest share of the duty's variance that a loop's law may leave. Chosen: beyond it, the loop is of another type."""
 LATE_S = 1e-3
-"""Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
+"""Least delay of a loop that is reported [s]. Chosen: the timestamps of a bus are no better."""
 CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
-"""Saturation: share of the largest duty, share of the time above it, samples left out around it."""
+"""Saturation: share of the largest duty that counts, least share of time above it, samples to exclude around it."""
 LOOP_STRETCH_S = 1.0
-"""Stretches whose scatter gives a loop's standard errors. Chosen: longer than any loop remembers."""
+"""Length of the stretches whose scatter gives standard errors [s]. Chosen: longer than a loop's memory."""
 LEAST_ROWS = 40
-"""That a block must have to be one. Chosen."""
+"""Least number of rows to fit a loop. Chosen."""
 
 
 @dataclass(frozen=True)
 class LoopLaw:
-    """A proportional loop at one joint: output = gain * (error ``late_s`` ago) + offset, cut off at ``limit``.
+    """Proportional position loop of one joint: output = ``per_rad`` * error(t - ``late_s``) + offset, within ``limit``.
 
     Attributes:
-        joint: which, from 0.
-        gain: of the position loop as the map has it, NaN where that is not known.
+        joint: index, from 0.
+        gain: position gain in the map; NaN if unknown.
         per_rad: output per rad or m of error.
-        se: its standard error, from the scatter between stretches of a second.
-        late_s: how long the loop takes, the readings' own lag included [s].
+        se: its standard error, from the scatter between one-second stretches.
+        late_s: delay of the loop, with that of the readings [s].
         offset: in the output's unit.
-        limit: most that was given where the loop was cut off; inf where it was not.
-        left: root mean square of what the law leaves, in the output's unit.
-        share: of the output's variance that it leaves.
-        logs: how many it was fitted to.
+        limit: output at saturation; inf if it never saturates.
+        left: rms residual, in the output's unit.
+        share: residual variance over the output's variance.
+        logs: number of logs in the fit.
     """
 
     joint: int
@@ -196,10 +197,10 @@ class LoopLaw:
 
 
 def loop_laws(logs: Sequence[JointLog]) -> list[LoopLaw]:
-    """The laws of all joints with a position command and a duty, one per gain.
+    """Fit the loops of all joints with a position command and a duty, one law for each gain.
 
     Args:
-        logs: of one robot; those whose drives are commanded something else are left out.
+        logs: logs of one robot; those without position commands are ignored.
     """
     told = [log for log in logs if _commanded(log)]
     if not told:
@@ -221,11 +222,11 @@ def loop_laws(logs: Sequence[JointLog]) -> list[LoopLaw]:
 
 
 def sentences(laws: Sequence[LoopLaw], joints: Sequence[str]) -> Iterator[str]:
-    """What is to be said of them, one sentence per joint.
+    """Sentences on the loops for the notes of a diagnosis, one for each joint.
 
     Args:
-        laws: of ``loop_laws``.
-        joints: names.
+        laws: result of ``loop_laws``.
+        joints: joint names.
     """
     for j in dict.fromkeys(law.joint for law in laws):
         own = [law for law in laws if law.joint == j]
@@ -256,7 +257,7 @@ def _commanded(log: JointLog) -> bool:
 
 
 def _law(logs: Sequence[JointLog], j: int, gain: float) -> LoopLaw | None:
-    peak = min(max(float(np.nanmax(np.abs(_duty(log, j)))) for log in logs), 1.0)  # resampling overshoots
+    peak = min(max(float(np.nanmax(np.abs(_duty(log, j)))) for log in logs), 1.0)  # resampling can overshoot
     rows, outputs, stretches, every = [], [], [], []
     for log in logs:
         assert log.command is not None
@@ -268,7 +269,7 @@ def _law(logs: Sequence[JointLog], j: int, gain: float) -> LoopLaw | None:
         here[[0, -1]] = False
         columns = np.column_stack([error, -rate, np.ones(len(error))])
         every.append(columns[here])
-        # What may be cut off does not follow the law.
+        # Leave out samples that may be saturated.
         here &= maximum_filter1d(np.abs(duty), CUT_OFF_SAMPLES) < CUT_OFF_SHARE * peak
         rows.append(columns[here])
         outputs.append(duty[here])
@@ -298,15 +299,15 @@ def _duty(log: JointLog, j: int) -> Array:
 
 @dataclass(frozen=True)
 class Servo:
-    """The loop of one joint: output = ``per_rad`` (command - position) - ``damping`` velocity, cut off at ``limit``.
+    """Position loop of one joint: output = ``per_rad`` (command - position) - ``damping`` velocity, within ``limit``.
 
     Attributes:
-        joint: which, from 0.
+        joint: index, from 0.
         per_rad: output per rad or m of error.
         damping: output per rad/s or m/s.
-        limit: most that it gives.
-        torque: of one unit of output at standstill [N m or N].
-        by_supply: whether that is per volt of supply: the output is a duty.
+        limit: largest absolute output.
+        torque: torque per unit of output at zero speed [N m or N].
+        by_supply: whether ``torque`` is per volt of supply, because the output is a duty.
     """
 
     joint: int
@@ -320,14 +321,14 @@ class Servo:
 def servo_of(
     log: JointLog, j: int, motors: Sequence[Motor], laws: Sequence[LoopLaw], name: str
 ) -> Servo | str:
-    """The loop of a joint by the map's gains or, where these are a firmware's, by what logs have; or why there is none.
+    """Build the loop of a joint from the map's gains or, for firmware gains, from fitted laws; or return why it cannot.
 
     Args:
-        log: with the commands.
-        j: the joint, from 0.
-        motors: what drives that are told by duties give.
-        laws: of loops, fitted to logs that are not to be simulated.
-        name: of the joint.
+        log: the log with the commands.
+        j: index of the joint, from 0.
+        motors: torque per unit of duty of drives without torque readings.
+        laws: loops fitted to logs other than the simulated one.
+        name: name of the joint.
     """
     drive = log.drive
     if drive.command != "position":
@@ -356,7 +357,7 @@ def servo_of(
 
 
 def _fitted(laws: Sequence[LoopLaw], j: int, gain: float) -> float | None:
-    """Output per rad at a gain: as it was fitted there, or as laws at other gains have it per unit of gain."""
+    """Output per rad at a gain: fitted at this gain, or else scaled from fits at other gains."""
     good = [law for law in laws if law.joint == j and law.share < MOST_LOOP_SHARE]
     same = [law.per_rad for law in good if law.gain == gain or (np.isnan(law.gain) and np.isnan(gain))]
     if same:
@@ -367,13 +368,13 @@ def _fitted(laws: Sequence[LoopLaw], j: int, gain: float) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class Commanded:
-    """Torques as the log would have them, of servos that follow its commands.
+    """Torques of servos that follow the commands of a log, on the scale of its logged torques.
 
     Attributes:
-        servos: of joints that have one.
-        time: of the samples, even [s], shape (Q,).
+        servos: loops of the joints that have one.
+        time: equidistant sample times [s], shape (Q,).
         command: held from sample to sample, shape (Q, J).
-        supply_V: shape (Q,); 1 where no servo needs it.
+        supply_V: shape (Q,); 1 if no servo needs it.
         on: whether the drives are on, shape (Q,).
     """
 
@@ -385,7 +386,7 @@ class Commanded:
 
     @classmethod
     def of(cls, log: JointLog, servos: Sequence[Servo]) -> Commanded:
-        """With the commands of a log."""
+        """Build from the commands of a log."""
         assert log.command is not None
         count = len(log.time)
         on = np.ones(count) if log.enabled is None else log.enabled.astype(float)
@@ -393,13 +394,13 @@ class Commanded:
         return cls(tuple(servos), log.time, log.command, supply, on)
 
     def sample(self, time: float) -> int:
-        """Which sample holds at a time."""
-        # Half a step of rounding must not hold the sample before.
+        """Index of the sample held at a time."""
+        # The tolerance prevents rounding from selecting the previous sample.
         k = int((time - self.time[0]) / (self.time[1] - self.time[0]) + 1e-6)
         return min(max(k, 0), len(self.time) - 1)
 
     def told(self, time: float, q: Array, dq: Array) -> Array:
-        """Torques of the servos [N m or N], shape (J,); 0 at joints that have none."""
+        """Torques of the servos [N m or N], shape (J,); 0 for joints without one."""
         k, out = self.sample(time), np.zeros(len(q))
         for servo in self.servos:
             j = servo.joint

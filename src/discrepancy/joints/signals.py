@@ -1,4 +1,4 @@
-"""Smooth signals of one log, the noise of its sensors in the rows, and torques of a displaced joint."""
+"""Smoothed signals of one log, sensor noise in the residual torque, and torque changes from joint displacements."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ from estimator.quantisation import Held, doubtful, filled
 from mocobot_logs.joints.joint_log import JointLog
 
 SMOOTH_HZ = 60.0
-"""Cut-off before the nonlinear formulas. Chosen: three times the rows', so that filtering and they commute."""
+"""Cut-off before the nonlinear dynamics [Hz]. Chosen: three times the rows', so that filter and dynamics commute."""
 SMOOTH_SHARE = 0.2
-"""The same over the sampling rate, at most. Chosen: a cut-off must stay below half of it."""
+"""Upper limit of that cut-off over the sampling rate. Chosen: it must stay below the Nyquist frequency."""
 WORK_RATIO = 4.0
-"""Rate of the mechanics over ``SMOOTH_HZ``, about. Derived: what it folds back has been damped to 1/80."""
+"""Approximate sampling rate of the dynamics over ``SMOOTH_HZ``. Derived: aliases are damped to 1/80."""
 CUTOFF_HZ = 20.0
-"""Cut-off of the rows. Chosen: arms move below 5 Hz, and bend from some 10 Hz on."""
+"""Cut-off of the rows [Hz]. Chosen: arm motion is below 5 Hz, and structural resonances begin near 10 Hz."""
 CUTOFF_SHARE = 0.15
-"""The same over the sampling rate, at most. Chosen."""
+"""Upper limit of that cut-off over the sampling rate. Chosen."""
 SLOW_SHARE = 0.01
-"""Share of a joint's typical speed below which the direction of friction fades. Chosen."""
+"""Share of a joint's typical speed below which the friction direction fades. Chosen."""
 SLOW_ROUNDINGS = 2.0
-"""Least such speed, in standard deviations of the velocity that rounding of positions makes."""
+"""Lower limit of that speed, in standard deviations of the velocity error from position rounding."""
 LEAST_SPEED = 1e-6
-"""Typical speed of a joint that does not move [rad/s or m/s]. Chosen: no more than a number to divide by."""
+"""Lower limit of the typical speed [rad/s or m/s]. Chosen: only prevents division by zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """W samples at the rate of the mechanics, J joints.
+    """Smoothed signals of one log at W samples for J joints.
 
     Attributes:
-        log: what they are of.
-        tree: the nominal one.
-        rate_hz: of the samples.
+        log: the original log.
+        tree: the nominal kinematic tree.
+        rate_hz: sampling rate of these signals.
         time: [s], shape (W,).
         q, dq, ddq: smoothed joint positions and their derivatives, shape (W, J).
-        torque: through the same filter, shape (W, J).
-        usable: samples and joints whose torque and motion are what they seem, shape (W, J).
-        inverse: torques that the nominal model asks for without friction, shape (W, J).
-        typical: speed of every joint while it moves, over all logs (root mean square), shape (J,).
-        cutoff_hz: of the rows.
-        enabled: whether the drives are on, shape (W,); None where the log does not say.
-        held: positions of the log whose encoder holds its last value.
-        spoilt: samples that these change by more than noise, shape (W,); None: none does.
+        torque: measured torque through the same filter, shape (W, J).
+        usable: whether torque and motion of a joint are valid, shape (W, J).
+        inverse: modelled torque without friction, shape (W, J).
+        typical: typical (rms) speed of each joint over all logs, shape (J,).
+        cutoff_hz: cut-off of the rows.
+        enabled: whether the drives are on, shape (W,); None: not logged.
+        held: intervals of the log in which an encoder holds its last value.
+        spoilt: samples that these intervals change by more than noise, shape (W,); None: no such samples.
     """
 
     log: JointLog
@@ -73,12 +73,12 @@ class Signals:
 
     @classmethod
     def of(cls, log: JointLog, tree: Tree, inverse_torque: Callable[[Array, Array, Array], Array]) -> Signals:
-        """Smooth, differentiate at the full rate, and keep as many samples as the filter leaves.
+        """Smooth and differentiate at the full rate, then reduce the rate as the filter permits.
 
         Args:
-            log: what to smooth.
-            tree: the nominal one.
-            inverse_torque: torques of the model without friction from positions and their derivatives.
+            log: the log.
+            tree: the nominal kinematic tree.
+            inverse_torque: returns the modelled torque without friction from positions and their derivatives.
         """
         rate = log.rate_hz
         step = work_step(rate)
@@ -100,35 +100,35 @@ class Signals:
 
     @cached_property
     def motion(self) -> Motion:
-        """Motion of the nominal tree's bodies."""
+        """Motion of the bodies of the tree."""
         return Motion.of(self.tree, self.q, self.dq, self.ddq)
 
     @property
     def slow(self) -> Array:
-        """Speeds below which the direction of friction fades, shape (J,): slow, and told from the reading's steps."""
+        """Speeds below which the friction direction fades, shape (J,): above the rounding noise of the velocity."""
         cutoff, rate = smoothing_hz(self.log.rate_hz), self.log.rate_hz
-        # Rounding as white noise of step^2 / 12, low-passed and differentiated.
+        # Treat rounding as white noise of variance step^2 / 12, low-passed and differentiated.
         rounding = self.log.position_step * 2.0 * np.pi * np.sqrt(cutoff**3 / (18.0 * rate))
         return np.maximum(SLOW_SHARE * self.typical, SLOW_ROUNDINGS * rounding)
 
 
 def smoothing_hz(rate_hz: float) -> float:
-    """Cut-off of the first filter."""
+    """Cut-off of the smoothing filter for a sampling rate."""
     return min(SMOOTH_HZ, SMOOTH_SHARE * rate_hz)
 
 
 def cutoff_hz(rate_hz: float) -> float:
-    """Cut-off of the rows of a log of some rate, whose drives tell their torques."""
+    """Cut-off of the rows for a sampling rate, if the drives report torques."""
     return min(CUTOFF_HZ, CUTOFF_SHARE * rate_hz)
 
 
 def work_step(rate_hz: float) -> int:
-    """Samples of a log to one of the mechanics."""
+    """Samples of the log for each sample of the dynamics."""
     return max(1, int(rate_hz / (WORK_RATIO * smoothing_hz(rate_hz))))
 
 
 def _filled(log: JointLog) -> tuple[Array, NDArray[np.bool_]]:
-    """Torques with what is missing interpolated, and where nothing was missing, shape (Q, J) each."""
+    """Torques with gaps interpolated, and where they are valid, shape (Q, J) each."""
     if log.torque is None:
         return np.zeros_like(log.q), np.zeros(log.q.shape, dtype=bool)
     known = np.isfinite(log.torque)
@@ -141,20 +141,20 @@ def _filled(log: JointLog) -> tuple[Array, NDArray[np.bool_]]:
 
 
 TORQUE_BAND_HZ = (30.0, 120.0)
-"""Where the torque's noise is read off: next to the rows, where little moves."""
+"""Band in which the torque noise is estimated [Hz]: above the rows, where there is little motion."""
 TOP_SHARES, FILTERED_SHARES = (0.25, 0.45), (0.1, 0.2)
-"""Where the noise of positions is read off, over the rate; the second of a log that was resampled."""
+"""Band in which the position noise is estimated, over the sampling rate; the second is for resampled logs."""
 SEGMENT_S = 0.5
-"""Length of the spectra whose median over time is the noise: bursts, such as reversals, are not [s]."""
+"""Segment length of the spectra [s]. The median over time ignores bursts such as reversals."""
 STILL_S, STILL_STEPS = 0.1, 0.3
-"""How long a position's reading must be the same, within which share of its step, to be without noise."""
+"""A reading has no noise if it is constant for this time [s], within this share of its resolution."""
 LEAST_SHARE = 1e-3
-"""Noise of a torque over its root mean square: no drive tells it better than to a thousandth."""
+"""Lower limit of torque noise over the rms torque: no drive measures better than to 0.1 %."""
 SEED = 8113
 
 
 def sensor_noise(s: Signals) -> Array:
-    """A draw of what the sensors add to the residual of a whole log, at the rate of its signals, shape (W, J)."""
+    """Sample of the sensor noise in the residual torque of a log, at the rate of its signals, shape (W, J)."""
     log, rate = s.log, s.log.rate_hz
     torque = np.nan_to_num(log.torque) if log.torque is not None else np.zeros_like(log.q)
     top = FILTERED_SHARES if log.resampled else TOP_SHARES
@@ -181,14 +181,14 @@ def sensor_noise(s: Signals) -> Array:
 
 
 def _changing(log: JointLog) -> NDArray[np.bool_]:
-    """Where the readings of positions change, shape (Q, J): one that stands still, by its step, has no noise at all."""
+    """Where position readings change, shape (Q, J); a constant reading has no noise."""
     size = max(3, 2 * round(STILL_S * log.rate_hz / 2.0) + 1)
     spread = maximum_filter1d(log.q, size, axis=0) - minimum_filter1d(log.q, size, axis=0)
     return spread > STILL_STEPS * log.position_step
 
 
 def _density(x: Array, rate_hz: float, low: float, high: float) -> Array:
-    """Power density of every channel in a band, median over time and frequency, shape (J,) per hertz."""
+    """Noise power density of each channel in a band, median over time and frequency, shape (J,) per hertz."""
     size = min(len(x), max(16, round(SEGMENT_S * rate_hz)))
     starts = range(0, len(x) - size + 1, max(1, size // 2))
     frequency, each = np.zeros(0), []
@@ -198,21 +198,21 @@ def _density(x: Array, rate_hz: float, low: float, high: float) -> Array:
     band = (frequency >= low) & (frequency <= high)
     if not band.any():
         band = frequency >= frequency[-1] / 2.0
-    # A periodogram's ordinate scatters as chi-square of two degrees of freedom, whose median is ln 2 of its mean.
+    # Periodogram ordinates follow chi-square with two degrees of freedom, whose median is ln 2 times the mean.
     return np.asarray(np.median(np.array(each)[:, band], axis=(0, 1)) / np.log(2.0))
 
 
 STEP_RAD, STEP_M = 1e-4, 1e-5
-"""Steps of differences by joint positions: their squares and rounding are both below 1e-6."""
+"""Steps for numerical derivatives: truncation and rounding errors are below 1e-6."""
 
 
 def along(signals: Signals, at: int, way: Array) -> Array:
-    """Change of the nominal torques per unit of a change of one joint's position over time, shape (W, J).
+    """First-order change of the modelled torques for a displacement of one joint over time, shape (W, J).
 
     Args:
-        signals: of one log.
-        at: the joint.
-        way: in which direction and how far, shape (W,).
+        signals: signals of one log.
+        at: index of the joint.
+        way: displacement [rad or m], shape (W,).
     """
     first = differentiate(way, signals.rate_hz)
     ways = (way, first, differentiate(first, signals.rate_hz))
@@ -220,7 +220,7 @@ def along(signals: Signals, at: int, way: Array) -> Array:
 
 
 def _partials(signals: Signals, at: int) -> list[Array]:
-    """Change of the torques with a joint's position, velocity and acceleration, shape (W, J) each; remembered."""
+    """Derivatives of the torques by a joint's position, velocity and acceleration, shape (W, J) each; cached."""
     known = signals.__dict__.setdefault("_partials", {})
     if at not in known:
         known[at], step = [], STEP_M if signals.tree.slides[at] else STEP_RAD

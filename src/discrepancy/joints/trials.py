@@ -1,4 +1,4 @@
-"""From logs to trials: torques of every drive, smooth signals, and parts that predict each other."""
+"""Prepare logs for the diagnosis: torques of all drives, smoothed signals, and parts for cross-validation."""
 
 from __future__ import annotations
 
@@ -23,34 +23,34 @@ from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import JointLog
 
 EDGE_S = 0.1
-"""Left out at both ends, where smoothing is spoilt: six periods of its cut-off."""
+"""Time to discard at both ends [s]: six periods of the smoothing cut-off, where the filter is inaccurate."""
 SHORT_S = 0.03
-"""Spells without a reading that are interpolated. Derived: a quarter of a period of the fastest row."""
+"""Longest gap to interpolate [s]. Derived: a quarter of a period of the fastest row."""
 LEAST_S, LEAST_SAMPLES = 2.0, 40
-"""A part that is used, at least."""
+"""Least length of a run: duration [s] and samples."""
 PARTS, PART_S = 3, 4.0
-"""Parts of a single log, and their length at least: each holds most of the motion's poses."""
+"""Largest number of parts of a single log, and their least duration [s]: each covers most poses of the motion."""
 LIMIT_RAD, LIMIT_M, LIMIT_S = 6e-3, 3e-3, 0.05
-"""Within this distance of a limit its force may act; fade time of what is left out [s]."""
+"""Distance from a joint limit within which its force may act [rad, m], and fade time of excluded samples [s]."""
 LEAST_SPEED = 1e-6
 RESTS = 2.0
-"""Noise over which readings of a joint must scatter for it to move."""
+"""Least standard deviation of a moving joint's readings, in units of their noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """Logs as the engine takes them.
+    """Logs in the form that the diagnosis uses.
 
     Attributes:
-        runs: stretches without gaps; those of a reference come last.
-        changed: how many are none of the reference.
-        joints: which have torques in all logs, from 0, shape (C,).
-        motors: drives that tell no torque, and what they give by what they were given.
-        parts: for each part its run and the samples of it.
-        names: of the parts.
-        noise: a draw of what the sensors add to the residual of each run, shape (W, J).
-        kept: weight of each sample of each run, zero where a joint is at a limit, shape (W, J); empty: none is.
-        limited: time that each joint spends at its limits [s], shape (J,).
+        runs: stretches without gaps; those of the reference come last.
+        changed: number of runs before those of the reference.
+        joints: indices of joints with torques in all logs, from 0, shape (C,).
+        motors: torque per unit of input of drives without torque readings.
+        parts: for each part, the index of its run and the samples in it.
+        names: names of the parts.
+        noise: sample of the sensor noise in the residual of each run, shape (W, J).
+        kept: weight of each sample of each run, zero at joint limits, shape (W, J); empty: all samples count.
+        limited: time of each joint at its limits [s], shape (J,).
     """
 
     runs: tuple[Signals, ...]
@@ -70,10 +70,10 @@ class Trials:
 
 
 def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[JointLog] = ()) -> Trials:
-    """Smooth the logs, and cut them where samples are missing; a single log has three parts if it is long enough.
+    """Smooth the logs and cut them at gaps; a single log is split into up to three parts.
 
     Raises:
-        InputError: a log is too short, or has no torques.
+        InputError: a log is too short or has no torques.
     """
     every, motors = with_torques(model, [*logs, *reference])
     known = np.ones(len(model.joints), dtype=bool)
@@ -108,10 +108,10 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
 
 
 def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array, ...], Array]:
-    """Weights of samples that fade to zero where a joint is at a limit, whose force nobody knows, and the time there.
+    """Weights of samples that fade to zero at joint limits, where the limit's force is unknown, and the time there.
 
-    A joint that spends most of its time beyond its limits has others than the model. Where an encoder holds its value,
-    the torques of all joints fade.
+    A joint that spends most of the time beyond its limits has other limits than the model, so these are ignored. All
+    joints fade where an encoder holds its last value.
     """
     slack = model.model.jnt_margin + np.where(model.slides, LIMIT_M, LIMIT_RAD)
     at = [(s.q < model.lower + slack) | (s.q > model.upper - slack) for s in runs]
@@ -129,7 +129,7 @@ def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array
 
 
 def held_in(model: SerialModel, trials: Trials) -> list[HeldReadings]:
-    """Encoders that hold their last value for a while in any of the trials."""
+    """Intervals in which encoders hold their last value, in all trials."""
     found = []
     for trial, s in enumerate(trials.signals):
         for held in s.held:
@@ -141,14 +141,14 @@ def held_in(model: SerialModel, trials: Trials) -> list[HeldReadings]:
 
 
 def part_of(s: Signals, at: slice) -> Signals:
-    """Some samples of a log."""
+    """Cut a range of samples from the signals."""
     own = {name: getattr(s, name)[at] for name in ("time", "q", "dq", "ddq", "torque", "usable", "inverse")}
     more = {name: x if (x := getattr(s, name)) is None else x[at] for name in ("enabled", "spoilt")}
     return replace(s, **own, **more)
 
 
 def _runs(s: Signals, joints: NDArray[np.intp]) -> list[slice]:
-    """Stretches of usable samples without the ends that smoothing spoils, short gaps included."""
+    """Usable stretches without the ends affected by smoothing; short gaps are bridged."""
     bad = ~s.usable[:, joints].all(axis=1)
     edge = max(1, round(EDGE_S * s.rate_hz))
     cuts = [-1, *np.flatnonzero(bad).tolist(), len(s.usable)]
@@ -176,7 +176,7 @@ def _name(s: Signals, at: slice, *, whole: bool) -> str:
 
 
 def notes_of(logs: Sequence[JointLog]) -> Iterator[str]:
-    """Notes on logs; of those that differ in their numbers only, the first, and how many more there are."""
+    """Notes on the logs; for notes that differ only in numbers, the first and the count of the others."""
     alike: dict[str, list[str]] = {}
     for log in logs:
         for note in log.notes:
@@ -188,17 +188,17 @@ def notes_of(logs: Sequence[JointLog]) -> Iterator[str]:
 
 
 def at_limits(model: SerialModel, limited: Array) -> Iterator[str]:
-    """What is left out because a joint is at a limit of the model."""
+    """Notes on samples that are left out because a joint is at a limit."""
     for name, seconds in zip(model.joints, limited, strict=True):
         if seconds:
             yield f"{seconds:.2g} s of {name} at its limits in the model are left out: nobody knows the limit's torque."
 
 
 def resting(logs: Sequence[JointLog]) -> Iterator[str]:
-    """What rests in all logs, of which they tell little."""
+    """A note on joints at rest in all logs, because such logs say little about them."""
     still = np.ones(len(logs[0].joints), dtype=bool) if logs else np.zeros(0, dtype=bool)
     for log in logs:
-        # White noise has second differences of six times its variance; those of a motion are small beside its size.
+        # Second differences of white noise have six times its variance; those of a motion are small.
         noise: Array = np.std(np.diff(log.q, 2, axis=0), axis=0) / np.sqrt(6.0)
         still &= np.std(log.q, axis=0) <= np.maximum(RESTS * noise, log.position_step)
     names = [name for name, rests in zip(logs[0].joints, still, strict=True) if rests] if logs else []

@@ -1,4 +1,4 @@
-"""Torques that no cause of the tables makes: smooth functions of one signal of a joint."""
+"""Unlisted laws: smooth functions of one signal of a joint, for effects in no table of causes."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from discrepancy.joints.causes import JointSignals
 from estimator.arrays import Array
 
 TERMS = 7
-"""Cosines of a function: periods down to a quarter of the signal's range."""
+"""Number of cosines in a function; the shortest period is 2/7 of the signal's range."""
 
 
 @dataclass(frozen=True)
 class Signal:
-    """What a function is of.
+    """The argument of an unlisted law.
 
     Attributes:
-        of: values at one joint, of its signals and of those of the joint before it.
-        turns: whether the function turns with the direction of motion.
-        name: as the simulator has it, but for the joint's number.
-        symbol: in a formula.
-        unit: of a joint that turns.
+        of: returns the values from the signals of the joint and of the joint before it.
+        turns: whether the function changes sign with the direction of motion.
+        name: name in the simulator, without the joint number.
+        symbol: symbol in a formula.
+        unit: unit for a revolute joint.
     """
 
     of: Callable[[JointSignals, JointSignals], Array]
@@ -46,24 +46,24 @@ SIGNALS: Mapping[str, Signal] = {
     "neighbour's torque": Signal(lambda s, before: before.asked, False, "torque", "tau", "N m"),
     "reading": Signal(lambda s, before: s.q, False, "q", "q", "rad"),
 }
-"""What a function is of; the last is an error of a position."""
+"""Possible arguments; a function of "reading" is a position error, the others are torques."""
 SLIDES = {"rad": "m", "rad/s": "m/s", "N m": "N", "s": "s"}
-"""Units of a joint that slides."""
+"""Units for a prismatic joint."""
 SIZES = 1.0 / (1.0 + np.arange(TERMS)) / np.sqrt(np.sum(1.0 / (1.0 + np.arange(TERMS)) ** 2))
-"""Standard deviations of the terms over that of the function: those of a function with a square integrable slope."""
+"""Relative prior standard deviations of the terms, as for a function with a square-integrable derivative."""
 
 
 def functions(
     signals: Sequence[JointSignals], before: Sequence[JointSignals]
 ) -> Iterator[tuple[str, list[list[Array]]]]:
-    """Bases of smooth functions of one joint.
+    """Basis functions of the unlisted laws of one joint.
 
     Args:
-        signals: of the joint, a log each.
-        before: of the joint before it.
+        signals: signals of the joint, one for each log.
+        before: signals of the joint before it.
 
     Returns:
-        For each signal its name, and series (W,) a log of each term.
+        For each argument, its name, and for each term its series (W,) by log.
     """
     edges = np.cumsum([len(s.q) for s in signals])[:-1]
     for name, signal in SIGNALS.items():
@@ -73,16 +73,16 @@ def functions(
 
 
 def every(name: str, signals: Sequence[JointSignals], before: Sequence[JointSignals]) -> Array:
-    """A signal in all logs one after another, shape (Q,)."""
+    """An argument in all logs, concatenated, shape (Q,)."""
     return np.concatenate([SIGNALS[name].of(s, b) for s, b in zip(signals, before, strict=True)])
 
 
 def basis(name: str, x: Array) -> Array:
-    """Terms of a function at values of its signal, shape (Q,) -> (Q, TERMS)."""
-    even = (x - x.min()) / (np.ptp(x) + 1e-9)  # what is differentiated is smooth
+    """Terms of a function at values of its argument, shape (Q,) -> (Q, TERMS)."""
+    even = (x - x.min()) / (np.ptp(x) + 1e-9)  # smooth in the reading, because it is differentiated
     place = even if name == "reading" else (rankdata(x) - 0.5) / len(x)
     terms = np.cos(np.pi * np.outer(place, 1.0 + np.arange(TERMS)))
-    if name == "neighbour's torque":  # a sensor that reads some of it
+    if name == "neighbour's torque":  # the torque sensor may read part of the neighbour's torque
         terms[:, 0] = x / (np.std(x) + 1e-9)
     return terms
 
@@ -91,14 +91,14 @@ def law_of(
     name: str, joint: int, slides: Sequence[bool], signals: Sequence[JointSignals],
     before: Sequence[JointSignals], fit: tuple[Array, Array, Array],
 ) -> Law:  # fmt: skip
-    """An unlisted error with its formula.
+    """Formula of an unlisted law.
 
     Args:
-        name: of the signal.
-        joint: which, from 0.
-        slides: whether each joint slides.
-        signals, before: of the joint and of the joint before it, a log each.
-        fit: mean (k,) and covariance (k, k) of its terms, and the variances (k,) with which they were fitted.
+        name: its argument.
+        joint: index of the joint, from 0.
+        slides: whether each joint is prismatic.
+        signals, before: signals of the joint and of the joint before it, one for each log.
+        fit: mean (k,) and covariance (k, k) of its terms, and their prior variances (k,).
     """
     signal, x = SIGNALS[name], every(name, signals, before)
     other = joint - 1 if name == "neighbour's torque" else joint

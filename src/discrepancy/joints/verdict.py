@@ -1,4 +1,4 @@
-"""From a search to a verdict: causes with values, probabilities, and what they are worth on data not used."""
+"""Turn a search result on joint logs into a verdict: causes with values and probabilities, and held-out predictions."""
 
 from __future__ import annotations
 
@@ -36,15 +36,14 @@ from mocobot_logs.joints.joint_log import JointLog
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """How well the torques of one trial are predicted by the others.
+    """Prediction of one trial's torques from the other trials.
 
     Attributes:
-        trial: its name.
-        before, after: root mean squares of measured minus predicted torque without and with the findings, as the other
-            trials have them, shape (J,) [N m or N].
-        noise: of the rows, shape (J,).
-        torque: root mean square of the measured torque, shape (J,).
-        chi2_before, chi2_after: squares over the noise's variance, per row.
+        trial: name of the trial.
+        before, after: rms of measured minus predicted torque without and with the findings, shape (J,) [N m or N].
+        noise: standard deviation of the noise of the rows, shape (J,).
+        torque: rms of the measured torque, shape (J,).
+        chi2_before, chi2_after: squared residuals over the noise variance, per row.
     """
 
     trial: str
@@ -58,14 +57,14 @@ class Prediction:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointVerdict(Verdict):
-    """What logs say of a model of a robot of joints.
+    """Verdict on the model of a robot with revolute and prismatic joints.
 
     Attributes:
         model: the robot as described.
-        parts: the trials: smoothed logs, or parts of one.
-        motors: drives that tell no torque, and what they give by what they were given.
-        predictions: one a trial, predicted by the others; by all of them where there is one trial only (``validated``).
-        by_the_others: for the number of a trial, the findings with values fitted to the other trials, without events.
+        parts: signals of the trials, which are whole logs or parts of one.
+        motors: torque per unit of input of drives without torque readings.
+        predictions: one for each trial, predicted from the others. A single trial is predicted from itself.
+        by_the_others: returns, for the index of a trial, the findings fitted to the other trials, without events.
     """
 
     model: SerialModel
@@ -88,19 +87,19 @@ def judged(
     seconds: float | None = None,
     say: Say = lambda _: None,
 ) -> JointVerdict:
-    """Find out what a model of a robot of joints gets wrong.
+    """Diagnose what a robot's model gets wrong, from joint logs.
 
     Args:
         model: the robot as described.
-        logs: of its joints.
-        reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
-        excluded: causes left out of the tables.
-        tolerances: standard deviations by cause and parameter of a healthy robot in place of the usual ones.
-        seconds: after which the search ends with what it has.
-        say: takes a line about each step.
+        logs: joint logs.
+        reference: logs of the same robot in a healthy state. Model errors present in them, too, are not reported.
+        excluded: causes to leave out.
+        tolerances: prior standard deviations of a healthy robot by cause and parameter, to replace the defaults.
+        seconds: time limit of the search [s].
+        say: receives a line of text about each step.
 
     Raises:
-        InputError: a log cannot be used, or a cause to be excluded does not exist.
+        InputError: a log is unusable, or an excluded cause does not exist.
     """
     until = Until(math.inf if seconds is None else time.monotonic() + seconds)
     say("smoothing the logs")
@@ -122,7 +121,7 @@ def judged(
 
 
 class _JointJudge(Judge):
-    """What one search found in logs of joints."""
+    """Turns a search result on joint logs into a verdict."""
 
     problem: JointProblem
 
@@ -139,7 +138,7 @@ class _JointJudge(Judge):
         return self.problem.withheld
 
     def verdict(self, notes: Sequence[str]) -> JointVerdict:
-        """All that is told."""
+        """Build the verdict."""
         logs = [s.log for s in self.trials.runs]
         more = (*at_limits(self.model, self.trials.limited), *resting(logs), *self._notes())
         verdict = JointVerdict(
@@ -184,7 +183,7 @@ class _JointJudge(Judge):
 
     @cache  # noqa: B019
     def _law(self, group: Group) -> Law:
-        """What no table lists, with its formula."""
+        """Formula of an unlisted law."""
         j, signals = self.model.joints.index(group.place), self.problem.joints
         slides = [bool(x) for x in self.model.slides]
         return law_of(self._signal(group), j, slides, signals[j], signals[j - 1], self.fit_of(group))
@@ -226,12 +225,12 @@ class _JointJudge(Judge):
         value, _ = physical(self.problem, group, np.where(seen, sizes, 0.0), np.diag(sizes**2))
         return {n: abs(x) if ok else None for (n, x), ok in zip(value.items(), seen, strict=True)}
 
-    # --- what they are worth
+    # --- held-out predictions
 
     def by_the_others(self, trial: int) -> tuple[Finding, ...]:
-        """The findings that a simulation can have, with values fitted to the other parts.
+        """Findings that a simulation can represent, with values fitted to the other parts.
 
-        They are alone, as in a simulation: tolerances and laws' errors do not take a share of what they do.
+        Tolerances and law errors are fixed at zero, as in the simulation. The findings explain all effects.
         """
         named = [o for o in self.named if not o.chosen.group.event and o.chosen.group.cause != "unlisted"]
         prior = self.prior([o.chosen for o in named], tolerated=False)
@@ -251,18 +250,18 @@ class _JointJudge(Judge):
             yield Prediction(name, sides[0], sides[1], self._wide(self._noise(t)), torque, chi2[0], chi2[1])
 
     def _wide(self, sizes: Array) -> Array:
-        """Numbers of the joints with torques as ones of all joints."""
+        """Expand values of the joints with torques to all joints; 0 for the others."""
         out = np.zeros(len(self.model.joints))
         out[self.trials.joints] = sizes
         return out
 
     def _noise(self, t: int) -> Array:
-        """Standard deviation of a part's noise in physical units, by channel."""
+        """Noise standard deviation of a part in physical units, for each channel."""
         rows = self.parts.rows[t]
         mean = np.sum(rows * self.state.posterior.variance, axis=1) / rows.sum(axis=1)
         return np.sqrt(mean) * self.series[t].unit
 
-    # --- what else there is to tell
+    # --- notes and traces
 
     def _notes(self) -> Iterator[str]:
         for motor in self.trials.motors:
@@ -277,7 +276,7 @@ class _JointJudge(Judge):
             )
 
     def traces(self) -> list[Trace]:
-        """Residuals of each part: as modelled, and with everything that was found."""
+        """Residuals of each part, as modelled and with everything that was found."""
         x = self.state.posterior.mean[self.parts.active]
         out = []
         for t, name in enumerate(self.trials.names[: self._changed]):

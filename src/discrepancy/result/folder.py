@@ -1,4 +1,4 @@
-"""A diagnosis as values, text and folder: what teams and robots of joints have in common."""
+"""A diagnosis as values, text and result folder: the common part for teams and single robots."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ V = TypeVar("V", bound=Verdict)
 
 
 class Diagnosed(ABC, Generic[V]):
-    """A verdict with all that is told, drawn and written of it."""
+    """A verdict with its text, plots and files."""
 
     verdict: V
 
@@ -34,44 +34,44 @@ class Diagnosed(ABC, Generic[V]):
     @property
     @abstractmethod
     def channels(self) -> Sequence[Channel]:
-        """What residuals are of."""
+        """The residual channels."""
 
     @abstractmethod
     def unit(self, name: str) -> str:
-        """Unit of a quantity that a misfit may depend on."""
+        """Unit of a quantity on which a misfit may depend."""
 
     @abstractmethod
     def models(self) -> Iterator[tuple[str, str, Callable[[Path], None]]]:
-        """Models to take away: folder, what it is in words, and what writes it."""
+        """Models to write: folder name, description, and a function that writes the model."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
+        """Strict JSON values with units in the keys; see ``discrepancy.result.json``."""
         return self.values
 
     def __str__(self) -> str:
-        """At most five sentences and a table."""
+        """Report of at most five sentences and a table."""
         return format_verdict(self.values)
 
     def verbose_text(self) -> str:
-        """All that there is to say."""
+        """Report with all details."""
         return format_verdict(self.values, verbose=True)
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
-        """Write models to take away, residuals, pictures, JSON and report into an existing folder.
+        """Write models, residuals, plots, JSON and report into an existing folder.
 
         Args:
-            folder: where.
-            pictures: whether pictures are drawn, too.
+            folder: the folder.
+            pictures: whether to draw plots.
             more: further keys of the JSON.
 
         Raises:
-            InputError: something cannot be written.
+            InputError: a file cannot be written.
         """
         values = self.values
         for name, what, write in self.models():
             try:
                 write(folder / name)
-            except InputError as error:  # values that no effect can have, such as a negative friction
+            except InputError as error:  # no effect has such values, such as a negative friction
                 note = f"There is no {what}: {error}."
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
         draw(values, self.verdict.traces(), self.channels, self.unit, folder, pictures=pictures)
@@ -83,10 +83,10 @@ def draw(
     values: Mapping[str, Any], traces: Sequence[Trace], channels: Sequence[Channel], unit: Callable[[str], str],
     folder: Path, *, pictures: bool = True,
 ) -> None:  # fmt: skip
-    """Write residuals and, where plots can be drawn, pictures of a diagnosis; arguments as of ``save_plots``.
+    """Write the residuals of a diagnosis, and its plots if plotting is available; arguments as in ``save_plots``.
 
     Raises:
-        InputError: something cannot be written.
+        InputError: a file cannot be written.
     """
     save_traces(traces, channels, folder / RESIDUALS)
     if pictures and draws_plots():

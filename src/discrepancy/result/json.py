@@ -1,87 +1,84 @@
-"""JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
+"""JSON form of a diagnosis: plain types, no NaN, units in the keys. A value that is not available is null.
 
-format, version     "mocobot-diagnosis", 3; version 2 has no ``machine``, ``finished`` and ``members``
-machine             "team", or "joints" of one robot of hinges and slides. A verdict of ``discrepancy.evidence`` on it
-                    (``discrepancy.result.json``) has ``told``, ``event``, ``at``, ``reference`` and a limit's ``place``
-                    besides. In it ``prior_odds``, ``share_left``, ``foretold``, ``unlisted_nats``, ``nats`` of
-                    ``scatter`` and ``chi2_per_n`` of alternatives are null
-finished            whether the search came to its end
+format, version     "mocobot-diagnosis", 3; version 2 lacks ``machine``, ``finished`` and ``members``
+machine             "team", or "joints" for one robot of hinges and slides. The latter also has ``told``, ``event``,
+                    ``at``, ``reference`` and a limit's ``place``. Its ``prior_odds``, ``share_left``, ``foretold``,
+                    ``unlisted_nats``, ``nats`` of ``scatter`` and ``chi2_per_n`` of alternatives are null
+finished            whether the search completed
 recordings          names of the trials
-reference           names of the trials of the robot while it was well
-prior_odds          of any cause being there before the data are seen, at all its places together
+reference           names of the trials of the robot in a healthy state
+prior_odds          prior odds of any one cause, for all its places together
 verdict             "consistent", "miscalibrated", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
-    kind, name, place, sentence    in words: the cause, the cause at its place, its place, what it does
-    parameters                     {name: {value, se}}; se is null for what was chosen, not fitted; of a cause of all
-                                   joints (joint null, place "all joints") the medians over its members
-    members                        list of {name, place, joint, parameters}, one a place
-    told                           list of {cause, place, name}: the smallest set that holds 90 %, the likeliest first
-    event                          {trial (from 1), start_s, duration_s} of what acted once, else null; ``at`` has its
-                                   first two numbers
+    kind, name, place, sentence    in words: the cause, the cause at its place, its place, its effect
+    parameters                     {name: {value, se}}; se is null for a value that was chosen, not fitted. For a
+                                   cause of all joints (joint null, place "all joints") the medians over its members
+    members                        list of {name, place, joint, parameters}, one for each place
+    told                           list of {cause, place, name}: smallest set with 90 % of the probability, likeliest
+                                   first
+    event                          {trial (from 1), start_s, duration_s} for an event, else null; ``at`` has the first
+                                   two of these
     explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
-                                   beyond those before it; the shares add up to what all causes remove
-    probability                    that it is this cause, at this place
-    over_nothing                   by how much it is likelier than nothing in its place [nats], or null
-    share_left                     where it acts, amplitude of what is left beyond noise over that of what it explains
-    instead                        {nothing, unlisted}: probabilities that nothing is there, or something that is not
-                                   in the catalogue and looks like it; with ``probability`` and those of the
-                                   alternatives they add up to 1
-    folds                          nats by which every trial is likelier with it, predicted by the others; of a team
-                                   beside everything that is off within its tolerance
-    law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
-                                   formula, units of the parameters}: an error at ``targets`` that is a function of
-                                   ``of``, times the signal ``times`` if there is one; ``function`` names its terms
-                                   (``formulas.formula``), ``spline`` where no formula says the curve. ``traces``: by
-                                   trial {time_s, signal, error, se, law}, the curve as it was found without a formula
-                                   and what the formula says, both about their mean, one row a target; else null
-    shape                          numbers that change the cause's columns, such as a pendulum's length
-    separate                       what would tell the cause from its look-alikes
+                                   beyond the causes before it; the shares add up to what all causes remove
+    probability                    probability of this cause at this place
+    over_nothing                   log odds over nothing in its place [nats], or null
+    share_left                     where the cause acts, amplitude of the residual beyond noise over its own amplitude
+    instead                        {nothing, unlisted}: probability of nothing, and of an unlisted effect with a
+                                   similar trace; with ``probability`` and the alternatives' they add up to 1
+    folds                          log odds that each trial, predicted from the others, gains from it [nats]; for a
+                                   team with all tolerances in the model
+    law                            for an unlisted law {place, unit, targets, function, of, times, numbers, formula,
+                                   units of the parameters}: an error at ``targets`` that is a function of the signal
+                                   ``of``, times the signal ``times`` if present; ``function`` names its terms
+                                   (``formulas.formula``), ``spline`` if no formula matches. ``traces``: by trial
+                                   {time_s, signal, error, se, law}, the curve fitted without a formula and the values
+                                   of the formula, both minus their mean, one row for each target; else null
+    shape                          parameters that the cause's columns depend on, such as a pendulum's length
+    separate                       experiment that separates the cause from similar ones
     alternatives                   list of {cause, kind, name, family, robot, joint, place, probability,
-                                   evidence_gap [nats], chi2_per_n, ambiguous, separate}; the probability by the rows;
-                                   chi2_per_n of its closed loop, or null
-places              where something unlisted was looked for, the likeliest first: {place, robot, joint, nats}; empty
-                    where nothing unlisted is left
-suspected           what would explain some of it, but is not probable enough to be named: list of {cause, kind, name,
-                    family, robot, joint, place, at, sentence, probability, over_nothing}; where ``told``
-                    is, all that causes have
-scatter             kinds of which all places are off by more than the tolerance, the farthest first: list of
+                                   evidence_gap [nats], chi2_per_n, ambiguous, separate}; the probability follows from
+                                   the rows; chi2_per_n of its closed loop, or null
+places              possible places of something unlisted, likeliest first: {place, robot, joint, nats}; empty if
+                    nothing unlisted remains
+suspected           causes that explain a part but are too improbable to be named: list of {cause, kind, name, family,
+                    robot, joint, place, at, sentence, probability, over_nothing}; with ``told``, all keys of causes
+scatter             causes whose places all deviate by more than the tolerance, largest first: list of
     cause, kind, family, sentence
     factor                         their spread over the tolerance
-    places                         how many there are
-    spread, tolerance              {name: size} of every parameter, standard deviations over the places
-    nats                           by how much the spread is likelier than the tolerance
-    each                           {robot, joint, place, parameters: {name: {value, se}}} of every place, the farthest
-                                   off first
-foretold            {as_designed, as_found}: chi2/n of trials left out, the machine as designed and as the other trials
-                    find it; null where nothing scatters, or for a single trial
-evidence            the strongest candidates: {before, after} with nothing found and with what
-                    is found (null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
-gain                null where the closed loop was not simulated and there is nothing to estimate, or
+    places                         number of places
+    spread, tolerance              {name: size} of each parameter, standard deviations over the places
+    nats                           log odds of the spread over the tolerance
+    each                           {robot, joint, place, parameters: {name: {value, se}}} of each place, largest first
+foretold            {as_designed, as_found}: chi2/n of held-out trials for the machine as designed and as fitted to the
+                    other trials; null without scatter or for a single trial
+evidence            strongest candidates: {before, after} without findings and with the findings in the model (or
+                    null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
+gain                null if the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed;
-                    as_found: with every healthy part as it is found, too; null where noise is left without or not asked
+                    as_found: with all healthy parts at their fitted values, too; null if only noise is left or if not
+                    requested
     units           of the channels' rms
-    noise           {<channel>_rms}: what noise and integration error alone would leave
+    noise           {<channel>_rms}: expected from noise and integration error alone
     removed         share of the excess error removed, with interval [low, high] over trials, or null
     trials          list of {name, before, after}
-    validated       false where trials were compared with what they were fitted to: a single one, or a push or a
-                    payload's mass of some trials named
-    estimates       {before, after}, as the rig has them
-    errors          {before, after} against the truth, only where it is known
-not_simulated       why there is no closed-loop comparison, or null
-rollouts            of serial robots: measured states let go in simulation, see ``joints.rolled``; else null
+    validated       false if trials were compared with a fit to themselves: a single trial, or a named push or payload
+                    mass of some trials
+    estimates       {before, after}: payload estimates for the rig
+    errors          {before, after} against the truth, only if it is known
+not_simulated       reason why there is no closed-loop comparison, or null
+rollouts            for serial robots: simulation from measured states, see ``joints.rolled``; else null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
-detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
-                    times in ten; null where these recordings say nothing
-residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
-    chi2_per_n_tolerated           with no cause, and everything off as far as its kind scatters
-    unlisted_nats                  by how much what is left is likelier something than clean noise
+detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: sizes detectable with 90 %
+                    probability; null if these recordings have no information
+residual            {chi2_per_n, signature} of the residual with the causes (and tolerances), and
+    chi2_per_n_tolerated           without causes, with all parameters as variable as their kind scatters
+    unlisted_nats                  log odds of something unlisted over noise in the residual
     nominal                        {chi2_per_n, signature} of the simulation as it is
-remains             sentences on what the verdict leaves open: misfit above clean, what is off everywhere, response
+remains             sentences on what the verdict leaves open: misfit above noise, scatter, response
 notes               sentences
 
-``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
-(``mocobot.results``).
+``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the input files (``mocobot.results``).
 """
 
 from __future__ import annotations
@@ -104,7 +101,7 @@ def _finite(value: float | None) -> float | None:
 
 
 def plain(value: Any) -> Any:
-    """numpy numbers and arrays to plain JSON values; what is not finite becomes null."""
+    """Convert numpy values to plain JSON values; non-finite numbers become null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -119,14 +116,14 @@ def plain(value: Any) -> Any:
 Values = dict[str, Any]
 ALL = "all joints"
 MOST_OFFERS = 14
-"""Candidates of each list of the evidence."""
+"""Maximum length of each list of candidates in the evidence."""
 
 
 class Told(ABC):
-    """Parts of a verdict as values with words.
+    """Converts a verdict to JSON values with words.
 
     Args:
-        verdict: which.
+        verdict: the verdict.
     """
 
     machine: ClassVar[str]
@@ -136,22 +133,22 @@ class Told(ABC):
 
     @abstractmethod
     def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
-        """Cause and place, in words too: cause, kind, name, family, robot, joint, place."""
+        """Cause and place as cause, kind, name, family, robot, joint and place."""
 
     @abstractmethod
     def sentence(self, f: Finding, place: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
-        """What a finding does, with its numbers; for a kind with their medians."""
+        """Sentence on the effect of a finding with its values; for several members, with their medians."""
 
     @abstractmethod
     def separate(self, cause: str) -> str:
-        """What would tell a cause from its look-alikes."""
+        """Experiment that separates a cause from similar ones."""
 
     @abstractmethod
     def signature(self, which: str) -> Values:
-        """Where the misfit is; ``before`` or ``after``."""
+        """Distribution of the misfit, ``before`` or ``after`` the findings."""
 
     def undecidable(self) -> list[Values]:
-        """What no logs of such a machine decide."""
+        """What no logs of such a machine can decide."""
         return []
 
     def values(
@@ -164,9 +161,9 @@ class Told(ABC):
         """The verdict as plain JSON values.
 
         Args:
-            gain: what the findings are worth to a simulation and to estimates, or None.
-            not_simulated: why there is no comparison in closed loop, or None.
-            rollouts: what rollouts said, or None.
+            gain: effect of the findings on simulation and estimates, or None.
+            not_simulated: reason why there is no closed-loop comparison, or None.
+            rollouts: result of rollouts, or None.
         """
         v, (modelled, tolerated, left) = self.verdict, self.verdict.chi2_per_n
         causes = [self.finding(finding) for finding in v.findings]
@@ -194,7 +191,7 @@ class Told(ABC):
         return plain(values | {"remains": _remains(values)})
 
     def finding(self, f: Finding) -> Values:
-        """An entry of ``causes`` and ``suspected``."""
+        """One entry of ``causes`` or ``suspected``."""
         at, event = self.at(f.cause, f.place, f.joint, f.partner), f.event
         at |= {"robot": f.law.robot, "joint": f.law.joint} if f.law else {}
         if f.of:
@@ -217,13 +214,16 @@ class Told(ABC):
         }  # fmt: skip
 
     def member(self, f: Finding, member: Member, at: Values) -> Values:
-        """One of a finding's places."""
+        """One member of a finding."""
         at = self.at(f.cause, member.place, member.joint) if len(f.members) > 1 or f.joint is None else at
         numbers = _with_errors(member)
         return {"name": at["name"], "place": at["place"], "joint": member.joint, "parameters": numbers}
 
     def one_of_told(self, f: Finding, cause: str, place: str, own: Values) -> Values:
-        """One of the causes that may be there; a finding at one place may have been judged as one of all joints."""
+        """One entry of ``told``.
+
+        A finding at one place may have been judged as a cause of all joints.
+        """
         joints = {(rival.cause, rival.place): rival.joint for rival in f.rivals}
         if (cause, place) not in joints and cause == f.cause and place in (f.place, ALL):
             at = own
@@ -234,14 +234,14 @@ class Told(ABC):
         return {key: at[key] for key in ("cause", "place", "name")}
 
     def rival(self, rival: Rival, alike: bool) -> Values:
-        """What else may be in a finding's place."""
+        """One alternative to a finding."""
         return self.at(rival.cause, rival.place, rival.joint) | {
             "probability": rival.probability, "evidence_gap": rival.nats, "chi2_per_n": None, "ambiguous": alike,
             "separate": self.separate(rival.cause),
         }  # fmt: skip
 
     def scatter(self, entry: Scatter) -> Values:
-        """A kind that is off everywhere."""
+        """One entry of ``scatter``."""
         places = [self.at(entry.cause, member.place, member.joint) for member in entry.members]
         values: Values = {
             "cause": entry.cause, "kind": self.at(entry.cause, ALL, None)["kind"], "family": entry.cause,
@@ -255,7 +255,7 @@ class Told(ABC):
         return values | {"sentence": scatter_sentence(values)}
 
     def offers(self, offers: Sequence[Offer]) -> list[Values]:
-        """What one more cause would gain, the most first; each in its likeliest shape."""
+        """The gain of one more cause for each cause and place, in its likeliest shape, largest first."""
         best: dict[tuple[str, str], Offer] = {}
         for offer in sorted(offers, key=lambda offer: -offer.nats):
             best.setdefault((offer.cause, offer.place), offer)
@@ -267,13 +267,13 @@ class Told(ABC):
         ]
 
     def limit(self, limit: Limit) -> Values:
-        """What would have been noticed."""
+        """One entry of ``detection_limits``."""
         at = self.at(limit.cause, limit.place, limit.joint)
         place = {key: at[key] for key in ("cause", "kind", "robot", "joint", "place")}
         return place | {"parameters": dict(limit.sizes)}
 
     def blind_spots(self) -> list[Values]:
-        """Causes and places of which these logs say nothing."""
+        """Causes and places without information in these logs."""
         places: dict[str, list[str]] = {}
         for limit in map(self.limit, self.verdict.limits):
             if limit["parameters"] and not any(limit["parameters"].values()):
@@ -288,7 +288,7 @@ class Told(ABC):
 
 
 def _remains(values: Values) -> list[str]:
-    """Sentences on kinds that are off everywhere, and on the misfit that is left."""
+    """Sentences on scatter and on the remaining misfit."""
     kinds, out, residual = ", ".join(entry["kind"] for entry in values["scatter"]), [], values["residual"]
     if kinds and values["verdict"] != "miscalibrated":
         out = [f"Besides, all places alike are off by more than their tolerances: {kinds}."]
@@ -308,7 +308,7 @@ def _with_errors(member: Member) -> Values:
 
 
 def _medians(members: Iterable[Member]) -> Values:
-    """Medians over members that have a parameter: joints that slide have others than joints that turn."""
+    """Medians over the members that have a parameter; prismatic and revolute joints have different parameters."""
     each: dict[str, list[float]] = {}
     for member in members:
         for name, value in member.values.items():

@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis: residuals over time and against what they may depend on, evidence, closed loop, law."""
+"""Plots of a diagnosis: residuals over time and against other quantities, evidence, closed loop and laws."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SERIES = (("as simulated", "white_before", BEFORE), ("with causes and tolerances
 def against_figure(
     traces: Sequence[Trace], grouped: Sequence[Group], unit: Callable[[str], str], *, named: bool
 ) -> Figure:
-    """One row per group of channels, one column per quantity; all trials together."""
+    """Plot residuals of all trials: one row for each group of channels, one column for each quantity."""
     quantities = list(traces[0].quantities)
     columns = len(quantities) + 1
     figure = Figure(figsize=(3.9 * columns, 1.9 * len(grouped) + 0.9), layout="constrained")
@@ -50,14 +50,14 @@ def against_figure(
 def titled(
     figure: Figure, title: str, handles: Sequence[Any], labels: Sequence[str], columns: int = 2
 ) -> Figure:
-    """The figure with its title and its legend."""
+    """Add a title and a legend to a figure."""
     figure.legend(handles, labels, loc="outside upper right", ncols=columns, frameon=False, fontsize=9)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
 
 
 def scale_multiples(axis: Axes, top: float, headroom: float) -> None:
-    """An axis of multiples of clean data, a line at 1: logarithmic, up to ``headroom`` tops, where these are high."""
+    """Format an axis of multiples of clean data, with a line at 1; logarithmic if the values are high."""
     axis.axhline(1.0, color="black", linewidth=0.8, linestyle="--")
     axis.grid(alpha=0.25)
     if top > 8.0:
@@ -67,14 +67,14 @@ def scale_multiples(axis: Axes, top: float, headroom: float) -> None:
 
 
 def log_scale(axis: Axes, low: float, high: float) -> None:
-    """A logarithmic axis with plain numbers."""
+    """Set a logarithmic axis with plain numbers."""
     axis.set_yscale("log")
     axis.set_ylim(low, high)
     plain_numbers(axis.yaxis)
 
 
 def _binned(axis: Axes, traces: Sequence[Trace], group: Group, name: str) -> float:
-    """Root mean square in bins of equal counts; returns the highest."""
+    """Plot the rms in bins of equal counts; return the highest."""
     top = 0.0
     for what, attribute, colour in SERIES:
         x, heights = binned(traces, attribute, list(group.columns), name)
@@ -84,7 +84,7 @@ def _binned(axis: Axes, traces: Sequence[Trace], group: Group, name: str) -> flo
 
 
 def _spectrum(axis: Axes, traces: Sequence[Trace], group: Group) -> float:
-    """Square root of the power density over that of white noise of unit variance; returns the highest."""
+    """Plot the square root of the power density over that of unit white noise; return the highest."""
     top = 0.0
     for _, attribute, colour in SERIES:
         found = spectrum(traces, attribute, list(group.columns))
@@ -102,7 +102,7 @@ RELATIONS = {
 
 
 def evidence_figure(values: Mapping[str, Any]) -> Figure:
-    """Evidence of the strongest candidates: nothing named yet, and with what is named in the model; on one scale."""
+    """Plot the evidence of the strongest candidates, without and with the named causes, on one scale."""
     evidence = values["evidence"]
     panels = [("nothing is named yet", drawn(evidence["before"]))]
     if evidence["after"] is not None:
@@ -113,7 +113,7 @@ def evidence_figure(values: Mapping[str, Any]) -> Figure:
         _dots(axis, strongest, values["causes"])
         axis.set_title(f"when {title}", loc="left", fontsize=10)
     seen = [entry[key] for _, strongest in panels for entry in strongest for key in ("nats", "needed")]
-    # Dots: bars would need a zero, which a log axis has not.
+    # Use dots: bars need a zero, and a log axis has none.
     axes[0].set_xlim(0.6, 3.0 * max(seen, default=10.0))
     shown = RELATIONS if values["causes"] else {"other": ("candidate", *RELATIONS["other"][1:])}
     handles = [axes[0].plot([], [], mark, color=colour)[0] for _, colour, mark in shown.values()]
@@ -131,7 +131,7 @@ def _dots(axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[M
         axis.plot(entry["needed"], y, "|", color="black", markersize=12)
         axis.plot(entry["nats"], y, mark, color=colour, markersize=7)
         nats = f"{entry['nats']:.0f}" if entry["nats"] >= 100 else f"{entry['nats']:.3g}"
-        right = entry["nats"] > entry["needed"]  # not where the mark of what is needed is
+        right = entry["nats"] > entry["needed"]  # avoid the mark of the required evidence
         axis.annotate(nats, (entry["nats"], y), (8 if right else -8, 0), textcoords="offset points", va="center",
                       ha="left" if right else "right", fontsize=8)  # fmt: skip
     axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
@@ -144,7 +144,7 @@ def _dots(axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[M
 
 
 def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
-    """Error of every channel and chi-square per trial, without and with the causes; None where not simulated."""
+    """Plot each channel's error and chi-square by trial, without and with the causes; None if not simulated."""
     gain = values["gain"]
     trials = [t for t in (gain or {}).get("trials", ()) if t["before"] is not None]
     if not trials:
@@ -196,7 +196,7 @@ Values = Mapping[str, Any]
 
 
 def law_figure(values: Values) -> Figure | None:
-    """Every stated law that was located: over time in the first trial, and against its signal in all; None without."""
+    """Plot each unlisted law over time in the first trial and against its signal in all trials; None without a law."""
     laws = [cause for cause in values["causes"] if cause.get("law") and cause["law"]["traces"]]
     if not laws:
         return None
@@ -214,7 +214,7 @@ def law_figure(values: Values) -> Figure | None:
 
 
 def strongest(traces: Sequence[Values]) -> int:
-    """The component of which a law says most."""
+    """Index of the component with the largest values of the law."""
     sizes = [
         np.std(np.concatenate([trace["law"][k] for trace in traces])) for k in range(len(traces[0]["law"]))
     ]
@@ -269,15 +269,15 @@ def save_plots(
     unit: Callable[[str], str],
     folder: Path,
 ) -> list[Path]:
-    """Draw everything there is and return the paths.
+    """Draw all plots of a diagnosis, and return their paths.
 
     Args:
         values: the diagnosis, as in the JSON.
-        traces: residuals of every trial.
-        channels: the rig's channels.
-        unit: of a quantity that a misfit may depend on.
-        folder: existing folder for ``residual_<trial>.png``, ``residual_against.png``, ``evidence.png`` and
-            ``closed_loop.png`` and ``law.png`` (these only where the closed loop was simulated, and a law stated).
+        traces: residuals of each trial.
+        channels: the residual channels.
+        unit: returns the unit of a quantity by name.
+        folder: existing folder for ``residual_<trial>.png``, ``residual_against.png`` and ``evidence.png``. It also
+            gets ``closed_loop.png`` if the closed loop was simulated, and ``law.png`` if there is a law.
     """
     grouped, named = groups(channels), bool(values["causes"])
     paths = []
@@ -295,7 +295,7 @@ def save_plots(
 
 
 def file_names(names: Sequence[str]) -> list[str]:
-    """Short and distinct parts of file names for trials that may be called by their paths."""
+    """Short and distinct parts of file names for trials, whose names may be paths."""
     out: list[str] = []
     for name in names:
         stem = re.sub(r"[^\w.-]+", "_", re.split(r"[/\\]", name)[-1].removesuffix(".parquet"))[:60] or "trial"
@@ -337,7 +337,7 @@ def _components(axis: Axes, trace: Trace, group: Group, values: Array, scale: fl
         band = _broken(trace, sigma)
         axis.fill_between(time, -band, band, color=CLEAN_BAND, linewidth=0)
     for k, name, colour in zip(group.columns, group.components, cycle(COMPONENTS), strict=False):
-        shown = f" {name}" if name.startswith("_") else name  # a legend leaves out what begins with "_"
+        shown = f" {name}" if name.startswith("_") else name  # a legend omits labels that begin with "_"
         axis.plot(time, _broken(trace, values[:, k]), color=colour, linewidth=0.8, label=shown)
         axis.plot(trace.time[trace.moving :], values[trace.moving :, k], "o", color=colour, markersize=3)
     axis.axhline(0.0, color="black", linewidth=0.4)
@@ -357,14 +357,14 @@ def _multiples(axis: Axes, trace: Trace, group: Group, *, named: bool) -> None:
 
 
 def _broken(trace: Trace, values: Array) -> Array:
-    """Moving rows with a NaN after every pause, so that lines do not cross it."""
+    """Rows in motion with a NaN after each pause, so that lines do not cross it."""
     moving = values[: trace.moving]
     after = np.flatnonzero(np.diff(trace.time[: trace.moving]) > 1.5 / trace.rate_hz) + 1
     return np.insert(moving.astype(float), after, np.nan)
 
 
 def _save(figure: Figure, path: Path) -> Path:
-    # As savefig does it, which would arrange and draw everything twice.
+    # ``savefig`` would arrange and draw everything twice.
     figure.dpi = 110
     FigureCanvasAgg(figure).print_png(path)
     return path

@@ -1,4 +1,4 @@
-"""A diagnosis read back from its file (format: ``discrepancy.result.json``)."""
+"""Read a diagnosis from its file (format: ``discrepancy.result.json``)."""
 
 import re
 from collections.abc import Mapping
@@ -11,9 +11,9 @@ from estimator.strict import read_json
 
 FORMAT, VERSION, NAME = "mocobot-diagnosis", 3, "diagnosis.json"
 READABLE = (2, VERSION)
-"""Versions that are read."""
+"""Readable versions."""
 EXTENDED, AS_FOUND = "extended", "as_found"
-"""Folders of models beside it: with the named causes, and with every part as far off as it is found."""
+"""Folders of models in a result folder: with the named causes, and with every part at its fitted value."""
 VERDICTS = {
     "consistent": "Consistent",
     "miscalibrated": "Miscalibrated",
@@ -21,7 +21,7 @@ VERDICTS = {
     "partly_explained": "Partly explained",
     "unexplained": "Unexplained",
 }
-"""In a word or two."""
+"""Verdicts in words."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class NamedCause:
     """One named cause.
 
     Attributes:
-        name: of the cause, such as ``sea_bias``.
-        robot, joint: where it sits, counted from 1; None where it has no such place.
-        sentence: what it does, with its numbers.
+        name: identifier, such as ``sea_bias``.
+        robot, joint: place, counted from 1; None if it has no such place.
+        sentence: its effect with values.
         kind: the cause in words, such as ``torque zero of a driven joint``.
-        label: the same at its place, such as ``torque zero of joint 1 of robot 2``.
+        label: the cause with its place, such as ``torque zero of joint 1 of robot 2``.
     """
 
     name: str
@@ -46,13 +46,13 @@ class NamedCause:
 
 @dataclass(frozen=True)
 class WrittenDiagnosis:
-    """What a diagnosis says.
+    """Content of a diagnosis file.
 
     Attributes:
         verdict: one of the keys of ``VERDICTS``.
         causes: in the order of discovery.
-        recordings: names of the trials it was made from.
-        of_joints: whether it is of one robot of joints, not of a team.
+        recordings: names of the trials.
+        of_joints: whether it is about one robot of joints, not about a team.
     """
 
     verdict: str
@@ -61,30 +61,30 @@ class WrittenDiagnosis:
     of_joints: bool = False
 
     def is_of(self, recording: str) -> bool:
-        """Whether it was made from a recording, by its file's name, or from parts of it (``team.long``)."""
+        """Whether the diagnosis used a recording, by file name, or parts of it (``team.long``)."""
         names = {Path(name).name for name in self.recordings}
         return Path(recording).name in names | {re.sub(r", \d+ to \d+ s$", "", name) for name in names}
 
     def robots(self) -> int:
-        """Largest number of a robot that a cause sits at; 0 if none does."""
+        """Largest robot number among the causes; 0 if there is none."""
         return max((cause.robot or 0 for cause in self.causes), default=0)
 
 
 def read_diagnosis(folder: Path) -> WrittenDiagnosis:
-    """Read what ``mocobot diagnose --out`` wrote.
+    """Read the result of ``mocobot diagnose --out``.
 
     Args:
-        folder: it, or its ``diagnosis.json``.
+        folder: the result folder, or its ``diagnosis.json``.
 
     Raises:
-        InputError: there is no diagnosis, or it is not complete.
+        InputError: there is no diagnosis, or it is incomplete.
     """
     path = folder if folder.suffix == ".json" else folder / NAME
     return parse_diagnosis(read_json(path, "a diagnosis"), path)
 
 
 def as_now(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a file as they are written now: versions before had fewer keys, and a team had no told sets."""
+    """Add keys that older versions lack, so that a file has the current form."""
 
     def finding(entry: Mapping[str, Any]) -> dict[str, Any]:
         rivals = entry.get("alternatives", [])
@@ -113,10 +113,10 @@ def as_now(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
-    """The values of a diagnosis' file (``path``, for messages).
+    """Parse the values of a diagnosis file; ``path`` is for messages.
 
     Raises:
-        InputError: they are something else, of another version, or not complete.
+        InputError: the values are no diagnosis, of an unreadable version, or incomplete.
     """
     if values.get("format") != FORMAT:
         raise InputError(f"{path}: not a diagnosis; it must have format {FORMAT!r}")
@@ -139,7 +139,9 @@ def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
 
 def _cause(values: Mapping[str, Any]) -> NamedCause:
     name, robot, joint = str(values["cause"]), values["robot"], values["joint"]
-    most_joints = None if robot is None else 3  # only robots of a team are numbered; they are Deltas
+    most_joints = (
+        None if robot is None else 3
+    )  # only team robots are numbered; they are Deltas with three joints
     for what, number, most in (("robot", robot, None), ("joint", joint, most_joints)):
         if number is not None and (type(number) is not int or number < 1 or (most and number > most)):
             raise ValueError(f"{what} is {number!r:.40}")
@@ -147,15 +149,15 @@ def _cause(values: Mapping[str, Any]) -> NamedCause:
 
 
 def name_of(entry: Mapping[str, Any]) -> str:
-    """A cause at its place in words."""
+    """A cause with its place in words."""
     return entry["name"]
 
 
 def kind_of(entry: Mapping[str, Any]) -> str:
-    """A cause in words, wherever it sits."""
+    """A cause in words, without its place."""
     return entry["kind"]
 
 
 def is_of_joints(values: Mapping[str, Any]) -> bool:
-    """Whether it is of one robot of joints; files of version 2 do not say, but such alone were rolled out."""
+    """Whether a diagnosis is about one robot of joints. Version 2 does not say; only such robots have rollouts."""
     return values.get("machine", "joints" if values.get("rollouts") else "") == "joints"

@@ -1,4 +1,4 @@
-"""What a verdict leaves open: figures that would contradict it if nothing were said of them, and kinds that scatter."""
+"""Sentences on what a verdict leaves open: remaining misfit and scatter."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -10,18 +10,18 @@ from discrepancy.numbers import one_each, parameter, three_digits
 from discrepancy.result.read import is_of_joints, kind_of
 
 VISIBLE_CHI2_PER_N = 3.0
-"""chi2/n of the closed loop from which it is reported beside the verdict."""
+"""Least chi2/n of the closed loop to report."""
 
 RESPONSE_SHARE = 0.8
-"""Share of the response's excess error that causes must remove; with less the rest is reported."""
+"""Share of the response's excess error that causes must remove; below it, the rest is reported."""
 
 Values = Mapping[str, Any]
 FARTHEST = 3
-"""Places of a kind that are said."""
+"""Number of places of a kind to report."""
 
 
 def remedy(values: Values) -> str:
-    """What to do where all places are off, and what it would be worth."""
+    """Advice for a miscalibrated machine, with the expected improvement."""
     if is_of_joints(values):
         return "Correct the model by these values, and diagnose again with it."
     what = 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
@@ -35,7 +35,7 @@ def remedy(values: Values) -> str:
 
 
 def of_response(values: Values) -> list[str]:
-    """A sentence on what the simulated response to the commands still is off by."""
+    """A sentence on the remaining error of the simulated response to the commands."""
     gain = values["gain"]
     told = gain and (gain["held_out"]["after"] or gain["held_out"]["before"])
     if not told or told["chi2_per_n"] <= VISIBLE_CHI2_PER_N:
@@ -62,7 +62,7 @@ def of_response(values: Values) -> list[str]:
 
 
 def all_as_found(gain: Values) -> list[str]:
-    """What it is off by where a simulation has healthy parts as they are found; nothing where that was not asked."""
+    """Error of a simulation with all healthy parts at their fitted values, in words; empty if not requested."""
     told = gain["held_out"].get("as_found")
     if told is None:
         return []
@@ -72,7 +72,7 @@ def all_as_found(gain: Values) -> list[str]:
 
 
 def scatter_sentence(entry: Values) -> str:
-    """What a kind that is off everywhere is off by."""
+    """A sentence on the spread of a kind with scatter."""
     kind = kind_of(entry)
     return (
         f"{kind[:1].upper()}{kind[1:]}: a spread of {sizes_of(entry, 'spread')} over {entry['places']} places "
@@ -81,7 +81,7 @@ def scatter_sentence(entry: Values) -> str:
 
 
 def farthest(entry: Values) -> str:
-    """The places that are farthest off, by how much, in words; empty where none is told."""
+    """The places that deviate most, with their values, in words."""
     return ", ".join(
         f"{place['place']} ({_sizes(entry, {n: p['value'] for n, p in place['parameters'].items()})})"
         for place in entry.get("each", ())[:FARTHEST]
@@ -89,7 +89,7 @@ def farthest(entry: Values) -> str:
 
 
 def sizes_of(entry: Values, which: str) -> str:
-    """``spread`` or ``tolerance`` of an entry in words; both in the unit that fits the spread."""
+    """``spread`` or ``tolerance`` of an entry in words, in the unit that fits the spread."""
     return _sizes(entry, entry[which])
 
 
@@ -105,10 +105,10 @@ def _sizes(entry: Values, sizes: Mapping[str, float]) -> str:
 
 
 def excess_removed(chi2_per_n: Iterable[tuple[float, float]]) -> dict[str, Any] | None:
-    """Share of the error beyond noise that is removed: mean over trials, 95 % interval (-inf to 1 of one trial).
+    """Share of the error beyond noise that is removed: mean over trials and 95 % interval (-inf to 1 for one trial).
 
     Args:
-        chi2_per_n: of each trial before and after; trials that noise accounts for before are left out.
+        chi2_per_n: chi2/n of each trial before and after; trials without excess error before are ignored.
     """
     excess = [[float(np.sqrt(max(x - 1.0, 0.0))) for x in pair] for pair in chi2_per_n if pair[0] > 1.0]
     shares = [1.0 - after / before for before, after in excess]

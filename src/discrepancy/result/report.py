@@ -1,4 +1,4 @@
-"""The text of a verdict: at most five sentences and one table; the rest on request."""
+"""Text report of a verdict: at most five sentences and one table, and details on request."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from discrepancy.result.remains import remedy
 from discrepancy.result.tables import WIDTH, Values, gain_lines, rollout_lines
 
 NOTHING_WRONG_HERE = ("consistent", "miscalibrated")
-"""Verdicts with which no place stands out."""
+"""Verdicts without any outstanding place."""
 SAID = 0.001
-"""Probabilities below are not told."""
+"""Probabilities below are not reported."""
 NEAREST = 4
-"""How many of what else it might be are told."""
+"""Number of alternatives to report."""
 
 
 def cause_lines(cause: Values, *, further: bool) -> Iterable[str]:
-    """What supports a cause, and what else may be in its place; ``further``: it is not the first."""
+    """Evidence for a cause and its alternatives; ``further``: it is not the first cause."""
     more = "a further " if further else ""
     explained = f"Explains {more}{_percent(cause['explained']['in_sample'])} of the misfit in sample"
     if cause["explained"]["held_out"] is not None:
@@ -41,7 +41,7 @@ def cause_lines(cause: Values, *, further: bool) -> Iterable[str]:
         f"Probability {probability_words(cause['probability'])}{over}{_else(cause)}. {explained}."
     )
     alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
-    ruled_out: dict[str, Values] = {}  # the likeliest of those that may act at several instants
+    ruled_out: dict[str, Values] = {}  # a cause may act at several instants: keep the likeliest
     for rival in cause["alternatives"]:
         if not rival["ambiguous"]:
             ruled_out.setdefault(name_of(rival), rival)
@@ -57,7 +57,7 @@ def cause_lines(cause: Values, *, further: bool) -> Iterable[str]:
 
 
 def _else(cause: Values) -> str:
-    """What else may be in its place, the likeliest first."""
+    """Alternatives to a cause, likeliest first."""
     instead = cause["instead"]
     others = [(rival["probability"], name_of(rival)) for rival in cause["alternatives"]]
     others += [
@@ -76,7 +76,7 @@ def _rival(rival: Values) -> str:
 
 
 def limit_lines(limits: Sequence[Values]) -> Iterable[str]:
-    """One line per cause: each parameter's smallest and largest limit over the places, in one unit per quantity."""
+    """One line for each cause with the smallest and largest limit over the places, in one unit per quantity."""
     sizes: dict[str, dict[str, list[float | None]]] = {}
     kinds = {entry["cause"]: kind_of(entry) for entry in limits}
     for entry in limits:
@@ -102,7 +102,7 @@ def _range(words: str, unit: str, sizes: Sequence[float | None], shown: Mapping[
 
 
 def _percent(share: float) -> str:
-    """``94 %``; a digit of what would round to none."""
+    """A share as in ``94 %``; one significant digit if it would round to zero."""
     if 0.0 < abs(share) < SAID / 100:
         return "less than 0.001 %"
     whole = f"{100 * share:.0f} %"
@@ -110,7 +110,7 @@ def _percent(share: float) -> str:
 
 
 def probability_words(probability: float) -> str:
-    """``94 %``; more digits near 0 and 100 %."""
+    """A probability as in ``94 %``; more digits near 0 and 100 %."""
     if probability > 1.0 - SAID:
         return "above 99.9 %"
     if probability < SAID:
@@ -119,12 +119,12 @@ def probability_words(probability: float) -> str:
 
 
 def wrapped(text: str, indent: str = "    ") -> Sequence[str]:
-    """Lines of at most ``WIDTH`` columns."""
+    """Wrap a text to lines of at most ``WIDTH`` columns."""
     return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
+    """Candidates with at least 1 nat; a log axis has no room for less."""
     return [entry for entry in strongest if entry["nats"] >= 1.0]
 
 
@@ -136,7 +136,7 @@ def label(entry: Mapping[str, Any]) -> str:
 
 
 def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:
-    """What an entry is to the named causes: ``named``, of their ``family``, or ``other``."""
+    """Relation of an entry to the named causes: ``named``, same ``family``, or ``other``."""
     place = ("cause", "robot", "joint")
     if any(all(entry[key] == cause[key] for key in place) for cause in causes):
         return "named"
@@ -144,31 +144,31 @@ def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> s
 
 
 MOST_NAMED = 4
-"""Findings that the second sentence lists."""
+"""Number of findings in the second sentence."""
 MOST_ALIKE = 3
-"""Causes of one finding that it lists."""
+"""Number of alternative causes of one finding in that sentence."""
 LEAST_NATS = 1.0
-"""Gains below are not told."""
+"""Gains below are not reported."""
 MOST_PLACES = 12
-"""Rows of a kind that is off everywhere."""
+"""Number of table rows for a kind with scatter."""
 PLACES, WHATS, LEAST_WHAT, SIZES, GAP = 24, 34, 22, 38, "  "
-"""Widest columns of places and of what there is, the narrowest of that, room for sizes, and what is between columns."""
+"""Widest place and cause columns, narrowest cause column, width for sizes, and column separator."""
 PARTS = "two joints|a (?:driven joint|joint|link|leg|robot|base|grasp)"
-"""Parts of a machine, as titles name them, where the place says which."""
+"""Machine parts in cause titles, which the table omits because the place column names them."""
 COUNTS = ("trial", "last_trial")
-"""Numbers that count."""
+"""Parameters that are counts."""
 TOGETHER = "\N{NO-BREAK SPACE}"
-"""Between words that stay in one line of a cell."""
+"""Joins words that must stay on one line of a cell."""
 Row = tuple[list[str], list[str], list[str], str]
-"""Lines of place, what and size, and a probability."""
+"""Lines of the place, cause and size cells, and a probability."""
 
 
 def format_verdict(values: Values, *, verbose: bool = False) -> str:
-    """Readable report of at most 100 columns.
+    """Format a verdict as text of at most 100 columns.
 
     Args:
         values: a verdict in the form of ``result.json``.
-        verbose: whether to tell rivals, limits, rollouts, notes and evidence, too.
+        verbose: whether to add alternatives, limits, rollouts, notes and evidence.
     """
     lines = [*wrapped(" ".join(_sentences(values, verbose=verbose)), ""), *_table(values, verbose=verbose)]
     if verbose:
@@ -217,7 +217,7 @@ def _found(values: Values) -> str:
 
 
 def _either(cause: Values) -> str:
-    """All of the smallest set that holds 90 %, the likeliest first, and what was fitted."""
+    """Names of the smallest set with 90 % of the probability, likeliest first, and of the fitted cause."""
     names = list(dict.fromkeys(entry["name"] for entry in (*cause["told"], cause)))
     return " or ".join(names) if len(names) <= MOST_ALIKE else f"{names[0]} or {len(names) - 1} others"
 
@@ -240,7 +240,7 @@ def _gain(values: Values) -> Iterable[str]:
 
 
 def _likelier(folds: Sequence[Sequence[float]]) -> Iterable[str]:
-    """What findings that last are worth to trials that the others predict."""
+    """Log odds that lasting findings gain in trials predicted from the others."""
     if folds:
         each = [sum(gains) for gains in zip(*folds, strict=True)]
         better = sum(gain > 0.0 for gain in each)
@@ -274,7 +274,7 @@ def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-# --- the table
+# --- table
 
 
 def _table(values: Values, *, verbose: bool) -> list[str]:
@@ -301,7 +301,7 @@ def _table(values: Values, *, verbose: bool) -> list[str]:
 
 
 def _lines(row: Row, widths: Sequence[int], last: int) -> Iterable[str]:
-    """A row as lines; what is too wide for its column goes on below."""
+    """Format a row; text that is too wide for its column continues on the next line."""
     cells = [[part for line in row[k] for part in _folded(line, widths[k])] for k in range(3)]
     for i, parts in enumerate(zip_longest(*cells, fillvalue="")):
         padded = (
@@ -315,14 +315,14 @@ def _folded(line: str, width: int) -> list[str]:
 
 
 def _rows(cause: Values, *, verbose: bool) -> Iterable[Row]:
-    """A finding; a kind with a row for every joint."""
+    """Table rows of a finding; a finding with several members has a row for each."""
     what, chance = _whats(cause), _chance(cause["probability"])
     members = cause.get("members") or [cause]
     if len(members) == 1:
         event, numbers = cause.get("event"), members[0]["parameters"]
         told = event or {}
         sizes = _sizes({name: x for name, x in numbers.items() if name not in told}, verbose=verbose)
-        if cause.get("law"):  # a formula says more than its numbers one by one
+        if cause.get("law"):  # a formula says more than its parameters
             sizes = [cause["sentence"].partition(OFF_BY)[2].removesuffix(".")]
         if event:
             sizes.append(f"trial {event['trial']}, {event['start_s']:.2f} s, for {event['duration_s']:.2f} s")
@@ -340,7 +340,7 @@ def _scattered(entry: Values) -> Iterable[Row]:
 
 
 def _each(place: str, what: list[str], members: Sequence[Values], chance: str) -> Iterable[Row]:
-    """A heading, and a row for every place; units in the heading if all places have the same."""
+    """A heading and a row for each place; units are in the heading if all places have the same parameters."""
     names = {tuple(member["parameters"]) for member in members}
     shown = one_each(
         (parameter(name)[1], entry["value"])
@@ -363,7 +363,7 @@ def _what(kind: str) -> str:
 
 
 def _whats(cause: Values) -> list[str]:
-    """The cause that was fitted, and what else the smallest set that holds 90 % has."""
+    """The fitted cause, and the other causes in the smallest set with 90 % of the probability."""
     chances = {rival["name"]: rival["probability"] for rival in cause["alternatives"]}
     others = [entry for entry in cause["told"] if entry["name"] != cause["name"]]
     what = _what(cause["kind"])
@@ -381,7 +381,7 @@ def _chance(probability: float) -> str:
 
 
 def _sizes(parameters: Values, *, verbose: bool) -> list[str]:
-    """Numbers of one place, a line each; components of a vector in one; moments of inertia on request."""
+    """Parameters of one place, one line each; vectors on one line; moments of inertia only if ``verbose``."""
     shown = one_each((parameter(name)[1], entry["value"]) for name, entry in parameters.items())
     vectors: dict[str, list[str]] = {}
     for name, entry in parameters.items():
@@ -427,7 +427,7 @@ def _word(name: str) -> str:
     return word if word != "more" else "viscous" if "_per_" in name else "Coulomb"
 
 
-# --- the rest
+# --- details
 
 
 def _rest(values: Values) -> Iterable[str]:

@@ -1,4 +1,4 @@
-"""Tables of the report: gain in closed loop, the payload's estimates, rollouts (keys: ``joints.rolled``)."""
+"""Tables of the report: closed-loop gain, payload estimates and rollouts (keys: ``joints.rolled``)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from discrepancy.numbers import Shown, one_each
 from discrepancy.result.remains import all_as_found
 
 WIDTH = 100
-"""Most columns of a line."""
+"""Maximum line length."""
 Values = Mapping[str, Any]
 ERRORS = {
     "mass_percent": "mass [%]",
@@ -38,7 +38,7 @@ def gain_lines(values: Values) -> list[str]:
 
 
 def something_is_off(values: Values) -> bool:
-    """Whether the payload is to be told with what is off: a cause is named, or the robots are found all the same."""
+    """Whether to compare payload estimates: a cause is named, or the verdict is miscalibrated."""
     return bool(values["causes"]) or values["verdict"] == "miscalibrated"
 
 
@@ -73,24 +73,24 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
 
 
 def predicted_torques(gain: Values) -> bool:
-    """Whether the channels are torques of a robot of joints, predicted from its motion without commands."""
+    """Whether the channels are joint torques, predicted from motion without commands."""
     return all(channel.endswith(" torque") for channel in gain["units"])
 
 
 def floor_words(gain: Values) -> str:
-    """What is left at best."""
+    """Name of the smallest possible error."""
     return "noise" if predicted_torques(gain) else "noise and integration error"
 
 
 def answer(gain: Values) -> str:
-    """What is held against the recordings."""
+    """Name of the quantity that is compared with the recordings."""
     if predicted_torques(gain):
         return "Torques, predicted from the recorded motion"
     return "Response to the recorded commands, simulated again"
 
 
 def response_units(gain: Values) -> dict[str, Shown]:
-    """In which unit every channel's error is shown: one for all channels of a kind, by the largest error."""
+    """Display unit of each channel's error; channels of one kind share the unit that fits the largest error."""
     errors = [gain["held_out"]["before"], *(trial["before"] for trial in gain["trials"])]
     shown = one_each(
         (unit, error[f"{channel}_rms"])
@@ -102,7 +102,7 @@ def response_units(gain: Values) -> dict[str, Shown]:
 
 
 def _estimates(estimates: Values) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
-    """Numbers of an estimate by label: mass, centre of mass, moments, distances of the grasps."""
+    """Values of an estimate by label: mass, centre of mass, principal moments, grasp distances."""
     table: dict[str, dict[str, float]] = {}
     for name, estimate in estimates.items():
         row = {"mass [kg]": estimate["mass_kg"]}
@@ -137,7 +137,7 @@ ROLLED = "rms error of the position, of the given model -> of the extended one (
 
 
 def rollout_lines(values: Values) -> list[str]:
-    """Errors of every joint before and after, as lines of at most 100 columns; none where there are no rollouts."""
+    """Position errors of each joint before and after, as lines of at most 100 columns; empty without rollouts."""
     rolled = values.get("rollouts")
     if rolled is None:
         return []
@@ -157,7 +157,7 @@ def _indented(lines: Iterable[str]) -> Iterable[str]:
 
 
 def blocks(rolled: Values) -> str:
-    """On which blocks."""
+    """Whether the blocks were held out, in words."""
     return "on blocks left out of the fit" if rolled["validated"] else "on the block itself: not validated"
 
 
@@ -188,7 +188,7 @@ def _free(rolled: Values) -> Iterable[str]:
 
 
 def _called(rolled: Values, shown: Mapping[str, Shown], room: int) -> list[str]:
-    """Joints by name, with units; by number where names are too long: cut short, they may be alike."""
+    """Joint names with units; joint numbers if names are too long, because shortened names may be equal."""
     units = [shown[unit][0] for unit in rolled["units"]]
     named = [f"{name} [{unit}]" for name, unit in zip(rolled["joints"], units, strict=True)]
     if max(map(len, named)) <= room:
@@ -211,7 +211,7 @@ def _error(value: float | None, scale: float) -> str:
 
 
 def diverged_sentences(rolled: Values) -> Iterable[str]:
-    """How many rollouts diverged, by model and horizon."""
+    """Sentences on the number of diverged rollouts, by model and horizon."""
     for which, words in (("before", "the given model"), ("after", "the extended model")):
         counts = [
             f"{max(h[which]['diverged'])} of {h['starts']} at {h['seconds']:g} s"
@@ -224,7 +224,7 @@ def diverged_sentences(rolled: Values) -> Iterable[str]:
 
 
 def shown_units(rolled: Values) -> dict[str, Shown]:
-    """The unit in which errors of joints that turn and of those that slide are shown: by what is off first."""
+    """Display units of errors of revolute and prismatic joints, chosen by the first horizon."""
     free = [(h[which] or {}).get("rms", []) for h in rolled["horizons"][:1] for which in ("before", "after")]
     loop = [rolled["commanded"][which] or [] for which in ("before", "after")]
     return one_each(
@@ -261,5 +261,5 @@ def _loop_errors(rolled: Values, loop: Values) -> Iterable[str]:
 
 
 def lost(runs: Sequence[Values], which: str) -> int:
-    """How many blocks diverged in some joint."""
+    """Number of blocks in which some joint diverged."""
     return sum(run[which] is not None and None in run[which] for run in runs)

@@ -1,8 +1,8 @@
-"""Residuals as a plot wants them, their statistics, and their file ``residuals.npz``.
+"""Residuals for plots, their statistics, and their file ``residuals.npz``.
 
 facts                  bytes of a JSON object: format "mocobot-residuals", version 1, channels: list of
                        {name, kind, robot, unit}, and trials: list of {name, moving, rate_hz, quantities [names]}
-time<k>                [s] of every row of trial k (from 0), shape (n,), float64
+time<k>                [s] of each row of trial k (from 0), shape (n,), float64
 before<k>, after<k>    physical residuals without and with the named causes, shape (n, C)
 sigma<k>               standard deviations of clean data, shape (n, C)
 white_before<k>, white_after<k>   whitened residuals, shape (n, C)
@@ -33,9 +33,9 @@ class Channel:
 
     Attributes:
         name: such as ``grasp 2 rotation x``.
-        kind: group that is reported together, such as ``kinematic``.
-        robot: whose channel it is, counted from 1, or None.
-        unit: physical unit of the unwhitened residual.
+        kind: group in which it is reported, such as ``kinematic``.
+        robot: number of its robot, from 1, or None.
+        unit: physical unit of the residual before whitening.
     """
 
     name: str
@@ -46,17 +46,17 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One trial's residual without and with the named causes; C channels.
+    """Residuals of one trial without and with the named causes, in C channels.
 
     Attributes:
-        name: the trial.
-        time: of every row [s], shape (n,).
-        moving: number of leading rows that are a series; the others are means of holds.
-        rate_hz: of the series.
+        name: name of the trial.
+        time: time of each row [s], shape (n,).
+        moving: number of leading rows that form a time series; the others are means over holds.
+        rate_hz: sampling rate of the series.
         before, after: physical residuals, shape (n, C).
         sigma: standard deviations of clean data, shape (n, C).
-        white_before, white_after: whitened residuals, shape (n, C); unit variance if clean.
-        quantities: what a misfit may depend on, shape (n,) each.
+        white_before, white_after: whitened residuals, shape (n, C), with unit variance for clean data.
+        quantities: quantities on which a misfit may depend, shape (n,) each.
     """
 
     name: str
@@ -73,13 +73,13 @@ class Trace:
 
 @dataclass(frozen=True)
 class Group:
-    """Channels that are shown together, such as the three components of a force.
+    """Channels in one plot, such as the three components of a force.
 
     Attributes:
         name: such as ``grasp 2 rotation``.
-        unit: of the physical residual.
-        columns: their indices.
-        components: what tells them apart, such as x, y, z.
+        unit: physical unit of the residual.
+        columns: channel indices.
+        components: names of the components, such as x, y, z.
     """
 
     name: str
@@ -89,7 +89,7 @@ class Group:
 
 
 def group_units(traces: Sequence[Trace], grouped: Sequence[Group]) -> dict[str, Shown]:
-    """For every unit of some channels the one in which all of them are shown, by the largest rms as simulated."""
+    """Display unit of each unit in the groups, chosen by the largest rms of the simulation without causes."""
     return one_each(
         (group.unit, float(np.sqrt(np.mean(trace.before[:, k] ** 2))))
         for trace in traces for group in grouped for k in group.columns
@@ -97,7 +97,7 @@ def group_units(traces: Sequence[Trace], grouped: Sequence[Group]) -> dict[str, 
 
 
 def groups(channels: Sequence[Channel]) -> list[Group]:
-    """Channels whose names differ in the last word only."""
+    """Group channels whose names differ only in the last word."""
     found: dict[str, list[int]] = {}
     for k, channel in enumerate(channels):
         stem, _, last = channel.name.rpartition(" ")
@@ -114,7 +114,7 @@ SEGMENT_S, LEAST_ROWS = 10.0, 16
 
 
 def running_rms(square: Array, rate_hz: float) -> Array:
-    """Root of the mean over ``RUNNING_S`` of a squared series, shape (n,) -> (n,)."""
+    """Running rms over ``RUNNING_S`` from squared values, shape (n,) -> (n,)."""
     width = max(1, round(RUNNING_S * rate_hz))
     if not len(square):
         return np.zeros(0)
@@ -122,14 +122,14 @@ def running_rms(square: Array, rate_hz: float) -> Array:
 
 
 def multiples(trace: Trace, white: Array, columns: Sequence[int]) -> Array:
-    """Rms of some whitened channels over time in multiples of clean data, shape (n,): running, but for holds."""
+    """Rms of some whitened channels over time, shape (n,): running for the time series, by row for holds."""
     square = np.mean(white[:, list(columns)] ** 2, axis=1)
     moving = running_rms(square[: trace.moving], trace.rate_hz)
     return np.concatenate([moving, np.sqrt(square[trace.moving :])])
 
 
 def binned(traces: Sequence[Trace], attribute: str, columns: list[int], quantity: str) -> tuple[Array, Array]:
-    """Mean of a quantity and rms of some channels in bins of equal counts, shapes (b,)."""
+    """Mean of a quantity and rms of some channels in bins of equal counts, shape (b,) each."""
     x = np.concatenate([trace.quantities[quantity] for trace in traces])
     square = np.concatenate([np.mean(getattr(trace, attribute)[:, columns] ** 2, axis=1) for trace in traces])
     order = np.argsort(x, kind="stable")
@@ -138,10 +138,10 @@ def binned(traces: Sequence[Trace], attribute: str, columns: list[int], quantity
 
 
 def spectrum(traces: Sequence[Trace], attribute: str, columns: list[int]) -> tuple[Array, Array] | None:
-    """Frequencies [Hz] and root of the power density over that of white noise of unit variance, shapes (f,).
+    """Frequencies [Hz] and square root of the power density over that of unit white noise, shape (f,) each.
 
-    Only rows in motion count, and only trials of the first one's rate that are long enough; pauses between them are
-    passed over. None where there is no such trial.
+    Uses only rows in motion, from sufficiently long trials with the rate of the first trial. Pauses between rows are
+    ignored. None if there is no such trial.
     """
     rate = traces[0].rate_hz
     used = [trace for trace in traces if trace.moving >= LEAST_ROWS and trace.rate_hz == rate]
@@ -154,7 +154,7 @@ def spectrum(traces: Sequence[Trace], attribute: str, columns: list[int]) -> tup
         _, density = welch(series, rate, nperseg=segment, axis=0, detrend="constant")
         total += trace.moving * density.mean(axis=1) * rate / 2.0
     height = np.sqrt(total / sum(trace.moving for trace in used))
-    # The mean is taken out of every segment, so frequency 0 says nothing; the last one is not doubled.
+    # The mean of each segment is removed, so drop frequency zero. Welch does not double the Nyquist frequency.
     if segment % 2 == 0:
         height[-1] *= np.sqrt(2.0)
     return np.asarray(np.fft.rfftfreq(segment, 1.0 / rate)[1:], dtype=float), height[1:]
@@ -166,15 +166,15 @@ TABLES = ("before", "after", "sigma", "white_before", "white_after")
 
 
 def save_traces(traces: Sequence[Trace], channels: Sequence[Channel], path: Path) -> None:
-    """Write the residuals of all trials; what is beyond float32 is lost.
+    """Write the residuals of all trials in float32.
 
     Args:
-        traces: of every trial, C channels each.
-        channels: what they are.
+        traces: residuals of each trial, C channels each.
+        channels: the channels.
         path: file to write.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     facts = {
         "format": FORMAT,
@@ -196,10 +196,10 @@ def save_traces(traces: Sequence[Trace], channels: Sequence[Channel], path: Path
 
 
 def load_traces(path: Path) -> tuple[list[Trace], list[Channel]]:
-    """Read what ``save_traces`` wrote.
+    """Read a file of ``save_traces``.
 
     Raises:
-        InputError: there is no such file, or it is not whole.
+        InputError: the file is missing or damaged.
     """
     facts, arrays = read_archive(path, "the residuals of a diagnosis")
     try:
@@ -236,7 +236,7 @@ def _trace(entry: Mapping[str, Any], k: int, channels: int, arrays: Mapping[str,
 
 
 def _numbers(arrays: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> Array:
-    """An array of finite numbers; -1 stands for any length."""
+    """An array of finite numbers; -1 in ``shape`` matches any length."""
     values = arrays[name]
     fits = values.ndim == len(shape) and all(
         want in (-1, has) for want, has in zip(shape, values.shape, strict=True)
