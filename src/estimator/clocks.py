@@ -37,12 +37,12 @@ from estimator.statistics import rms
 #     e(t) = q_1(t) - (1 + drift) R_1i q_i(s(t)),    s(t) = t + offset + drift (t - middle),
 #
 # with R_1i also unknown; a fast clock makes rates appear small. The filter commutes with R_1i, so it affects both
-# signals equally. A quintic spline interpolates q_i; far below half the sampling rate it equals the band-limited signal.
+# signals equally. A quintic spline interpolates q_i; far below half the sampling rate it is the band-limited signal.
 
 CUTOFF_HZ = 0.7
 """Cut-off of the first-order low-pass, run forward and backward. White encoder noise grows in proportion to frequency
-in the rates. Above the cut-off the filter acts as an integrator, which makes this noise white again. The motion of a
-payload ends below 1 Hz. Sharper filters at 1 to 3 Hz give 1.0 to 1.6 times the scatter."""
+in the rates; from the cut-off on, the filter compensates this growth. The motion of a payload ends below 1 Hz. Sharper
+filters at 1 to 3 Hz give 1.0 to 1.6 times the scatter."""
 TRIM_S = 2.0
 """Time dropped at both ends of a stream because of filter transients [s]."""
 STEP_LIMIT_S = 0.5
