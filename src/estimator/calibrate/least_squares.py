@@ -255,9 +255,9 @@ class Problem:
         self.basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
         self.prior = np.zeros(self.basis.shape[1])
         self.prior[: of_units.shape[1]] = 1.0
-        # Derivatives at a row's mean signals have errors of up to 2 %. The difference between a common spring scale and
-        # free arm masses is no larger, so a Gauss-Newton step would cover only a fifth of the distance. With held
-        # robots and weak motion, these errors may exceed the information on the inertia. Both cases average derivatives.
+        # Derivatives at a row's mean signals have errors of up to 2 %. Free arm masses and a common spring scale differ
+        # by no more than that, so a Gauss-Newton step would cover only a fifth of the distance. With held robots and
+        # weak motion, the errors may exceed the information on the inertia. Both cases need averaged derivatives.
         self._averaged = given.prior.arm_mass_ratio > 0.0 or not self.prior.any()
         self._use_rows(max(1, sum(len(trial.rows.time) for trial in given.trials) // rules.COARSE_ROWS))
 

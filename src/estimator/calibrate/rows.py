@@ -148,7 +148,7 @@ def _repeats(angles: Array, rate_hz: float) -> Array | float:
     shares = np.array([np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0) for lag in lags])
     if not len(lags) or shares.mean(axis=(1, 2)).max() < rules.REPEATED:
         return 1.0
-    # The shortest candidate period after which a joint repeats almost as well as after the best one.
+    # The shortest candidate period with at least 80 % of the largest share of repeats.
     first = np.argmax(shares > 0.8 * shares.max(axis=0), axis=0)
     again = 1.0 + np.take_along_axis(shares, first[None], axis=0)[0] * (len(angles) / lags[first] - 1.0)
     return np.concatenate([again, again[:, :3]], axis=1)
@@ -159,8 +159,8 @@ def _kernel(rate_hz: float) -> tuple[Array, int]:
 
     The kernel is a root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph
     Transmission Theory, 1928). White noise in different rows is then uncorrelated, so the rows' covariance is valid
-    for slowly varying quantities. With a windowed sinc, neighbouring rows correlate by an eighth, and standard errors
-    are a seventh too small.
+    for slowly varying quantities. With a windowed sinc, neighbouring rows correlate by an eighth, and the claimed
+    precision is a seventh too high.
     """
     spacing, b = max(1, round(rules.ROW_S * rate_hz)), rules.ROLL_OFF
     half = rules.LOBES * spacing
