@@ -124,7 +124,7 @@ def _changes(found: Fit, names: Sequence[str]) -> list[Change]:
 
 
 def _freed(found: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float, Array]:
-    """Free some unknowns in one recording and refit the rest: return the drop in chi2 and the changes of the unknowns."""
+    """Free some unknowns in one recording and refit the rest: return the drop in chi2 and their changes."""
     own = np.searchsorted(part.index, places)
     H_ee, H_ex, g_e = part.H[np.ix_(own, own)], part.H[own], part.g[own]
     C = found.covariance[np.ix_(part.index, part.index)]

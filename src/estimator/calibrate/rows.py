@@ -173,7 +173,7 @@ def _kernel(rate_hz: float) -> tuple[Array, int]:
 
 
 def _gain(rate_hz: float, cutoff_hz: float, stride: int, kernel: Array) -> Array:
-    """Return the response of a row to a unit impulse in one sample, squared and summed over all samples, shape (3, 3)."""
+    """Return a row's response to a unit impulse in one sample, squared and summed over all samples, shape (3, 3)."""
     half = max(round(1.5 * rate_hz), MIN_SAMPLES)
     impulse = np.zeros(2 * half + 1)
     impulse[half] = 1.0
@@ -299,7 +299,7 @@ def _steps(recording: Recording) -> Array:
 
 
 def _to_and_fro(recording: Recording, step: Array) -> Array:
-    """Return the share of slow changes, of one step at most, that the next change reverses, (N, 9); 1 if few are slow."""
+    """Return the share of slow changes (one step at most) that the next change reverses, (N, 9); 1 if few are slow."""
     change = np.rint(np.diff(_columns(recording), axis=0) / np.where(step > 0, step, np.inf))
     slow = np.all([np.abs(change[1:]) <= 1, np.abs(change[:-1]) <= 1], axis=0)
     back, count = np.sum(slow & (change[1:] * change[:-1] < 0), axis=0), np.sum(slow, axis=0)
