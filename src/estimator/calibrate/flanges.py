@@ -93,7 +93,7 @@ def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Fl
 
 
 def turned(R_1i: Array, zeros: Array) -> Array:
-    """Return R_1i as built, from R_1i in the encoders' frames and the theta_x zeros [rad]; shapes (N, 3, 3) and (N,)."""
+    """Return R_1i as built, from R_1i in the encoders' frames and theta_x zeros [rad]; shapes (N, 3, 3) and (N,)."""
     about_x = Rotation.from_euler("x", np.asarray(zeros)[:, None]).as_matrix()
     return about_x[0] @ R_1i @ np.swapaxes(about_x, -1, -2)
 
