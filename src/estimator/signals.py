@@ -203,7 +203,7 @@ def find_holds(data: GraspData) -> list[Hold]:
 
 
 def _rests(data: GraspData, robot: int, window: int) -> NDArray[np.bool_]:
-    """Return whether one robot's forces are constant and its grasp is still, in every window; shape (Q - window + 1,)."""
+    """Return whether one robot's forces are constant and its grasp is still, per window; shape (Q - window + 1,)."""
     force = np.einsum("qab,qb->qa", data.R_bi[:, robot], data.wrench[:, robot, 3:])
     variance = _noise_variance(force, data.rate_hz, window)  # (windows, 3)
     smooth = uniform_filter1d(force, _odd(_SMOOTH_S * data.rate_hz), axis=0, mode="nearest")
@@ -232,7 +232,7 @@ def _hold(data: GraspData, first: int, last: int) -> Hold:
 
 
 def _noise_variance(force: Array, rate_hz: float, window: int) -> Array:
-    """Return the variance of noise that is uncorrelated over the lag, per window, shape (Q - window + 1, components)."""
+    """Return the variance of noise that is uncorrelated over the lag, per window, (Q - window + 1, components)."""
     lag = max(1, min(round(_LAG_S * rate_hz), (window - 1) // 2))
     second = force[2 * lag :] - 2 * force[lag:-lag] + force[: -2 * lag]
     length = window - 2 * lag

@@ -291,7 +291,7 @@ def _excitation(V_1: Array, V_j: Array, R: Array, p: Array, robot: int, samples:
 
 
 def _weights(V: Array, R: Array, p: Array) -> Array:
-    """Return weights (2, 1, 1) of angular and linear residuals: the inverse of their rms, relative to the angular one."""
+    """Return weights (2, 1, 1) of angular and linear residuals: inverse of their rms, relative to the angular one."""
     r = _residuals(V, R, p)
     motion = rms(V[..., :3]), rms(V[..., 3:])
     # Avoid division by zero for exact data.
