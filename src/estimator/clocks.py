@@ -189,7 +189,7 @@ def _determined(turning: Array) -> Array:
 
 CANDIDATES = 6
 _AS_HIGH = 0.02
-_MIN_OVERLAP = 0.5  # of the first signal
+_MIN_OVERLAP = 0.5  # of the shorter signal
 _STILL = 1e-9  # variance, relative to the largest, below which it is rounding error of the transforms
 
 

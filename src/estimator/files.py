@@ -245,7 +245,7 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
             if str(temporary) not in str(error):
                 raise
             raise InputError(str(error).replace(str(temporary), str(path))) from error
-        except OSError as error:  # of libraries that write pictures
+        except OSError as error:  # raised by libraries that write pictures
             if error.errno not in FULL:
                 raise
             raise InputError(f"{path}: cannot be written ({error.strerror})") from error

@@ -210,7 +210,7 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     speed = np.abs(x[stop - 1 + 3 * PERIODS] - x[stop - 1 + PERIODS]) / (2.0 * PERIODS)
     late = stop - 2 * PERIODS - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
     first, held = np.where(stood & ~stops, np.maximum(first, late), first), stops | leaves
-    # One more reading at the end: a reading taken between two encoder values mixes both.
+    # A span includes the first reading of the run and the one after it: a sample between two readings mixes both.
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
 

@@ -151,7 +151,7 @@ def fusion_changes(
     of_robot = np.repeat(np.arange(1, N), 6)
     summed = np.moveaxis(summing, -1, -2) @ np.moveaxis(wrench, 0, -1)[of_robot]
 
-    def changed(stacked: Array) -> Array:  # components apart in memory
+    def changed(stacked: Array) -> Array:  # each component contiguous in memory
         return np.moveaxis((dG @ stacked.reshape(Q, -1).T).reshape(K, 6, Q), 1, 2)
 
     ups = robot_up(R_bi, grasps)

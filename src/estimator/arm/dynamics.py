@@ -45,7 +45,7 @@ class Gimbal(NamedTuple):
         return self._replace(cx=1.0, sx=0.0)
 
     def rotation(self) -> Array:
-        """Return the orientation R_bi of the grasp frame {i} in the base frame {b}, equation (28), shape (..., 3, 3)."""
+        """Return the orientation R_bi of the grasp frame {i} in the base frame {b}, equation (28), (..., 3, 3)."""
         cz, cy, cx, sz, sy, sx = self
         return matrices([
             [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],

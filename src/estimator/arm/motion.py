@@ -95,7 +95,7 @@ MASSES: NDArray[np.intp] = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"]
 TILT: NDArray[np.intp] = np.r_[AT["tilt"]]
 BY_UNIT: NDArray[np.intp] = np.concatenate([LENGTHS, MASSES, TILT])
 """Deviations that affect more than the sensor readings."""
-_LENGTH, _MASS, _TILT = 1e-6, 1e-4, 1e-6  # steps of differences
+_LENGTH, _MASS, _TILT = 1e-6, 1e-4, 1e-6  # steps of finite differences
 _NONE = np.zeros(3)
 _Wrist = tuple[Array, Array, Array, Array]
 """Wrist position [m], velocity, acceleration and force on the payload [N], in the arm's own frame."""

@@ -176,7 +176,7 @@ def true_joints(arms: Arms, phi: Array, theta: Array, tau: Array) -> tuple[Array
 
 
 def levelled(arms: Arms, R: Array, h: Array) -> tuple[Array, Array]:
-    """Transform orientations (..., 3, 3) and wrist positions (..., 3) [m] from the arms' own frames to the level {b}."""
+    """Rotate orientations (..., 3, 3) and wrist positions (..., 3) [m] from the arms' own frames to the level {b}."""
     if not isinstance(arms, ArmUnit) or not arms.of("tilt").any():
         return R, h
     return arms.R_ba @ R, (arms.R_ba @ h[..., None])[..., 0]

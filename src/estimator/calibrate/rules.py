@@ -45,9 +45,9 @@ share, and fewest slow readings. Derived: a reading between two values takes one
 other with q. The mean of p q over a step is sigma / sqrt(pi) for small sigma, so sigma is sqrt(pi) times the
 share. Noise of ``DITHER`` moves ten of 50 readings."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TORQUE_FLOOR_NM = 4e-6, 8e-7, 3e-4
-"""Errors of the simulated mechanics in motion at 100 Hz, besides any sensor: soft rods and welds shift a
-wrist by micrometres and hardly turn it. Measured on trials with ideal sensors and with encoders of 19 and 20
-bits: with these floors, chi2/n of the loops of random trials is 0.55 (ideal) and 0.8 to 1.2."""
+"""Errors of the simulated mechanics in motion at 100 Hz, besides any sensor: soft rods and welds shift a wrist by
+micrometres and hardly turn it. Measured: with these floors, the loops of random trials leave 0.55 (ideal sensors) and
+0.8 to 1.2 (encoders of 19 and 20 bits) of the predicted residual."""
 AT_REST = 0.2
 """Share of these floors that applies at rest, at any rate. Measured: static trials with ideal sensors show at
 most a fiftieth of the floors' variance."""

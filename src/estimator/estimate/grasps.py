@@ -75,7 +75,7 @@ class PairGrasp:
         return norm_se(self.p_ij, self.covariance[3:, 3:])
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "i": self.i,
             "j": self.j,
@@ -160,7 +160,7 @@ class GraspEstimate:
         return replace(self, covariance=self.covariance + np.diag(own) + still_rad2[0] * first @ first.T)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "pairs": [
                 self.pair(i, j).to_dict()

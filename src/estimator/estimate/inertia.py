@@ -72,7 +72,7 @@ class PrincipalInertia:
         return standard_errors(so3.rotvec_covariance(self.R_1c, self.R_1c_covariance))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         axes, axes_se, covariance = self.axis_angle_rad, self.axis_angle_se_rad, self.R_1c_covariance
         return {
             "principal_kgm2": self.moments.tolist(),
@@ -194,7 +194,7 @@ class InertiaEstimate:
         return refuse_uncertain(report, self.covariance, SE_LIMIT * float(np.trace(self.inertia)) / 3)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "I_b_kgm2": self.inertia.tolist(),
             "I_b_se_kgm2": inertia_matrix(standard_errors(self.covariance)).tolist(),

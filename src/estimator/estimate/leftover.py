@@ -143,7 +143,7 @@ class Leftover:
         return self.left / self.noise
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; keys as the fields."""
+        """Convert to plain types, with the field names as keys."""
         return asdict(self)
 
 

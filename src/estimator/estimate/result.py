@@ -91,7 +91,7 @@ class RecordingEstimate:
     leftovers: tuple[Leftover, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; keys as the fields."""
+        """Convert to plain types, with the field names as keys."""
         return {
             **vars(self),
             "grasps": self.grasps and self.grasps.to_dict(),
@@ -101,7 +101,7 @@ class RecordingEstimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], robots: int) -> RecordingEstimate:
-        """Inverse of ``to_dict``, for a number of robots N."""
+        """Inverse of ``to_dict`` for N robots."""
         parts = {
             "grasps": _if_given(values["grasps"], lambda grasps: GraspEstimate.from_dict(grasps, robots)),
             "inertia": _if_given(values["inertia"], InertiaEstimate.from_dict),

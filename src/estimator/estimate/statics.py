@@ -240,7 +240,7 @@ def _excess_variance(residual: Array, A: Array, known: Array, shape: Array) -> f
     def excess(v: float) -> float:
         return float(np.sum(squares / (eigenvalues + v))) - len(z)
 
-    most = float(np.sum(squares)) / len(z)  # the solution if nothing else were known
+    most = float(np.sum(squares)) / len(z)  # the solution if ``known`` were zero
     least = 1e-9 * most
     if most <= 0 or excess(least) <= 0:
         return 0.0

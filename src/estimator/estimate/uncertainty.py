@@ -135,7 +135,7 @@ class WeakDirection:
         return f"{self.step}, {self.direction}: {self.reason}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {"direction": self.direction, "vector": list(self.vector), "reason": self.reason}
 
 
@@ -174,7 +174,7 @@ class StepReport:
         return self.singular_values[0] / smallest if smallest > 0 else float("inf")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "step": self.step,
             "parameters": list(self.parameters),

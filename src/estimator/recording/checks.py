@@ -68,7 +68,7 @@ def check_duration(recording: Recording, trim_s: float) -> None:
 
 
 def check_finite(name: str, columns: Mapping[str, Array]) -> None:
-    """Check that columns hold finite numbers only.
+    """Check that columns contain finite numbers only.
 
     Raises:
         InputError: names the recording, the column and the row (counted from 0).

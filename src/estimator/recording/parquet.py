@@ -236,14 +236,14 @@ def _structure(data: bytes, at: int) -> tuple[dict[int, Any], int]:
 def _value(data: bytes, at: int, kind: int) -> tuple[Any, int]:
     value = None
     match kind:
-        case 1 | 2 | 3:  # in a list, true or false; a byte
+        case 1 | 2 | 3:  # a boolean in a list, or a byte
             at += 1
         case 4 | 5 | 6:
             number, at = _unsigned(data, at)
             value = (number >> 1) ^ -(number & 1)
         case 7:
             at += 8
-        case 8:  # bytes, after their number
+        case 8:  # bytes after their length
             number, at = _unsigned(data, at)
             at += number
         case 9 | 10:
