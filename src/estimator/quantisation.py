@@ -19,30 +19,27 @@ BLOCK = 1024
 _LIVE = 0.5
 _SIGMAS = 8.0  # excess of runs of equal rows over chance, in standard deviations
 _ORDER, _NOISE = 6, 1e-6
-"""Order of the differences, and their size, relative to the range, above which they are noise: motion leaves
-less."""
+"""Order of the differences, and their size, relative to the range, above which they are noise: motion leaves less."""
 _EQUAL, _OF = 2, 8  # prior pseudo-counts: 2 of 8 readings equal by chance
 
 
 class Repeats:
     """Distinguish readings that a logger wrote again from readings that are equal by chance.
 
-    The noise of a measured effort distinguishes them: by chance, readings two apart are equal as often as
-    neighbours are. A run of equal rows beyond that chance is one reading. Efforts without noise give no
-    evidence, because a robot at rest repeats its readings.
+    The noise of a measured effort distinguishes them: by chance, readings two apart are equal as often as neighbours
+    are. A run of equal rows beyond that chance is one reading. Efforts without noise give no evidence, because a robot
+    at rest repeats its readings.
     """
 
     def __init__(self, efforts: Sequence[int]) -> None:
-        """Take the columns that hold measured torques, forces or currents; without any, no row counts as
-        repeated."""
+        """Take the columns that hold measured torques, forces or currents; without any, no row counts as repeated."""
         self._efforts = list(efforts)
         self._last: Array | None = None
         self._readings = self._live = self._differences = 0
         self._noisy = np.zeros(len(self._efforts))
 
     def of(self, values: Array) -> NDArray[np.bool_]:
-        """Return which of the next rows (q, C) repeat the row before; q is a multiple of ``BLOCK`` except in
-        the last call."""
+        """Return which of the next rows (q, C) repeat the row before; q is a multiple of ``BLOCK`` but at the end."""
         self._look(values)
         blocks = [self._block(values[k : k + BLOCK]) for k in range(0, len(values), BLOCK)]
         return np.concatenate(blocks) if blocks else np.zeros(0, dtype=bool)
@@ -127,30 +124,27 @@ def _step_of(gaps: Array, levels: int) -> float | None:
 
 
 def rounding_step(values: Array) -> float:
-    """Return the rounding step of a sensor, or 0 if values rarely repeat, so that rounding acts like white
-    noise."""
+    """Return the rounding step of a sensor, or 0 if values rarely repeat: rounding then acts as white noise."""
     return 0.0 if len(np.unique(values)) > 0.9 * len(values) else quantisation_step(values, levels=2) or 0.0
 
 
 LEAST = 3
-"""Fewest equal readings of a held span. Derived: distinguishing a jump from a constant speed needs two of
-three steps."""
+"""Fewest equal readings of a held span. Derived: distinguishing a jump from a constant speed needs two of three steps.
+"""
 PERIODS = 2
-"""Number of periods over which a held value may change. Derived: a reading taken between two encoder values
-spreads the change over two periods."""
+"""Number of periods over which a held value may change. Derived: a reading taken between two encoder values spreads
+the change over two periods."""
 MOST = 0.5
-"""Share of an angle's readings that repeat others; above it, the encoder counts as slow rather than holding.
-Chosen."""
+"""Share of an angle's readings that repeat others; above it, the encoder counts as slow rather than holding. Chosen.
+"""
 DIES_CYCLES = 4.0
-"""Number of cut-off periods after which the response of the low-pass filter is below 1e-4 of its peak.
-Derived."""
+"""Number of cut-off periods after which the response of the low-pass filter is below 1e-4 of its peak. Derived."""
 TYPICAL = 0.8
 """Share of the moving readings that are neither held nor next to held ones. Chosen."""
 TYPICAL_SIGMAS = 1.2816
 """Standard deviations that contain this share of a normal distribution. Derived."""
 FINEST = 2e-6
-"""Step [rad or m] assumed for a reading that is not rounded. Chosen: no encoder has more than 21 bits per
-turn."""
+"""Step [rad or m] assumed for a reading that is not rounded. Chosen: no encoder has more than 21 bits per turn."""
 
 
 class Held(NamedTuple):
@@ -167,15 +161,14 @@ class Held(NamedTuple):
 
 
 def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
-    """Find spans of readings that repeat the one before although the angle moved on, as pairs (first, last +
-    1).
+    """Find spans (first, last + 1) of readings that repeat the one before although the angle moved on.
 
-    An angle that stays within one step for m periods at constant acceleration has a speed of at most 4 / m
-    steps per period. It therefore changes by at most (1 + 2 p / m)^2 steps in p periods before or after the
-    span. Before a held value, the joint moves faster than this limit. After it, the reading jumps by the
-    whole motion during the span. That jump exceeds the limit, and exceeds the change in the next period by
-    more than the limit. If an encoder shows this at least once, it holds values. Then every span is held
-    whose change before or after exceeds the limit plus the effect of the neighbouring acceleration.
+    An angle that stays within one step for m periods at constant acceleration has a speed of at most 4 / m steps per
+    period. It therefore changes by at most (1 + 2 p / m)^2 steps in p periods before or after the span. Before a held
+    value, the joint moves faster than this limit. After it, the reading jumps by the whole motion during the span.
+    That jump exceeds the limit, and exceeds the change in the next period by more than the limit. If an encoder shows
+    this at least once, it holds values. Then every span is held whose change before or after exceeds the limit plus
+    the effect of the neighbouring acceleration.
 
     Args:
         x: readings, shape (Q,).
@@ -187,8 +180,7 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     first, stop = first[there], stop[there]
 
     def changes(p: int) -> tuple[Array, Array, Array, Array, Array]:
-        """Return the largest change of a resting joint in p periods, and the changes before and after the
-        span."""
+        """Return the largest change of a resting joint in p periods, and changes before and after the span."""
         most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
         before, back, end = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0), stop - 1
         each = ((first, before), (before, back), (end + p, end), (end + 2 * p, end + p))
@@ -215,8 +207,7 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
 
 
 def scatter(x: Array) -> float:
-    """Return the rounding step whose noise matches that of moving readings, shape (Q,), from fourth
-    differences."""
+    """Return the rounding step whose noise matches that of moving readings, shape (Q,), from fourth differences."""
     apart = np.abs(np.diff(x, 4))
     sigma = np.quantile(apart[apart > 0.0], TYPICAL) / TYPICAL_SIGMAS if apart.any() else 0.0
     return float(sigma * np.sqrt(12.0 / 70.0))
@@ -225,8 +216,8 @@ def scatter(x: Array) -> float:
 def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held, ...], Array]:
     """Return readings with held ones interpolated, the held readings, and the doubt of the interpolation.
 
-    The doubt is the difference between cubic and quintic interpolation over the standard deviation of the
-    rounding error. It is the largest of all columns at each instant, shape (Q,).
+    The doubt is the difference between cubic and quintic interpolation over the standard deviation of the rounding
+    error. It is the largest of all columns at each instant, shape (Q,).
 
     Args:
         x: readings of C joints, shape (Q, C).
@@ -253,8 +244,7 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
 
 
 def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Array]:
-    """Apply ``filled`` to a recording; columns are all driven angles, then all gimbal angles (see
-    ``angle_of``)."""
+    """Apply ``filled`` to a recording; columns are all driven angles, then all gimbal angles (see ``angle_of``)."""
     angles = np.stack([recording.phi, recording.theta], axis=1)
     x = angles.reshape(len(angles), -1)
     x, held, doubt = filled(x, [rounding_step(own) for own in x.T])
@@ -269,8 +259,7 @@ def angle_of(column: int, robots: int) -> tuple[int, int, int]:
 
 
 def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_]:
-    """Return samples of filtered angles, rates or accelerations that held readings may change by more than
-    noise, (Q,).
+    """Return a mask (Q,) of filtered samples (angles, rates, accelerations) that held readings change beyond noise.
 
     ``doubt`` is that of ``filled``; the filter is ``filtering.low_pass``.
     """

@@ -174,8 +174,7 @@ def fusion_matrix(grasps: GraspEstimate) -> Array:
 
 
 def _ratio(grasps: GraspEstimate) -> tuple[float, Array]:
-    """Return the weight of linear residuals relative to angular ones [rad/m], and its derivative (6(N-1),) by grasp
-    errors."""
+    """Return the weight of linear relative to angular residuals [rad/m], and its derivative by grasp errors."""
     N, off = grasps.robots, ~np.eye(grasps.robots, dtype=bool)
     if N == 1:
         return 1.0, np.zeros(0)
@@ -203,8 +202,7 @@ def fusion_with(grasps: GraspEstimate, ratio: float) -> Array:
 
 
 def _fusion_matrix_changes(grasps: GraspEstimate, ratio: float, by_ratio: Array) -> Array:
-    """Return the derivative of ``fusion_with`` with respect to grasp errors, directly and through ``ratio``, (K, 6,
-    6N).
+    """Return the derivative of ``fusion_with`` by grasp errors, directly and through ``ratio``, shape (K, 6, 6N).
 
     G = H^+ W with weights W and H = W Ad^-1 of full rank: dH^+ = -H^+ dH H^+ + (H^T H)^-1 dH^T (1 - H H^+) (G. Golub,
     V. Pereyra, SIAM J. Numer. Anal. 10, 1973).
@@ -223,8 +221,7 @@ def _fusion_matrix_changes(grasps: GraspEstimate, ratio: float, by_ratio: Array)
 
 
 def total_wrench(wrench: Array, grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Return the sum of the wrenches (m_i, f_i) in {i}, (Q, N, 6), at the origin of {1}: force and moment, (Q, 3)
-    each.
+    """Sum the wrenches (m_i, f_i) in {i}, (Q, N, 6), at the origin of {1}: force and moment, (Q, 3) each.
 
     Equations (10), (19), including the grasp moments m_i. The result is in {1}.
     """
@@ -253,8 +250,7 @@ def tilt_scatter(R_bi: Array, grasps: GraspEstimate) -> float:
 
 
 def acceleration_noise(data: GraspData, grasps: GraspEstimate) -> float:
-    """Return the rms difference of angular acceleration between robots, per component and robot [rad/s^2]; 0 for one
-    robot."""
+    """Return the rms disagreement on angular acceleration, per component and robot [rad/s^2]; 0 for one robot."""
     if grasps.robots == 1:
         return 0.0
     alpha = np.einsum("iab,qib->qia", grasps.R_1i, data.twist_dot[..., :3])
@@ -387,8 +383,7 @@ def start_bases(R: Array, h: Array, shared: Shared) -> Bases:
 def needed_wrench(
     motion: Array, twist: Array, twist_dot: Array, gravity: Array, pi: Array
 ) -> tuple[Array, Array]:
-    """Return the change of force and moment that a change of the payload's motion requires, in {1}, shape (..., 3)
-    each.
+    """Return the change of force and moment for a change of the payload's motion, in {1}, shape (..., 3) each.
 
     Args:
         motion: twist of the payload, shape (Q, 6).

@@ -7,8 +7,7 @@ from estimator.arrays import Array
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return cross products along the last axis, shapes (..., 3); bitwise equal to ``np.cross``, in a third of its
-    time."""
+    """Return cross products along the last axis, (..., 3): bitwise equal to ``np.cross``, in a third of its time."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     # Each component is contiguous in memory, as in ``estimator.arrays``.

@@ -176,8 +176,7 @@ def is_in_reach(h: ArrayLike, design: Arms) -> NDArray[np.bool_]:
 
 
 def _leg_triangles(h: Array, design: Arms) -> tuple[Array, Array, Array]:
-    """Return the wrist relative to each driven axis, outward and up [m], and the cosine of that triangle's angle,
-    (..., 3)."""
+    """Return the wrist from each driven axis, outward and up [m], and the cosine of the angle there, (..., 3)."""
     l1, l2 = design.proximal_length_m, design.rod_length_m
     # On the driven axis itself, or at infinity, the cosine is not finite: out of reach.
     with np.errstate(all="ignore"):

@@ -62,8 +62,7 @@ class Gimbal(NamedTuple):
         return matrices([[-sy, 0.0, 1.0], [cy * sx, cx, 0.0], [cy * cx, -sx, 0.0]])
 
     def motion(self, theta_dot: ArrayLike, theta_ddot: ArrayLike) -> tuple[Array, Array]:
-        """Return angular velocity omega_i [rad/s] of {i} in {b}, expressed in {i}, and its derivative [rad/s^2], (...,
-        3).
+        """Return angular velocity [rad/s] of {i} in {b}, expressed in {i}, and its derivative [rad/s^2], (..., 3).
 
         These are E theta_dot and E theta_ddot + dE/dt theta_dot, without multiplications by zero.
         """
@@ -86,8 +85,7 @@ class Gimbal(NamedTuple):
         return vectors(cy * sx * y + cy * cx * z - sy * x, cx * y - sx * z, x)
 
     def moment(self, torque: ArrayLike) -> Array:
-        """Return the moment in {i} [N m] with given torques about the axes (z, y, x) [N m]: E^-T torque, shape (...,
-        3)."""
+        """Return the moment in {i} [N m] with given torques about axes (z, y, x) [N m]: E^-T torque, (..., 3)."""
         _, cy, cx, _, sy, sx = self
         about_z, about_y, about_x = components(torque)
         # In {i} before the rotation about x, y is the middle axis and the first axis is (-sin, 0, cos) of theta_y.

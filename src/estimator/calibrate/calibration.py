@@ -209,8 +209,7 @@ class Calibration:
 
     @property
     def zero_sd_rad(self) -> float:
-        """Standard deviation of the theta_x zeros, by which the payloads' frames are turned; 0 in the drawing's
-        frames."""
+        """Standard deviation of the theta_x zeros, which turn the payloads' frames; 0 in the drawing's frames."""
         return self.prior.encoder_zero_rad if in_encoder_frames(self.units) else 0.0
 
     @cached_property
@@ -308,8 +307,7 @@ def calibrated(recording: Recording, calibration: Calibration, called: str = "th
 def units_for(
     calibration: Calibration, robots: int, design: OmnidDesign, name: str, called: str = "the calibration"
 ) -> ArmUnit:
-    """Return the calibration's robots for a log of ``robots`` robots of a design; messages use ``name`` and
-    ``called``.
+    """Return the calibration's robots, after a check of number and design; messages use ``name`` and ``called``.
 
     Raises:
         InputError: the log has another number of robots or another design.

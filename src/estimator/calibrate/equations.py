@@ -140,8 +140,7 @@ def adjustment_of(J: Array, noise: Array, covariance: Array, residual: Array) ->
 
 
 def noise_of(rows: Rows, variances: tuple[Array, Array]) -> Array:
-    """Return the covariance of each joint's (value, rate, acceleration) and of the torques in the rows: (n, N, 7, 3,
-    3)."""
+    """Return the covariance of (value, rate, acceleration) per joint, and of the torques, (n, N, 7, 3, 3)."""
     moving, held = variances
     n, N = moving.shape[:2]
     out = np.zeros((n, N, 7, 3, 3))

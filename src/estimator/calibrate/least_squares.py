@@ -102,8 +102,7 @@ class Quadratic:
 
     @classmethod
     def of(cls, J: Array, residual: Array, covariance: Array, index: NDArray[np.intp]) -> Quadratic:
-        """Whiten rows (n, C) and their derivative (n, C, k) by the covariance of their noise (n, C, C), and sum the
-        squares."""
+        """Whiten rows (n, C) and their derivative (n, C, k) by the noise covariance (n, C, C); sum the squares."""
         factor = np.linalg.cholesky(covariance)
         white = np.linalg.solve(factor, np.concatenate([J, residual[..., None]], axis=2))
         flat = white.reshape(residual.size, -1)

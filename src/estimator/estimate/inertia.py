@@ -95,8 +95,7 @@ class PrincipalInertia:
 
 
 def about_origin(mass: float, c: Array, inertia: Array) -> Array:
-    """Return (m, m c, J about the origin), shape (10,), from mass [kg], centre of mass c [m] and inertia about c [kg
-    m^2]."""
+    """Return (m, m c, J about the origin), shape (10,), from mass [kg], centre of mass c [m], inertia [kg m^2]."""
     about = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
     return np.concatenate([[mass], mass * c, inertia_parameters(about)])
 
@@ -326,8 +325,7 @@ def _upstream_covariance(
 def by_upstream(
     trials: Sequence[GraspData], grasps: GraspEstimate, p_1c: Array, com_by_grasp: Array
 ) -> Array:
-    """Return the derivative of the parameters (26) by the grasp errors, which also move the CoM, and by the CoM, (6, K
-    + 3).
+    """Return the derivative of the parameters (26) by grasp errors, which also move the CoM, and by the CoM, (6, K+3).
 
     Differentiating the normal equations of X x = y with residual r: X^T X dx = dX^T r + X^T (dy - dX x).
 

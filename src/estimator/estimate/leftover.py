@@ -210,8 +210,7 @@ def _rest(A: Array, b: Array) -> Array:
 
 
 def _noise(left: Array, lag: int) -> float:
-    """Return the rms length of the noise in residuals, shape (..., Q, 3); of the residuals themselves if Q is too
-    short."""
+    """Return the rms length of the noise in residuals, (..., Q, 3); of the residuals themselves for small Q."""
     count = left.shape[-2] - _ORDER * lag
     if count < 1:
         return rms_length(left.reshape(-1, 3))

@@ -161,8 +161,7 @@ class PayloadEstimate:
 
     @property
     def contradicts(self) -> bool | None:
-        """Whether the robots contradict each other beyond noise, which makes standard errors too small; None if
-        unknown."""
+        """Whether the robots contradict each other beyond noise, so standard errors are too small; None if unknown."""
         found = [one for recording in self.recordings for one in recording.leftovers]
         return bool(beyond_noise(found)) if found else None
 
