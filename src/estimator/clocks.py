@@ -1,13 +1,13 @@
-"""Clocks of the robots against each other, from the motion itself.
+"""Estimate the offset and drift between the robots' clocks from the motion of a shared payload.
 
-Every grasp of a rigid payload turns with the same angular velocity, seen from another frame. The gimbal angles of a
-robot give it in {i} by the stamps of that robot; what shifts the courses of two robots on top of each other is what
-their clocks differ by. The course of |omega|, the same in every frame, finds the shift among all possible ones
-(``clock_search``); the whole vectors then fix it (``clock_fit``). With 16-bit encoders that is good to 4 us and 0.1 ppm
-in a random trial of payload (a) and to 1.2 us in a periodic one; |omega| alone scatters 1.3 and 1.8 times as much.
+All grasps of a rigid payload have the same angular velocity, expressed in different frames. The gimbal angles of each
+robot give it in {i} on that robot's clock. The time shift that aligns two robots is the difference of their clocks.
+Correlating |omega|, which is equal in all frames, finds candidate shifts (``likely_lags``). A fit of the whole vectors
+then refines them (``fit_clock``). With 16-bit encoders the standard error is 4 us and 0.1 ppm for a random trial of
+payload (a), and 1.2 us for a periodic one. With |omega| alone it is 1.3 and 1.8 times larger.
 
-A positive offset means that a clock is ahead: **stamp = true time + offset + drift (true time - middle)**, the true
-time being that of robot 1. A log that says t of a sample taken at t - delay has an offset of +delay.
+A positive offset means that a clock is ahead: **stamp = true time + offset + drift (true time - middle)**. True time
+is the clock of robot 1. A log that stamps a sample taken at t - delay with t has an offset of +delay.
 """
 
 from __future__ import annotations
@@ -36,36 +36,35 @@ from estimator.statistics import rms
 #
 #     e(t) = q_1(t) - (1 + drift) R_1i q_i(s(t)),    s(t) = t + offset + drift (t - middle),
 #
-# with R_1i unknown as well; a clock that runs fast makes rates small. The filter commutes with R_1i, so whatever it
-# takes away it takes from both. q_i between its samples is a quintic spline; far below half the sampling rate that is
-# the band-limited signal.
+# with R_1i also unknown; a fast clock makes rates appear small. The filter commutes with R_1i, so it affects both
+# signals equally. A quintic spline interpolates q_i; far below half the sampling rate it is the band-limited signal.
 
 CUTOFF_HZ = 0.7
-"""Cut-off of the first-order low-pass, run forward and backward. White noise of encoders grows in proportion to
-frequency in rates: from about here on the filter turns rates into something like angles, in which that noise is even,
-and the motion of a payload ends below 1 Hz. Sharper filters at 1 to 3 Hz scatter 1.0 to 1.6 times as much."""
+"""Cut-off of the first-order low-pass, run forward and backward. White encoder noise grows in proportion to frequency
+in the rates; from the cut-off on, the filter compensates this growth. The motion of a payload ends below 1 Hz. Sharper
+filters at 1 to 3 Hz give 1.0 to 1.6 times the scatter."""
 TRIM_S = 2.0
-"""Dropped at both ends of a stream against transients of the filter [s]."""
+"""Time dropped at both ends of a stream because of filter transients [s]."""
 STEP_LIMIT_S = 0.5
-"""A fit that moves further than this from where it began has lost its place [s]."""
+"""Largest distance of a fit from its initial guess; beyond it, the fit has diverged [s]."""
 _ITERATIONS = 20
 _CONVERGED_S = 1e-10
 _RATE_HZ = 25.0
 
 
 class Rates:
-    """Filtered angular velocity of one robot's grasp, by its own stamps.
+    """Filtered angular velocity of one robot's grasp on its own clock.
 
     Attributes:
-        rate_hz: about 25 Hz; the filter leaves little beyond half of that.
-        time: stamps [s] that the filter's transients have left, at that rate, shape (Q,).
+        rate_hz: sampling rate of ``time`` and ``q``, about 25 Hz; the filter leaves little above half of that.
+        time: stamps without filter transients [s], shape (Q,).
         q: angular velocity in {i} [rad/s], shape (Q, 3).
-        spline: the same between samples, through all that were recorded.
-        change: its derivative [rad/s^2].
+        spline: interpolation of the angular velocity through all recorded samples.
+        change: derivative of ``spline`` [rad/s^2].
     """
 
     def __init__(self, theta: Array, start_s: float, rate_hz: float) -> None:
-        """Take gimbal angles [rad], shape (Q, 3), with Q well above 2 ``TRIM_S`` seconds."""
+        """Take gimbal angles [rad], shape (Q, 3), well over 2 ``TRIM_S`` seconds long."""
         omega = np.einsum("qij,qj->qi", rate_matrix(theta), differentiate(theta, rate_hz))
         keep = slice(round(TRIM_S * rate_hz), len(theta) - round(TRIM_S * rate_hz))
         time, q = start_s + np.arange(len(theta))[keep] / rate_hz, _smooth(omega, rate_hz)[keep]
@@ -77,16 +76,16 @@ class Rates:
 
 @dataclass(frozen=True)
 class ClockFit:
-    """Least-squares fit over some samples of robot 1.
+    """Least-squares fit of a clock to a span of samples of robot 1.
 
     Attributes:
         offset_s, drift: s = t + offset + drift (t - middle) [s], [-].
-        samples: those of robot 1 that are in the fit.
-        half_s: half their length [s].
+        samples: span of robot 1's samples in the fit.
+        half_s: half the length of the span [s].
         R: R_1i.
         residual: e, shape (Q, 3) [rad/s].
-        rotated_rate: J columns of the rotation, shape (Q, 3, 3), those of directions that turn nothing left out.
-        change: R_1i dq_i/ds [rad/s^2], the derivative by the offset up to its sign, shape (Q, 3).
+        rotated_rate: columns of J for the rotation, shape (Q, 3, K), without directions that have no effect.
+        change: R_1i dq_i/ds [rad/s^2], shape (Q, 3): minus the derivative of e with respect to the offset.
         mismatch: rms of e over rms of q_1.
     """
 
@@ -111,13 +110,14 @@ def fit_clock(
     *,
     with_drift: bool = True,
 ) -> ClockFit | None:
-    """Gauss-Newton from a guess; None if it goes astray or less than half of the samples overlap.
+    """Fit a clock by Gauss-Newton; return None if it diverges or less than half of the samples overlap.
 
     Args:
         first, other: robots 1 and i.
-        part: samples of robot 1 to use as far as robot i has any at their instants.
-        middle_s: instant of robot 1 at which ``offset_s`` is meant [s].
-        offset_s, drift: the guess; the drift is kept without ``with_drift``.
+        part: samples of robot 1 to use, if robot i has samples at those instants.
+        middle_s: instant of robot 1 to which ``offset_s`` refers [s].
+        offset_s, drift: initial guess.
+        with_drift: whether to estimate the drift rather than hold it.
     """
     wanted = first.time[part]
     at = wanted + offset_s + drift * (wanted - middle_s)
@@ -129,11 +129,11 @@ def fit_clock(
     time, q_1 = first.time[part], first.q[part]
     centre, half_s = (time[0] + time[-1]) / 2, (time[-1] - time[0]) / 2
     lever = ((time - centre) / half_s)[:, None]
-    # Offset at the centre of the samples: uncorrelated with the drift.
+    # The offset at the centre of the samples is uncorrelated with the drift.
     guess = here = offset_s + drift * (centre - middle_s)
 
     def moved() -> tuple[Array, Array]:
-        """q_i and its derivative at robot 1's instants, per second of robot 1."""
+        """Return q_i and its derivative at robot 1's instants, per second of robot 1."""
         at = time + here + drift * (time - centre)
         return (1.0 + drift) * other.spline(at), (1.0 + drift) * other.change(at)
 
@@ -144,7 +144,7 @@ def fit_clock(
         columns = [
             -so3.skew(q_i @ R.T),
             change[..., None],
-        ]  # by a rotation vector on the left, and the offset
+        ]  # derivatives with respect to a left rotation vector and the offset
         columns += [(lever * change)[..., None]] if with_drift else []
         J = np.concatenate(columns, axis=-1).reshape(q_1.size, -1)
         size = np.linalg.norm(J, axis=0)
@@ -175,36 +175,36 @@ def fit_clock(
 
 
 def _smooth(omega: Array, rate_hz: float) -> Array:
-    """Zero-phase low-pass of |H| = 1 / (1 + (f / cutoff)^2) along axis 0."""
+    """Apply a zero-phase low-pass with |H| = 1 / (1 + (f / cutoff)^2) along axis 0."""
     sections = butter(1, CUTOFF_HZ, fs=rate_hz, output="sos")
     padding = min(len(omega) - 1, math.ceil(6.0 * rate_hz / CUTOFF_HZ))
     return sosfiltfilt(sections, omega, axis=0, padlen=padding)
 
 
 def _determined(turning: Array) -> Array:
-    """Derivatives by the rotations that change something: none about a single axis of all motion."""
+    """Keep the rotation derivatives with an effect: motion about a single axis leaves one direction without any."""
     values, axes = np.linalg.eigh(np.einsum("qik,qil->kl", turning, turning))
     return turning @ axes[:, values > 1e-12 * values[-1]]
 
 
 CANDIDATES = 6
 _AS_HIGH = 0.02
-_MIN_OVERLAP = 0.5  # of the first signal
-_STILL = 1e-9  # variance over the largest one that is rounding error of the transforms
+_MIN_OVERLAP = 0.5  # of the shorter signal
+_STILL = 1e-9  # variance, relative to the largest, below which it is rounding error of the transforms
 
 
 def likely_lags(a: Array, b: Array, least: int, largest: int, near: float) -> list[int]:
-    """Lags L at which b[n + L] looks most like a[n], the best first.
+    """Return the lags L at which b[n + L] correlates best with a[n], the best first.
 
-    The coefficient of correlation over the samples that overlap, as if only those existed (Padfield, "Masked
-    object registration in the Fourier domain", IEEE Trans. Image Processing 2012, in one dimension), at its
-    highest local maxima. Those that are as high as others to within 2 % come in the order of their distance from
-    ``near``, so that motion that repeats itself does not crowd out what is likely.
+    The correlation coefficient at each lag uses only the overlapping samples (Padfield, "Masked object registration in
+    the Fourier domain", IEEE Trans. Image Processing 2012, in one dimension). Candidates are its highest local maxima.
+    Maxima within 2 % of each other are sorted by distance from ``near``, so that periodic motion does not hide the
+    likely lag.
 
     Args:
         a, b: samples at one rate, shapes (Q,) and (P,).
         least, largest: range of the lags.
-        near: lag of clocks that agree.
+        near: lag of equal clocks.
     """
     lags = np.arange(1 - len(a), len(b))
     rho = _correlation(a, b)
@@ -217,7 +217,7 @@ def likely_lags(a: Array, b: Array, least: int, largest: int, near: float) -> li
 
 
 def _correlation(a: Array, b: Array) -> Array:
-    """Coefficient at every lag from 1 - Q to P - 1; -inf where too little overlaps or one signal rests."""
+    """Return the correlation coefficient at lags 1 - Q to P - 1; -inf if too little overlaps or a signal rests."""
     a, b = a - a.mean(), b - b.mean()
     one_a, one_b = np.ones_like(a), np.ones_like(b)
 
@@ -239,16 +239,16 @@ def _correlation(a: Array, b: Array) -> Array:
 
 MAX_OFFSET_S = 30.0
 NUMBERS = ("offset_s", "drift", "covariance", "mismatch", "repeats_s")
-"""What is told of each clock in numbers."""
+"""Numeric fields of each clock."""
 MATCH = 1.0 / 3.0
-"""Residual over motion (rms) from which two robots do not turn alike, whatever their clocks."""
+"""Residual over motion (rms) above which two robots do not share one angular velocity at any time shift."""
 _SHORTEST_S = 4.0  # of overlapping motion
 _PIECE_S, _GROWTH = 120.0, 3.0
 _SAME_S = 0.1
-_RIVAL = 1.25  # times the mismatch of the best shift: as good
+_RIVAL = 1.25  # a shift with up to this multiple of the least mismatch is equally good
 _RATE_FLOOR, _TRANSIENTS = 1e-7, 1e-5
-"""Change of the angular velocity that cannot be told from rounding errors [rad/s^2], nor, as a share of all change,
-from what the filter's transients leave."""
+"""Smallest significant change of the angular velocity: rounding error [rad/s^2], and filter transients as a share of
+the total change."""
 
 
 @dataclass(frozen=True)
@@ -256,16 +256,16 @@ class ClockEstimate:
     """Clocks of N robots relative to robot 1, whose own values are zero.
 
     Attributes:
-        middle_s: the instant of robot 1 at which the offsets hold, after the origin of the stamps [s].
-        offset_s: stamp minus true time at ``middle_s`` [s], shape (N,); NaN where undetermined.
-        drift: seconds gained per second, shape (N,); NaN where the offset is undetermined, 0 where only the drift
-            is.
-        covariance: of (offset, drift), shape (N, 2, 2); NaN and infinite accordingly.
-        mismatch: rms difference of the angular velocities that remains, over the rms motion, shape (N,).
-        repeats_s: where the motion repeats itself: the offset is known up to multiples of this [s], the
-            smallest is given; NaN elsewhere, shape (N,).
-        reports: excitation of offset and drift of robots 2 to N; none where there was nothing to compare.
-        why_not: for every robot why its offset is undetermined, or None.
+        middle_s: instant of robot 1 at which the offsets hold, relative to the origin of the stamps [s].
+        offset_s: stamp minus true time at ``middle_s`` [s], shape (N,); NaN if undetermined.
+        drift: seconds gained per second, shape (N,); NaN if the offset is undetermined, 0 if only the drift is.
+        covariance: of (offset, drift), shape (N, 2, 2); NaN for an undetermined offset, infinite for an undetermined
+            drift.
+        mismatch: rms of the remaining angular velocity difference over rms motion, shape (N,).
+        repeats_s: for periodic motion, the smallest shift that fits equally well [s]; the offset is known up to
+            multiples of it. NaN otherwise, shape (N,).
+        reports: excitation of the offset and drift of robots 2 to N; a robot without comparable data has none.
+        why_not: reason why the offset of each robot is undetermined, or None.
     """
 
     middle_s: float
@@ -289,11 +289,11 @@ class ClockEstimate:
 
     @property
     def determined(self) -> bool:
-        """Whether all offsets are known."""
+        """Whether all offsets are determined."""
         return not any(self.why_not)
 
     def stamps(self, robot: int, time_s: ArrayLike) -> Array:
-        """What the clock of ``robot`` (from 0) shows at times of robot 1 [s], same shape."""
+        """Convert times of robot 1 [s] to stamps of ``robot`` (from 0) [s], same shape."""
         time_s = np.asarray(time_s, dtype=float)
         return time_s + self.offset_s[robot] + self.drift[robot] * (time_s - self.middle_s)
 
@@ -301,17 +301,17 @@ class ClockEstimate:
 def estimate_clocks(
     theta: Sequence[Array], start_s: ArrayLike, rate_hz: float, max_offset_s: float = MAX_OFFSET_S
 ) -> ClockEstimate:
-    """Offset and drift of every robot's clock relative to that of robot 1.
+    """Estimate the offset and drift of every robot's clock relative to that of robot 1.
 
     Args:
-        theta: gimbal angles (theta_z, theta_y, theta_x) of every robot at its own instants [rad], N arrays of
-            shape (Q_i, 3).
-        start_s: first stamp of every robot, in one common count [s], shape (N,).
-        rate_hz: sampling rate by every robot's own stamps [Hz].
+        theta: gimbal angles (theta_z, theta_y, theta_x) of each robot at its own instants [rad], N arrays of shape
+            (Q_i, 3).
+        start_s: first stamp of each robot relative to one common origin [s], shape (N,).
+        rate_hz: sampling rate on each robot's own clock [Hz].
         max_offset_s: largest magnitude of an offset [s].
 
     Returns:
-        The estimate. Where the motion cannot tell, an offset is NaN and ``why_not`` says why.
+        The estimate. If the motion does not determine an offset, it is NaN and ``why_not`` gives the reason.
     """
     starts = np.asarray(start_s, dtype=float)
     too_short = [len(x) < (2 * TRIM_S + _SHORTEST_S) * rate_hz for x in theta]
@@ -328,9 +328,9 @@ def estimate_clocks(
 
 
 def unknown_clocks(robots: int, middle_s: float, why: str) -> ClockEstimate:
-    """What is known of N clocks where nothing can be compared, for a reason ``why``.
+    """Return undetermined clocks of N robots, with the reason ``why``.
 
-    ``middle_s`` is an instant of robot 1, after the origin of the stamps [s].
+    ``middle_s`` is an instant of robot 1, relative to the origin of the stamps [s].
     """
     return _relative_to_first(middle_s, [_unknown(why)] * (robots - 1))
 
@@ -346,7 +346,7 @@ def _relative_to_first(middle_s: float, others: Sequence[_Clock]) -> ClockEstima
 
 
 def recorded_clocks(recording: Recording, max_offset_s: float = MAX_OFFSET_S) -> ClockEstimate:
-    """The same of a recording, whose robots share one column of time; see ``estimate_clocks``."""
+    """Estimate the clocks of a recording, whose robots share one time column; see ``estimate_clocks``."""
     theta = [recording.joints(i)[1] for i in range(recording.metadata.robots)]
     starts = np.full(len(theta), recording.time[0])
     return estimate_clocks(theta, starts, recording.metadata.rate_hz, max_offset_s)
@@ -390,7 +390,7 @@ def _pair(first: Rates, other: Rates, robot: int, middle_s: float, max_offset_s:
     report = _excitation(first, fit, robot)
     with_drift = report.determined
     if not with_drift:
-        # Short motion tells the offset if the drift is taken to be none; motion that any rotation imitates does not.
+        # A short motion determines the offset alone, with zero drift, unless a rotation has the same effect.
         alone = _excitation(first, fit, robot, with_drift=False)
         if not alone.determined:
             return _unknown(alone.weak[0].reason, fit.mismatch, report)
@@ -407,7 +407,7 @@ def _pair(first: Rates, other: Rates, robot: int, middle_s: float, max_offset_s:
 
 
 def _liveliest(first: Rates) -> slice:
-    """The piece of robot 1 in which its angular velocity changes most."""
+    """Return the span of robot 1 in which its angular velocity changes most."""
     length, samples = round(_PIECE_S * first.rate_hz), len(first.time)
     if samples <= length:
         return slice(0, samples)
@@ -424,13 +424,13 @@ def _grown(piece: slice, samples: int) -> slice:
 def _search(
     first: Rates, other: Rates, piece: slice, middle_s: float, max_offset_s: float
 ) -> tuple[ClockFit, float] | None:
-    """The best fit of a piece, and after what time another one is as good, else NaN."""
+    """Return the best fit of a span and the smallest other shift that fits equally well, or NaN."""
     a, b = (np.linalg.norm(q, axis=1) for q in (first.q[piece], other.q))
     apart_s, step_s = other.time[0] - first.time[piece][0], 1.0 / first.rate_hz
     least, largest = ((bound - apart_s) / step_s for bound in (-max_offset_s, max_offset_s))
     lags = likely_lags(a, b, math.ceil(least), math.floor(largest), near=-apart_s / step_s)
     fits: list[ClockFit] = []
-    # Clocks that agree are likely, whatever |omega| looks like.
+    # Also try equal clocks, which are likely a priori.
     for offset_s in [*(apart_s + lag * step_s for lag in lags), 0.0]:
         fit = fit_clock(first, other, piece, middle_s, offset_s)
         if fit is not None and all(abs(fit.offset_s - f.offset_s) > _SAME_S for f in fits):
@@ -445,7 +445,7 @@ def _search(
 
 
 def _excitation(first: Rates, fit: ClockFit, robot: int, *, with_drift: bool = True) -> StepReport:
-    """How much offset and drift change what is compared, beyond what a rotation could, against noise."""
+    """Judge how strongly offset and drift change the residual, beyond the effect of a rotation, against noise."""
     time = first.time[fit.samples]
     lever = ((time - (time[0] + time[-1]) / 2) / fit.half_s)[:, None]
     parts = [fit.change, lever * fit.change] if with_drift else [fit.change]
@@ -466,7 +466,7 @@ def _excitation(first: Rates, fit: ClockFit, robot: int, *, with_drift: bool = T
 
 
 def _covariance(first: Rates, fit: ClockFit, middle_s: float, *, with_drift: bool) -> Array:
-    """Covariance (2, 2) of offset at ``middle_s`` and drift."""
+    """Return the covariance (2, 2) of the offset at ``middle_s`` and the drift."""
     time = first.time[fit.samples]
     centre = (time[0] + time[-1]) / 2
     lever = ((time - centre) / fit.half_s)[:, None, None]

@@ -1,9 +1,9 @@
-"""Errors that the user can act on."""
+"""Errors that the user can correct."""
 
 
 class InputError(ValueError):
-    """Bad input from the user: one sentence that names the file, the field, the value and what is allowed."""
+    """Invalid user input: one sentence with the file, the field, the value and the allowed range."""
 
 
 class RepeatedRowsError(InputError):
-    """A recording in which rows repeat the one before."""
+    """A recording in which rows repeat the row before."""

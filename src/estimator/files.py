@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
+"""Write files and folders atomically: write next to the target, then rename."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _swept: set[Path] = set()
 
 
 def scratch_name(folder: Path) -> Path:
-    """A name in a folder that nothing has and that tells whose it is; scraps of dead processes there are removed."""
+    """Return an unused name in a folder that identifies this process; remove leftovers of dead processes there."""
     if folder not in _swept:
         _swept.add(folder)
         with suppress(OSError):
@@ -44,7 +44,7 @@ def scratch_name(folder: Path) -> Path:
 
 @contextmanager
 def scratch_folder(where: Path | None = None) -> Iterator[Path]:
-    """A folder that lasts as long as the block, in ``where`` or in the system's folder for temporary files."""
+    """Make a folder for the duration of the block, in ``where`` or in the system's temporary folder."""
     path = scratch_name(Path(tempfile.gettempdir()) if where is None else where)
     path.mkdir(mode=0o700)
     try:
@@ -54,7 +54,7 @@ def scratch_folder(where: Path | None = None) -> Iterator[Path]:
 
 
 def _remove(path: Path) -> None:
-    shutil.rmtree(path, ignore_errors=True)  # neither files nor links
+    shutil.rmtree(path, ignore_errors=True)  # does not remove files or links
     with suppress(OSError):
         path.unlink()
 
@@ -63,7 +63,7 @@ def _is_alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
     except OSError as error:
-        return error.errno != errno.ESRCH  # another user's
+        return error.errno != errno.ESRCH  # a process of another user is alive
     return True
 
 
@@ -71,7 +71,7 @@ EVERY_S = 0.5
 
 
 def end_with(parent: int) -> None:
-    """End this process soon after its parent has ended, however that was killed."""
+    """End this process soon after its parent has ended for any reason."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -82,29 +82,33 @@ def end_with(parent: int) -> None:
 
 
 def ends_with_this() -> Mapping[str, Any]:
-    """What makes the workers of ``joblib.Parallel`` end with this process."""
+    """Return options of ``joblib.Parallel`` that make its workers end with this process."""
     return {"initializer": end_with, "initargs": (os.getpid(),)}
 
 
 LIST, FORMAT = ".mocobot-files", "mocobot-files"
-"""The list: {format, kind: of the result, files: {path in the folder: SHA-256}}."""
+"""File name and format of the list of a folder: {format, kind: of the result, files: {path in the folder: SHA-256}}.
+"""
 
 
 def list_written(folder: Path, kind: str) -> None:
-    """Write the list of all that a new folder holds, whose result is of a kind such as ``diagnosis``."""
+    """Write the list of all files in a new folder, with the kind of its result, such as ``diagnosis``."""
     files = {str(path.relative_to(folder)): _digest(path) for path in _entries(folder)}
     write_json(folder / LIST, {"format": FORMAT, "kind": kind, "files": files})
 
 
 def add_written(path: Path) -> None:
-    """Add a file that was written into a folder later to the folder's list, if there is one."""
+    """Add a file that was written later to the folder's list, if there is one."""
     if values := _read(path.parent):
         values["files"][path.name] = _digest(path)
         write_json(path.parent / LIST, values)
 
 
 def holds(kind: str) -> Callable[[Path], bool]:
-    """What says whether a folder is a result of some kind, and raises an InputError if it holds anything else."""
+    """Return a function that tests whether a folder holds a result of some kind.
+
+    The function raises an InputError if the folder holds such a result and also other or modified files.
+    """
 
     def is_ours(folder: Path) -> bool:
         values = _read(folder)
@@ -121,7 +125,7 @@ def holds(kind: str) -> Callable[[Path], bool]:
 
 
 def leave_others(folder: Path, new: Path) -> None:
-    """Remove from a replaced folder what its list has, and move all else to the new one, under a free name."""
+    """Remove listed files from a replaced folder, and move all others to the new folder under a free name."""
     values = _read(folder)
     for path in _entries(folder):
         if _is_written(path, folder, values):
@@ -139,14 +143,14 @@ def leave_others(folder: Path, new: Path) -> None:
 
 
 def free_name(path: Path) -> Path:
-    """The path, or with ``.kept`` behind it where it is taken."""
+    """Return the path, or with ``.kept`` appended until it is free."""
     while os.path.lexists(path):
         path = path.with_name(f"{path.name}.kept")
     return path
 
 
 def _entries(folder: Path) -> list[Path]:
-    """Files, links and empty folders below a folder, but the list."""
+    """Return files, links and empty folders below a folder, except the list."""
     found = [path for path in folder.rglob("*") if path != folder / LIST]
     return sorted(p for p in found if p.is_symlink() or not p.is_dir() or not any(p.iterdir()))
 
@@ -157,7 +161,7 @@ def _is_written(path: Path, folder: Path, values: dict[str, Any]) -> bool:
 
 
 def _digest(path: Path) -> str:
-    """SHA-256 of a file; a word that is none for anything else."""
+    """Return the SHA-256 of a file, ``"folder"`` for a folder, or an empty text for anything else."""
     with suppress(OSError):
         if not path.is_symlink():
             return "folder" if path.is_dir() else file_sha256(path)
@@ -165,7 +169,7 @@ def _digest(path: Path) -> str:
 
 
 def _read(folder: Path) -> dict[str, Any]:
-    """The list; empty if there is none that can be used."""
+    """Return the list; empty if there is no valid one."""
     with suppress(InputError):
         values = read_json(folder / LIST, "a list of what was written")
         if values.get("format") == FORMAT and isinstance(values.get("files"), dict):
@@ -174,18 +178,18 @@ def _read(folder: Path) -> dict[str, Any]:
 
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
-"""What a disk says that takes no more."""
+"""Error numbers of a disk that cannot be written."""
 _State = tuple[int, int, int] | None
 _checked: dict[Path, _State] = {}
-"""What was at the place of a file when it was checked, before the work; None for nothing."""
+"""State of each target when it was checked, before the work; None for no file."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary name beside ``path`` for a file that takes its place when the block ends without an error.
+    """Yield a temporary name next to ``path`` for a file that replaces it when the block ends without an error.
 
-    Missing folders above it are made. A file that somebody else has put there since the place was checked
-    (``check_target``) is kept, with ``.kept`` behind its name.
+    Missing parent folders are created. If another program has written the target since ``check_target``, that file is
+    kept, with ``.kept`` appended to its name.
 
     Raises:
         InputError: the operating system refuses.
@@ -213,14 +217,14 @@ def _state(path: Path) -> _State:
 
 @contextmanager
 def whole_folder(path: Path, kind: str) -> Iterator[Path]:
-    """A temporary folder that takes the place of ``path`` when the block ends without an error.
+    """Yield a temporary folder that replaces ``path`` when the block ends without an error.
 
-    Missing folders above it are made. What cannot be written inside is told by its place in ``path``. The folder gets
-    a list of what is in it, with the kind of result. What the list of a replaced folder has is removed; everything else
-    is kept, and has ``.kept`` behind its name where the new folder has the same one.
+    Missing parent folders are created. Messages about files inside refer to their place in ``path``. The folder gets a
+    list of its files, with the kind of result. Files in the list of a replaced folder are removed. All others are
+    kept, with ``.kept`` appended if the new folder has a file of the same name.
 
     Raises:
-        InputError: it cannot be created or put in place.
+        InputError: the folder cannot be created or put in place.
     """
     real = Path(os.path.realpath(path))
     with _folders_above(path):
@@ -241,7 +245,7 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
             if str(temporary) not in str(error):
                 raise
             raise InputError(str(error).replace(str(temporary), str(path))) from error
-        except OSError as error:  # of libraries that write pictures
+        except OSError as error:  # raised by libraries that write pictures
             if error.errno not in FULL:
                 raise
             raise InputError(f"{path}: cannot be written ({error.strerror})") from error
@@ -254,7 +258,7 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
 
 @contextmanager
 def _folders_above(path: Path) -> Iterator[None]:
-    """A block before which the missing folders above ``path`` are made, and taken away again if it fails."""
+    """Create missing folders above ``path`` for the block, and remove them if it fails."""
     real = Path(os.path.realpath(path))
     missing = [folder for folder in real.parents if not folder.exists()]
     try:
@@ -269,13 +273,13 @@ def _folders_above(path: Path) -> Iterator[None]:
 
 
 def check_place(path: Path) -> None:
-    """Find out that nothing can be put at a path before the work is done whose result it would hold.
+    """Check that a path is writable before the work whose result it will hold.
 
-    Folders above it that are missing will be made. The nearest that is there gets a file without a name for a moment:
-    permission bits say little to the superuser, and nothing of file systems that cannot be written.
+    Missing parent folders are allowed. The nearest existing folder gets an unnamed temporary file. This also works for
+    the superuser and for read-only file systems, unlike permission bits.
 
     Raises:
-        InputError: it cannot.
+        InputError: it is not writable.
     """
     with system_errors(path):
         folder = next(above for above in Path(os.path.realpath(path)).parents if above.exists())
@@ -285,12 +289,12 @@ def check_place(path: Path) -> None:
 
 
 def check_target(path: Path, suffix: str = "") -> None:
-    """Find out that a file cannot be written before the work is done whose result it would hold.
+    """Check that a file is writable before the work whose result it will hold.
 
-    Its name must end in ``suffix``, such as ``".html"``; any name will do if that is empty.
+    Its name must end in ``suffix``, such as ``".html"``; an empty suffix allows any name.
 
     Raises:
-        InputError: the target is a folder or a device, its name ends otherwise, or nothing can be put there.
+        InputError: the target is a folder or a device, its name has another suffix, or the place is not writable.
     """
     with system_errors(path):  # a name too long for the system
         if path.is_dir():
@@ -305,7 +309,7 @@ def check_target(path: Path, suffix: str = "") -> None:
 
 
 def make_folder(path: Path) -> Path:
-    """Create a folder and those above it, and find out whether it can be written.
+    """Create a folder and its parents, and check that it is writable.
 
     Raises:
         InputError: it cannot be created or written.
@@ -317,7 +321,7 @@ def make_folder(path: Path) -> Path:
 
 
 def file_facts(path: Path) -> dict[str, Any]:
-    """Name, path as given, size and SHA-256 of a file, which is read piece by piece.
+    """Return name, path as given, size and SHA-256 of a file, which is read in pieces.
 
     Raises:
         InputError: it cannot be read.
@@ -329,7 +333,7 @@ def file_facts(path: Path) -> dict[str, Any]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text; in a ``.txt`` file, which terminals show, control characters are escaped.
+    """Write UTF-8 text; in a ``.txt`` file control characters are escaped, because terminals may show it.
 
     Raises:
         InputError: the target cannot be written.
@@ -349,10 +353,10 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
 
 @contextmanager
 def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
-    """A block in which what the operating system refuses becomes one sentence: that ``path`` cannot be ``done``.
+    """Convert errors of the operating system inside the block to one sentence: ``path`` cannot be ``done``.
 
     Raises:
-        InputError: it refuses something.
+        InputError: the operating system refuses an operation.
     """
     try:
         yield
@@ -361,12 +365,12 @@ def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
 
 
 def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *, compress: bool) -> None:
-    """Write plain values and arrays to one NPZ file, without pickles: ``facts`` is the bytes of a JSON text.
+    """Write plain values and arrays to one NPZ file without pickles; ``facts`` is stored as the bytes of a JSON text.
 
     Raises:
         OSError: it cannot be written.
     """
-    import numpy as np  # of no use to those who write texts only
+    import numpy as np  # not needed for writing text only
 
     told = np.frombuffer(json.dumps(facts).encode(), dtype=np.uint8)
     with path.open("wb") as file:
@@ -374,10 +378,10 @@ def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *,
 
 
 def read_archive(path: Path, what: str) -> tuple[Any, dict[str, NDArray[Any]]]:
-    """Read what ``write_archive`` wrote; messages call it ``what``.
+    """Read a file of ``write_archive``; ``what`` is its description in messages.
 
     Raises:
-        InputError: there is no such file, it is not whole, or unpacks to too much.
+        InputError: the file is missing or damaged, or unpacks to too much.
     """
     import numpy as np
 
@@ -397,15 +401,15 @@ def read_archive(path: Path, what: str) -> tuple[Any, dict[str, NDArray[Any]]]:
         raise
     except FileNotFoundError as error:
         raise InputError(f"{path}: there is no such file; it would be {what}") from error
-    except Exception as error:  # on damaged bytes numpy and zipfile raise many types
+    except Exception as error:  # numpy and zipfile raise many types for damaged bytes
         raise InputError(f"{path}: not {what}, or damaged ({words(error)})") from error
 
 
 def refuse_other_packing(archive: zipfile.ZipFile, where: str) -> None:
-    """Refuse entries packed as numpy never does: Python unpacks these without a limit.
+    """Refuse compression methods that numpy does not use: Python unpacks them without a limit.
 
     Raises:
-        InputError: there is one.
+        InputError: an entry uses one.
     """
     for entry in archive.infolist():
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
@@ -413,5 +417,5 @@ def refuse_other_packing(archive: zipfile.ZipFile, where: str) -> None:
 
 
 def words(error: Exception) -> str:
-    """What a library says of a damaged file, in one line."""
+    """Return a library's error message about a damaged file in one line."""
     return " ".join(str(error).split())[:120] or type(error).__name__

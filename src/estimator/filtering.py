@@ -10,15 +10,15 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 
 BUTTERWORTH_ORDER = 3
-MIN_SAMPLES = 16  # what the filter's padding and the widest difference need
+MIN_SAMPLES = 16  # for the filter's padding and the widest difference
 _HALF_WIDTH = 3
 
 
 def low_pass(x: ArrayLike, rate_hz: float, cutoff_hz: float) -> Array:
-    """Third-order Butterworth filter run forward and backward along axis 0 (paper, section IV.B).
+    """Apply a third-order Butterworth filter forward and backward along axis 0 (paper, section IV.B).
 
-    Zero phase; the two passes square the magnitude to 1 / (1 + (f / cutoff)^6) in the analogue prototype,
-    so it is 1/2, not 1/sqrt(2), at the cut-off.
+    The phase is zero. The two passes square the magnitude to 1 / (1 + (f / cutoff)^6) in the analogue prototype, so it
+    is 1/2, not 1/sqrt(2), at the cut-off.
 
     Args:
         x: samples, shape (Q, ...).
@@ -32,27 +32,27 @@ def low_pass(x: ArrayLike, rate_hz: float, cutoff_hz: float) -> Array:
     if not 0.0 < cutoff_hz < rate_hz / 2.0:
         raise InputError(f"cutoff_hz is {cutoff_hz!r}; it must lie between 0 and {rate_hz / 2.0:g} Hz")
     sections = _sections(float(rate_hz), float(cutoff_hz))
-    # The slowest transient dies as exp(-pi cutoff t): six periods of padding leave 1e-8 of it.
+    # The slowest transient decays as exp(-pi cutoff t): six periods of padding leave 1e-8 of it.
     padding = min(len(x) - 1, math.ceil(6.0 * rate_hz / cutoff_hz))
-    from scipy.signal import sosfiltfilt  # takes 0.4 s to load, and checks and simulations filter nothing
+    from scipy.signal import sosfiltfilt  # slow import (0.4 s); checks and simulations do not need it
 
     return sosfiltfilt(sections, x, axis=0, padlen=padding)
 
 
 @cache
 def _sections(rate_hz: float, cutoff_hz: float) -> Array:
-    """The filter's second-order sections; there are few, and a diagnosis filters a thousand times."""
+    """Return the filter's second-order sections; cached because a diagnosis uses few filters very often."""
     from scipy.signal import butter
 
     return np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"), dtype=np.float64)
 
 
 def differentiate(x: ArrayLike, rate_hz: float) -> Array:
-    """Time derivative along axis 0 by a sixth-order central difference, same shape, unit of x per second.
+    """Differentiate along axis 0 by a sixth-order central difference, same shape, unit of x per second.
 
-    At frequency f its gain is i w (1 - (w/rate)^6 / 140 + ...), w = 2 pi f: 7e-6 low at 5 Hz and 100 Hz
-    sampling, where the usual two-point difference is 1.6 % low. The three samples at each end come from
-    one-sided differences on the same seven samples, also of sixth order but with larger error constants.
+    At frequency f its gain is i w (1 - (w/rate)^6 / 140 + ...), w = 2 pi f. At 5 Hz and 100 Hz sampling it is 7e-6
+    low; the usual two-point difference is 1.6 % low. The three samples at each end use one-sided differences on the
+    same seven samples, also of sixth order but with larger error constants.
 
     Args:
         x: samples, shape (Q, ...).
@@ -61,8 +61,8 @@ def differentiate(x: ArrayLike, rate_hz: float) -> Array:
     Raises:
         InputError: fewer than 16 samples.
     """
-    # The same as scipy's savgol_filter(x, 7, 6, deriv=1), whose weights are off by 4e-15: enough to change the tiny
-    # errors of noise-free recordings by 5e-7 of themselves.
+    # Equals scipy's savgol_filter(x, 7, 6, deriv=1) without the 4e-15 error of its weights, which changes the small
+    # errors of noise-free recordings by a relative 5e-7.
     x = _samples(x)
     n, width = len(x), 2 * _HALF_WIDTH + 1
     y = np.empty_like(x)
@@ -77,10 +77,10 @@ def differentiate(x: ArrayLike, rate_hz: float) -> Array:
 
 
 def trim_slice(samples: int, rate_hz: float, trim_s: float) -> slice:
-    """Indices left after dropping ``trim_s`` seconds at each end (paper, section IV.B: two seconds).
+    """Return the indices that remain after dropping ``trim_s`` seconds at each end (paper, section IV.B: two seconds).
 
     Raises:
-        InputError: trim_s is negative or not finite, or nothing would be left.
+        InputError: trim_s is negative or not finite, or no sample remains.
     """
     if not (np.isfinite(trim_s) and trim_s >= 0.0):
         raise InputError(f"trim_s is {trim_s!r}; it must be a finite number of seconds, at least 0")
@@ -102,7 +102,7 @@ def _samples(x: ArrayLike) -> Array:
 
 @cache
 def _difference_weights(at: int) -> Array:
-    """Weights of the first derivative at node ``at`` of the nodes 0..6, exact for polynomials of degree 6."""
+    """Return weights of the first derivative at node ``at`` of the nodes 0..6, exact for polynomials of degree 6."""
     nodes = np.arange(2 * _HALF_WIDTH + 1) - at
     powers = np.vander(nodes, increasing=True).T.astype(float)
     return np.linalg.solve(powers, np.eye(len(nodes))[1])

@@ -1,7 +1,6 @@
-"""Files that users name, and texts in them: no pipes or devices, nothing boundless, nothing that a terminal obeys.
+"""Open input files safely, and limit their size: no pipes or devices, no control characters, no unbounded unpacking.
 
-Whatever its container, a file unpacks to so much and no more: what is beyond is refused before memory or disk is
-taken for it.
+The limit on the unpacked size applies to every container, before memory or disk is allocated.
 """
 
 import errno
@@ -18,20 +17,23 @@ from typing import Any
 from estimator.errors import InputError
 
 DEEPEST = 64
-"""Most levels of a file's values, and parts of a key in TOML: beyond, parsers take minutes or fail."""
+"""Largest nesting depth of a file's values, and number of parts of a TOML key; parsers take minutes or fail beyond it.
+"""
 MOST_BITS = 4096
-"""Longest whole number: Python does not print much larger ones."""
+"""Largest size of an integer; Python does not print much larger ones."""
 TOML_BYTES, JSON_BYTES = 1 << 20, 64 << 20
 _DOTTED = re.compile(rf"""(?:(?:(?<![\w-])[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 
 def open_input(path: Path) -> BufferedReader:
-    """Open a file to read.
+    """Open a file for reading.
 
     Raises:
-        OSError: it cannot be, or is no regular file: a pipe may never end.
+        OSError: it cannot be opened, or is not a regular file (a pipe may never end).
     """
-    number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # without, a pipe waits for its writer
+    number = os.open(
+        path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)
+    )  # otherwise opening a pipe waits for its writer
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)
         raise OSError(errno.EINVAL, "not a regular file")
@@ -39,10 +41,10 @@ def open_input(path: Path) -> BufferedReader:
 
 
 def read_input(path: Path, most_bytes: int) -> bytes:
-    """All of a file.
+    """Read a whole file.
 
     Raises:
-        OSError: see ``open_input``, or it is larger.
+        OSError: see ``open_input``, or it is larger than ``most_bytes``.
     """
     with open_input(path) as file:
         content = file.read(most_bytes + 1)
@@ -52,7 +54,7 @@ def read_input(path: Path, most_bytes: int) -> bytes:
 
 
 def file_sha256(path: Path) -> str:
-    """SHA-256 of a file, which is read piece by piece.
+    """Return the SHA-256 of a file, read in pieces.
 
     Raises:
         OSError: see ``open_input``.
@@ -62,11 +64,11 @@ def file_sha256(path: Path) -> str:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Tables of TOML.
+    """Parse TOML text.
 
     Raises:
         ValueError: it is not TOML, or see ``plain``.
-        RecursionError: it has too many levels.
+        RecursionError: it is nested too deeply.
     """
     if _DOTTED.search(text):
         raise ValueError(f"a key has more than {DEEPEST} parts")
@@ -74,10 +76,10 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def plain(values: Any) -> Any:
-    """Values as they are, if they can be shown and searched.
+    """Return the values unchanged if they are safe to print and search.
 
     Raises:
-        ValueError: they have more than ``DEEPEST`` levels, or a whole number of more than ``MOST_BITS`` bits.
+        ValueError: they have more than ``DEEPEST`` levels, or an integer of more than ``MOST_BITS`` bits.
     """
     level = [values]
     for _ in range(DEEPEST):
@@ -94,33 +96,34 @@ def plain(values: Any) -> Any:
 
 
 def printable(text: str, keep: str = "\n\t") -> str:
-    """Text as a terminal may show it: control characters are escaped, but for a few."""
+    """Escape control characters, except those in ``keep``, so that a terminal may show the text."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in keep else _escaped(c) for c in text)
 
 
 def _escaped(character: str) -> str:
-    """As Python has it, and beyond ASCII TOML and JSON, too: drafts of maps are printed."""
+    """Escape as in Python; beyond ASCII also valid in TOML and JSON, because drafts of maps are printed."""
     escaped = ascii(character)[1:-1]
     return escaped if character < "\x80" else escaped.replace("\\x", "\\u00")
 
 
 MOST_BYTES = 4 << 30
-"""No file unpacks to more unless it is larger itself."""
+"""Largest unpacked size of a file, unless the file itself is larger."""
 FREE_BYTES = 256 << 20
-"""Any file may unpack to so much: it does no harm."""
+"""Unpacked size that is allowed for any file."""
 LARGEST_RATIO = 100
-"""Between these, of unpacked to packed bytes. Measured samples are noisy and rarely reach 10, even in counts."""
+"""Largest ratio of unpacked to packed bytes between these limits. Measured samples are noisy and rarely reach 10, even
+in counts."""
 GIB = 1 << 30
 
 _CHOSEN: ContextVar[float | None] = ContextVar("max_unpacked_gib", default=None)
 
 
 def set_max_unpacked(gib: float | None) -> None:
-    """Choose how much any file may unpack to [GiB]; a file's own size is always allowed.
+    """Set the largest unpacked size of any file [GiB]; a file's own size is always allowed.
 
-    None stands for 100 times the file's size, at least 0.25 and at most 4 GiB.
+    None means 100 times the file's size, at least 0.25 and at most 4 GiB.
 
     Raises:
         InputError: it is out of range.
@@ -131,19 +134,19 @@ def set_max_unpacked(gib: float | None) -> None:
 
 
 class Unpacked:
-    """Counts what one input unpacks to: ``size`` so far [bytes]."""
+    """Counter of the unpacked size of one input: ``size`` so far [bytes]."""
 
     def __init__(self, where: str, stored_bytes: int) -> None:
-        """Take the name of the input for messages, and its size [bytes]."""
+        """Take the name of the input for messages, and its packed size [bytes]."""
         self.size, self._where, chosen = 0, where, _CHOSEN.get()
         usual = min(MOST_BYTES, max(FREE_BYTES, LARGEST_RATIO * stored_bytes))
         self._limit = max(stored_bytes, usual if chosen is None else chosen * GIB)
 
     def add(self, size: int) -> None:
-        """Count more [bytes], before or while it is unpacked.
+        """Add a size [bytes], before or during unpacking.
 
         Raises:
-            InputError: it is too much in all.
+            InputError: the total exceeds the limit.
         """
         self.size += size
         if self.size > self._limit:

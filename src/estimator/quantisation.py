@@ -1,4 +1,4 @@
-"""What samples tell of their sensor: rounding steps, rows that a logger repeated, encoders that hold their value."""
+"""Detect rounding steps, rows that a logger repeated, and encoders that hold their value."""
 
 from __future__ import annotations
 
@@ -14,37 +14,39 @@ from estimator.filtering import differentiate, low_pass
 from estimator.recording.model import Recording
 
 BLOCK = 1024
-"""Rows that are judged together."""
-_LIVE = 0.5  # of the readings differ in an effort from the one before, or the efforts have no noise
-_SIGMAS = 8.0  # by which runs of equal rows are more than chance makes of them
+"""Number of rows that are judged together."""
+# Least share of readings whose effort differs from the one before; below it, efforts count as noise-free.
+_LIVE = 0.5
+_SIGMAS = 8.0  # excess of runs of equal rows over chance, in standard deviations
 _ORDER, _NOISE = 6, 1e-6
-"""Differences, and their share of the range beyond which they are noise: motion leaves less."""
-_EQUAL, _OF = 2, 8  # readings that are taken to be equal by chance, before any is seen
+"""Order of the differences, and their size, relative to the range, above which they are noise: motion leaves less."""
+_EQUAL, _OF = 2, 8  # prior pseudo-counts: 2 of 8 readings equal by chance
 
 
 class Repeats:
-    """Tells readings that a logger wrote again from readings that happen to be equal.
+    """Distinguish readings that a logger wrote again from readings that are equal by chance.
 
-    The noise of a measured effort tells: by chance, readings two apart are equal as often as neighbours are. Runs of
-    equal rows beyond that are one reading each. Efforts without noise tell nothing: a robot at rest repeats itself.
+    The noise of a measured effort distinguishes them: by chance, readings two apart are equal as often as neighbours
+    are. A run of equal rows beyond that chance is one reading. Efforts without noise give no evidence, because a robot
+    at rest repeats its readings.
     """
 
     def __init__(self, efforts: Sequence[int]) -> None:
-        """Take the channels that hold measured torques, forces or currents; without any, no row is a repeated one."""
+        """Take the columns that hold measured torques, forces or currents; without any, no row counts as repeated."""
         self._efforts = list(efforts)
         self._last: Array | None = None
         self._readings = self._live = self._differences = 0
         self._noisy = np.zeros(len(self._efforts))
 
     def of(self, values: Array) -> NDArray[np.bool_]:
-        """Which of the next rows (q, C) repeat the row before; q a multiple of ``BLOCK``, but for the last rows."""
+        """Return which of the next rows (q, C) repeat the row before; q is a multiple of ``BLOCK`` but at the end."""
         self._look(values)
         blocks = [self._block(values[k : k + BLOCK]) for k in range(0, len(values), BLOCK)]
         return np.concatenate(blocks) if blocks else np.zeros(0, dtype=bool)
 
     def _look(self, values: Array) -> None:
-        """Count high differences of the efforts that are noise; smooth efforts tell nothing of equal rows."""
-        with np.errstate(over="ignore", invalid="ignore"):  # of values beyond floats, which others refuse
+        """Count the high-order differences of the efforts that are noise."""
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow; other checks refuse such values
             changes = np.any(np.diff(values, axis=0) != 0, axis=1)
             kept = np.append(True, changes)[: len(values)]
             efforts = values[kept][:, self._efforts]
@@ -58,7 +60,7 @@ class Repeats:
         above = np.concatenate([values[:1] if self._last is None else self._last[None], values[:-1]])
         same = np.all(values == above, axis=1)
         same[0] &= self._last is not None
-        self._last = values[-1].copy()  # what it is cut from may be large
+        self._last = values[-1].copy()  # do not keep the large array alive
         readings = values[~same]
         self._readings += len(readings)
         self._live += int(np.any((values != above)[:, self._efforts], axis=1).sum())
@@ -67,7 +69,9 @@ class Repeats:
         if not self._efforts or smooth or self._live + 1 < _LIVE * self._readings:
             return repeats
         again = np.all(readings[2:] == readings[:-2], axis=1).sum()
-        likeliest = np.sqrt((again + _EQUAL) / (len(readings) + _OF))  # no reading comes more often
+        likeliest = np.sqrt(
+            (again + _EQUAL) / (len(readings) + _OF)
+        )  # bound on the frequency of the commonest reading
         edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int))).reshape(-1, 2)
         lengths = edges[:, 1] - edges[:, 0]
         for least in np.unique(lengths):
@@ -79,20 +83,20 @@ class Repeats:
         return repeats
 
 
-_LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
-_OFF = 0.05  # of a step
-# Share of the largest value by which one may come out as two: in rounding, in a log of ten digits.
+_LARGEST_RATIO = 1000.0  # of a difference to the step: larger ones are too inaccurate
+_OFF = 0.05  # largest distance from a whole number of steps, in steps
+# Two values closer than this share of the largest one are equal: floating-point rounding, a log of ten digits.
 _ONE_VALUE = (1e-12, 1e-9)
 
 
 def quantisation_step(values: Array, levels: int = 8) -> float | None:
-    """The step that all values are multiples of, up to a common offset; None where there is none.
+    """Return the step of which all values are multiples, up to a common offset; None if there is none.
 
-    Differences of neighbouring values are whole steps, however the values are scaled and shifted.
+    Differences of neighbouring values are whole steps, whatever the scale and offset of the values.
 
     Args:
-        values: samples, finite, shape (q,).
-        levels: fewest different values that tell a step; 2 where a channel at rest may show no more.
+        values: finite samples, shape (q,).
+        levels: fewest distinct values that determine a step; use 2 for a channel that may rest.
     """
     found = np.unique(values)
     if len(found) < levels:
@@ -106,7 +110,7 @@ def quantisation_step(values: Array, levels: int = 8) -> float | None:
 
 
 def _step_of(gaps: Array, levels: int) -> float | None:
-    """The same from the gaps between neighbouring values that differ."""
+    """Return the step from the non-zero gaps between neighbouring values."""
     if len(gaps) < max(1, levels - 1):
         return None
     step = float(gaps.min())
@@ -120,32 +124,35 @@ def _step_of(gaps: Array, levels: int) -> float | None:
 
 
 def rounding_step(values: Array) -> float:
-    """Step by which a sensor's errors repeat, or 0: where values hardly repeat, rounding is as good as noise."""
+    """Return the rounding step of a sensor, or 0 if values rarely repeat: rounding then acts as white noise."""
     return 0.0 if len(np.unique(values)) > 0.9 * len(values) else quantisation_step(values, levels=2) or 0.0
 
 
 LEAST = 3
-"""Equal readings at least. Derived: two of three steps are needed to tell a jump from a speed."""
+"""Fewest equal readings of a held span. Derived: distinguishing a jump from a constant speed needs two of three steps.
+"""
 PERIODS = 2
-"""In which a held value is left. Derived: what is taken between two readings is left in two."""
+"""Number of periods over which a held value may change. Derived: a reading taken between two encoder values spreads
+the change over two periods."""
 MOST = 0.5
-"""Share of an angle's readings that repeat others, beyond which its encoder is no worse than slow. Chosen."""
+"""Share of an angle's readings that repeat others; above it, the encoder counts as slow rather than holding. Chosen.
+"""
 DIES_CYCLES = 4.0
-"""Periods of its cut-off after which the low-pass filter's response is below 1e-4 of its peak. Derived."""
+"""Number of cut-off periods after which the response of the low-pass filter is below 1e-4 of its peak. Derived."""
 TYPICAL = 0.8
-"""Share of readings that are neither held nor next to such, of those that move. Chosen."""
+"""Share of the moving readings that are neither held nor next to held ones. Chosen."""
 TYPICAL_SIGMAS = 1.2816
-"""Standard deviations that such a share of normal numbers stays within. Derived."""
+"""Standard deviations that contain this share of a normal distribution. Derived."""
 FINEST = 2e-6
-"""Step [rad or m] of a reading that is not rounded. Chosen: no encoder has more than 21 bits a turn."""
+"""Step [rad or m] assumed for a reading that is not rounded. Chosen: no encoder has more than 21 bits per turn."""
 
 
 class Held(NamedTuple):
-    """Readings of a column that were held.
+    """Held readings of one column.
 
     Attributes:
-        spans: readings that are none, first and last but one more.
-        nats: by how much a value that is held is likelier than readings of a moving joint that happen to be equal.
+        spans: pairs (first, last + 1) of held readings.
+        nats: log-odds [nat] of a held value against equal readings of a moving joint by chance.
     """
 
     column: int
@@ -154,13 +161,14 @@ class Held(NamedTuple):
 
 
 def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
-    """Spans of readings that repeat one before them while the angle moved on, first and last but one more.
+    """Find spans (first, last + 1) of readings that repeat the one before although the angle moved on.
 
-    An angle that stays within one step for m periods and has one acceleration all the time has a speed of 4 / m steps
-    per period at most, so that it changes by (1 + 2 p / m)^2 steps in p periods before or after. A value that is held
-    is entered at speed, by more than that, and left by all that the angle moved meanwhile: by more than that, and by as
-    much more than in the period after. In an encoder that does so once, any value is held that is entered or left by
-    more than that beyond what the change before or after makes of the acceleration.
+    An angle that stays within one step for m periods at constant acceleration has a speed of at most 4 / m steps per
+    period. It therefore changes by at most (1 + 2 p / m)^2 steps in p periods before or after the span. Before a held
+    value, the joint moves faster than this limit. After it, the reading jumps by the whole motion during the span.
+    That jump exceeds the limit, and exceeds the change in the next period by more than the limit. If an encoder shows
+    this at least once, it holds values. Then every span is held whose change before or after exceeds the limit plus
+    the effect of the neighbouring acceleration.
 
     Args:
         x: readings, shape (Q,).
@@ -172,7 +180,7 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
     first, stop = first[there], stop[there]
 
     def changes(p: int) -> tuple[Array, Array, Array, Array, Array]:
-        """The most that a joint at rest changes in p periods, and what it does before the span and after it."""
+        """Return the largest change of a resting joint in p periods, and changes before and after the span."""
         most = step * (0.5 + (1.0 + 2.0 * p / (stop - first - 1.0)) ** 2)  # readings change by whole steps
         before, back, end = np.maximum(first - p, 0), np.maximum(first - 2 * p, 0), stop - 1
         each = ((first, before), (before, back), (end + p, end), (end + 2 * p, end + p))
@@ -181,35 +189,35 @@ def held_spans(x: Array, step: float) -> list[tuple[int, int]]:
 
     stops, leaves = np.zeros((2, len(first)), dtype=bool)
     for most, into, earlier, out, after in map(changes, range(1, PERIODS + 1)):
-        # Twice a change less another: two more roundings.
+        # Extrapolating a change from two differences adds two roundings.
         enters = (2.0 * into - earlier > most + 2.0 * step) & (earlier > most)
         stops, leaves = stops | enters, leaves | (2.0 * out - after > most + 2.0 * step)
     most, into, _, out, after = changes(1)
     if not np.any((into > most) & (out > most + after)):
         return []
-    # Where it stood before, too: from rest with one acceleration, it takes twice as long as at the speed at the end,
-    # which is seen some periods later only.
+    # If the joint also rested before: starting from rest at constant acceleration takes twice as long as at the final
+    # speed. That speed shows only some periods later.
     stood = np.abs(x[first] - x[np.maximum(2 * first - stop, 0)]) < 2.5 * step
     moved = np.abs(x[stop - 1 + PERIODS] - x[stop - 1])
     speed = np.abs(x[stop - 1 + 3 * PERIODS] - x[stop - 1 + PERIODS]) / (2.0 * PERIODS)
     late = stop - 2 * PERIODS - np.ceil(2.0 * moved / np.maximum(speed, step / (2.0 * PERIODS))).astype(int)
     first, held = np.where(stood & ~stops, np.maximum(first, late), first), stops | leaves
-    # One more at either end: what is taken between two readings has a share of both.
+    # A span includes the first reading of the run and the one after it: a sample between two readings mixes both.
     return [(int(a), int(b) + 1) for a, b in zip(first[held], stop[held], strict=True)]
 
 
 def scatter(x: Array) -> float:
-    """Rounding step that would make the noise of moving readings, shape (Q,), from their fourth differences."""
+    """Return the rounding step whose noise matches that of moving readings, shape (Q,), from fourth differences."""
     apart = np.abs(np.diff(x, 4))
     sigma = np.quantile(apart[apart > 0.0], TYPICAL) / TYPICAL_SIGMAS if apart.any() else 0.0
     return float(sigma * np.sqrt(12.0 / 70.0))
 
 
 def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held, ...], Array]:
-    """Readings with held ones interpolated, which these are, and how wrong the interpolation may be.
+    """Return readings with held ones interpolated, the held readings, and the doubt of the interpolation.
 
-    The last is the difference between two orders of interpolation over the standard deviation of the reading's
-    rounding, the largest of the columns at each instant, shape (Q,).
+    The doubt is the difference between cubic and quintic interpolation over the standard deviation of the rounding
+    error. It is the largest of all columns at each instant, shape (Q,).
 
     Args:
         x: readings of C joints, shape (Q, C).
@@ -225,7 +233,7 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
         there = np.zeros(len(own), dtype=bool)
         for start, stop in spans:
             there[start:stop] = True
-        # Against readings that may have had any value on the joint's way.
+        # Alternative hypothesis: the reading takes any value along the joint's path.
         nats = sum((b - a) * np.log1p(abs(own[b] - own[a]) / step) for a, b in spans)
         found.append(Held(column, tuple(spans), float(nats)))
         cubic, quintic = (_interpolated(own, there, order) for order in (3, 5))
@@ -236,7 +244,7 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
 
 
 def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Array]:
-    """The same of a recording, whose columns are its driven angles, then those of its gimbals (``angle_of``)."""
+    """Apply ``filled`` to a recording; columns are all driven angles, then all gimbal angles (see ``angle_of``)."""
     angles = np.stack([recording.phi, recording.theta], axis=1)
     x = angles.reshape(len(angles), -1)
     x, held, doubt = filled(x, [rounding_step(own) for own in x.T])
@@ -245,13 +253,13 @@ def without_held(recording: Recording) -> tuple[Recording, tuple[Held, ...], Arr
 
 
 def angle_of(column: int, robots: int) -> tuple[int, int, int]:
-    """Whether it is a gimbal's, and its robot and joint, all from 0, of a column of a recording of N robots."""
+    """Return (1 for a gimbal or 0, robot, joint) of a column, all from 0, for a recording of N robots."""
     kind, robot, joint = np.unravel_index(column, (2, robots, 3))
     return int(kind), int(robot), int(joint)
 
 
 def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_]:
-    """Samples of filtered angles, rates and accelerations that held readings may change by more than noise, shape (Q,).
+    """Return a mask (Q,) of filtered samples (angles, rates, accelerations) that held readings change beyond noise.
 
     ``doubt`` is that of ``filled``; the filter is ``filtering.low_pass``.
     """
@@ -270,7 +278,7 @@ def doubtful(doubt: Array, rate_hz: float, cutoff_hz: float) -> NDArray[np.bool_
 
 def _interpolated(x: Array, missing: NDArray[np.bool_], order: int) -> Array:
     from scipy.interpolate import (
-        make_interp_spline,  # takes a while to load, and few encoders hold their values
+        make_interp_spline,  # slow import, rarely needed
     )
 
     at, out = np.arange(len(x), dtype=float), x.copy()

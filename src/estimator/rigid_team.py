@@ -1,11 +1,11 @@
-"""The stacked residual of one trial: rigid grasps between robots, and Newton-Euler of the payload.
+"""Residuals of one trial: closure of rigid grasps between robots, and Newton-Euler balance of the payload.
 
-Per instant 6 N numbers. For every robot i >= 2, with the poses of the bases constant,
+There are 6 N residuals per instant. Each robot i >= 2, whose base has a constant pose, contributes
 
     e_rot = log(R_b1bi R_bi R_1i^T R_b1^T),   e_pos = p_b1bi + R_b1bi h_i - h_1 - R_b1 p_1i    (axes of {b1})
 
-and once (f, M) - Y pi: the sum of the robots' wrenches at the origin of {1} against the payload's ten inertial
-parameters. All are zero, at every instant, for a rigid payload in ideal robots.
+The balance (f, M) - Y pi compares the sum of the robots' wrenches at the origin of {1} with the payload's ten inertial
+parameters. For a rigid payload and ideal robots all residuals are zero at every instant.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from estimator.so3 import cross
 
 
 def momentum_regressor(w: Array) -> Array:
-    """L(w) with L(w) I_reg = I w and I_reg as in (20), shapes (..., 3) -> (..., 3, 6); (21) is L(alpha)."""
+    """Return L(w) with L(w) I_reg = I w and I_reg as in (20), shapes (..., 3) -> (..., 3, 6); (21) is L(alpha)."""
     w = np.asarray(w, dtype=float)
     x, y, z = w[..., 0], w[..., 1], w[..., 2]
     L = np.zeros((*w.shape, 6))
@@ -39,18 +39,18 @@ def momentum_regressor(w: Array) -> Array:
 
 
 def inertia_regressor(omega: Array, alpha: Array) -> Array:
-    """A + B of (21)-(24): (A + B) I_reg = I alpha + omega x I omega, shapes (..., 3) -> (..., 3, 6).
+    """Return A + B of (21)-(24): (A + B) I_reg = I alpha + omega x I omega, shapes (..., 3) -> (..., 3, 6).
 
-    B = [omega] L(omega). The paper prints B as six rows of three: its rows 1-3 are columns 1-3 and its rows
-    4-6 are columns 4-6 of the 3 x 6 matrix meant.
+    B = [omega] L(omega). The paper prints B as six rows of three: its rows 1-3 are columns 1-3 and its rows 4-6 are
+    columns 4-6 of the intended 3 x 6 matrix.
     """
     return momentum_regressor(alpha) + so3.skew(omega) @ momentum_regressor(omega)
 
 
 def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, moment: Array) -> Array:
-    """Changes of sum_q (A + B)^T m, with A + B as of ``inertia_regressor``, by changes of the motion, (K, 6).
+    """Return changes of sum_q (A + B)^T m (see ``inertia_regressor``) due to changes of the motion, shape (K, 6).
 
-    ``omega`` and ``moment``, m, have shape (Q, 3); the changes of omega and of alpha have shape (K, Q, 3).
+    ``omega`` and ``moment`` (m) have shape (Q, 3); the changes of omega and alpha have shape (K, Q, 3).
     """
     # L(w)^T m is linear in w m^T, and [omega]^T m = m x omega.
     outer = np.swapaxes(d_alpha, 1, 2) @ moment + np.swapaxes(d_omega, 1, 2) @ so3.cross(moment, omega)
@@ -61,9 +61,10 @@ def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, mome
 
 
 def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) -> Array:
-    """Regressor of (f, M) at the origin of {1} by (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz), shape (Q, 6, 10).
+    """Return the regressor of (f, M) at the origin of {1}, shape (Q, 6, 10).
 
-    From angular velocity and acceleration and the specific force G = a + g up [m/s^2] in {1}, shape (Q, 3) each.
+    The columns are (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz). The arguments are the angular velocity, the angular
+    acceleration, and the specific force G = a + g up [m/s^2], all in {1}, shape (Q, 3) each.
     """
     W = so3.skew(omega)
     Y = np.zeros((len(omega), 6, 10))
@@ -75,7 +76,7 @@ def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) ->
 
 
 class BodyMotion(NamedTuple):
-    """Motion of the payload and the load on it, in {1}; shape (Q, 3) each.
+    """Motion of the payload and the total wrench on it, in {1}; shape (Q, 3) each.
 
     Attributes:
         omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2].
@@ -114,10 +115,10 @@ def fuse(data: GraspData, grasps: GraspEstimate) -> BodyMotion:
 
 
 class FusionChanges(NamedTuple):
-    """Derivatives of a motion by the K = 6(N-1) errors of the grasps (``GraspEstimate.covariance``).
+    """Derivatives of a motion with respect to the K = 6(N-1) grasp errors (``GraspEstimate.covariance``).
 
-    Of the payload's twist in {1} and its component-wise derivative, shape (K, Q, 6), and of ``up``, ``force`` and
-    ``moment`` as in ``BodyMotion``, shape (K, Q, 3).
+    ``twist`` (in {1}) and its component-wise derivative ``twist_dot`` have shape (K, Q, 6). ``up``, ``force`` and
+    ``moment`` are those of ``BodyMotion``, shape (K, Q, 3).
     """
 
     twist: Array
@@ -135,9 +136,10 @@ def fusion_changes(
     grasps: GraspEstimate,
     ratio: float | None = None,
 ) -> FusionChanges:
-    """Derivatives of ``fuse`` at twists, orientations and wrenches as of ``GraspData``.
+    """Differentiate ``fuse`` at given twists, orientations and wrenches (as in ``GraspData``).
 
-    ``ratio`` is a fixed weight as of ``fusion_with``; None takes that of ``fusion_matrix``, which changes with grasps.
+    ``ratio`` is a fixed weight as in ``fusion_with``; None uses that of ``fusion_matrix``, which depends on the
+    grasps.
     """
     Q, N = twist.shape[:2]
     K = 6 * (N - 1)
@@ -145,11 +147,11 @@ def fusion_changes(
     if ratio is None:
         ratio, by_ratio = _ratio(grasps)
     dG = _fusion_matrix_changes(grasps, ratio, by_ratio).reshape(6 * K, 6 * N)
-    summing = _adjoint_inverse_changes(grasps)  # robot i sums to {1} what is its own, so the others stay
+    summing = _adjoint_inverse_changes(grasps)  # the errors of robot i change its own wrench only
     of_robot = np.repeat(np.arange(1, N), 6)
     summed = np.moveaxis(summing, -1, -2) @ np.moveaxis(wrench, 0, -1)[of_robot]
 
-    def changed(stacked: Array) -> Array:  # components apart in memory
+    def changed(stacked: Array) -> Array:  # each component contiguous in memory
         return np.moveaxis((dG @ stacked.reshape(Q, -1).T).reshape(K, 6, Q), 1, 2)
 
     ups = robot_up(R_bi, grasps)
@@ -167,17 +169,17 @@ def fusion_changes(
 
 
 def fusion_matrix(grasps: GraspEstimate) -> Array:
-    """G with V_1 = G [V_1; ...; V_N], shape (6, 6N)."""
+    """Return G with V_1 = G [V_1; ...; V_N], shape (6, 6N)."""
     return np.eye(6) if grasps.robots == 1 else fusion_with(grasps, _ratio(grasps)[0])
 
 
 def _ratio(grasps: GraspEstimate) -> tuple[float, Array]:
-    """Weight of linear residuals [rad/m] beside angular ones, and its derivative by the grasps' errors, (6(N-1),)."""
+    """Return the weight of linear relative to angular residuals [rad/m], and its derivative by grasp errors."""
     N, off = grasps.robots, ~np.eye(grasps.robots, dtype=bool)
     if N == 1:
         return 1.0, np.zeros(0)
     angular = float(np.mean(grasps.angular_residual_rms[off] ** 2)) / 2
-    # The linear residual also holds the angular noise of the mean times the distance; take that part out.
+    # The linear residual contains the angular noise of the mean times the distance; subtract that part.
     apart = grasps.p_1i[:, None] - grasps.p_1i[None]
     pair = float(np.mean(grasps.linear_residual_rms[off] ** 2))
     share = angular / N * 2 / 3
@@ -193,17 +195,17 @@ def _ratio(grasps: GraspEstimate) -> tuple[float, Array]:
 
 
 def fusion_with(grasps: GraspEstimate, ratio: float) -> Array:
-    """``fusion_matrix`` with linear residuals weighted by ``ratio`` [rad/m], angular ones by 1."""
+    """Return ``fusion_matrix`` with weight ``ratio`` [rad/m] on linear residuals and 1 on angular ones."""
     weights = np.array([1.0, 1.0, 1.0, ratio, ratio, ratio])
     H = (weights[:, None] * _adjoint_inverses(grasps)).reshape(-1, 6)
     return np.asarray(np.linalg.pinv(H) * np.tile(weights, grasps.robots), dtype=float)
 
 
 def _fusion_matrix_changes(grasps: GraspEstimate, ratio: float, by_ratio: Array) -> Array:
-    """Derivative of ``fusion_with`` by the grasps' errors, the ratio's with it, shape (K, 6, 6N).
+    """Return the derivative of ``fusion_with`` by grasp errors, directly and through ``ratio``, shape (K, 6, 6N).
 
-    G = H^+ W with W the weights and H = W Ad^-1 of full rank: dH^+ = -H^+ dH H^+ + (H^T H)^-1 dH^T (1 - H H^+)
-    (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10, 1973).
+    G = H^+ W with weights W and H = W Ad^-1 of full rank: dH^+ = -H^+ dH H^+ + (H^T H)^-1 dH^T (1 - H H^+) (G. Golub,
+    V. Pereyra, SIAM J. Numer. Anal. 10, 1973).
     """
     N, K = grasps.robots, len(by_ratio)
     weights, by_weights = np.repeat([1.0, ratio], 3), np.repeat([0.0, 1.0], 3)
@@ -219,11 +221,11 @@ def _fusion_matrix_changes(grasps: GraspEstimate, ratio: float, by_ratio: Array)
 
 
 def total_wrench(wrench: Array, grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Sum of the wrenches (m_i, f_i) in {i}, (Q, N, 6), at the origin of {1}, in {1}: force and moment, (Q, 3) each.
+    """Sum the wrenches (m_i, f_i) in {i}, (Q, N, 6), at the origin of {1}: force and moment, (Q, 3) each.
 
-    Equations (10), (19): the grasp moments m_i count too.
+    Equations (10), (19), including the grasp moments m_i. The result is in {1}.
     """
-    # [Ad_T_i1]^T takes a wrench from {i} to {1}; side by side they add up all robots' in one product.
+    # [Ad_T_i1]^T takes a wrench from {i} to {1}; one product of the stacked matrices sums all robots.
     total = wrench.reshape(len(wrench), -1) @ _adjoint_inverses(grasps).reshape(-1, 6)
     return total[:, 3:], total[:, :3]
 
@@ -235,12 +237,12 @@ def fused_up(R_bi: Array, grasps: GraspEstimate) -> Array:
 
 
 def robot_up(R_bi: Array, grasps: GraspEstimate) -> Array:
-    """Unit vector against gravity in {1} by each robot alone: R_1i R_bi^T z, shape (Q, N, 3)."""
+    """Return the unit vector against gravity in {1} according to each robot: R_1i R_bi^T z, shape (Q, N, 3)."""
     return np.einsum("iab,qib->qia", grasps.R_1i, R_bi[..., 2, :])
 
 
 def tilt_scatter(R_bi: Array, grasps: GraspEstimate) -> float:
-    """Sum of squares of what the robots' tilts disagree by [rad^2], each robot's constant offset taken out."""
+    """Return the sum of squared differences between the robots' tilts [rad^2], without each robot's constant offset."""
     up = robot_up(R_bi, grasps)
     apart = up - up.mean(axis=1, keepdims=True)
     apart -= apart.mean(axis=0)
@@ -248,10 +250,7 @@ def tilt_scatter(R_bi: Array, grasps: GraspEstimate) -> float:
 
 
 def acceleration_noise(data: GraspData, grasps: GraspEstimate) -> float:
-    """Disagreement of the robots about the angular acceleration, rms per component of one robot [rad/s^2].
-
-    Zero for one robot, which has nobody to disagree with.
-    """
+    """Return the rms disagreement on angular acceleration, per component and robot [rad/s^2]; 0 for one robot."""
     if grasps.robots == 1:
         return 0.0
     alpha = np.einsum("iab,qib->qia", grasps.R_1i, data.twist_dot[..., :3])
@@ -268,7 +267,7 @@ def _adjoint_inverses(grasps: GraspEstimate) -> Array:
 
 
 def _adjoint_inverse_changes(grasps: GraspEstimate) -> Array:
-    """Derivatives of each robot's by its own errors (d_i, e_i), robot by robot from the second, shape (K, 6, 6)."""
+    """Return derivatives of ``_adjoint_inverses`` of robots 2 to N by their own errors (d_i, e_i), shape (K, 6, 6)."""
     out = np.zeros((grasps.robots - 1, 6, 6, 6))
     turned = np.swapaxes(grasps.R_1i[1:], 1, 2)[:, None] @ so3.skew(np.eye(3))  # -d(R^T) by d_i
     out[:, :3, :3, :3] = out[:, :3, 3:, 3:] = -turned
@@ -279,29 +278,29 @@ def _adjoint_inverse_changes(grasps: GraspEstimate) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Shared:
-    """What all trials have in common: the grasp frames X_1i, and pi = (m, m c, J about {1}), shape (10,)."""
+    """Quantities that all trials share: grasp frames X_1i, and pi = (m, m c, J about {1}), shape (10,)."""
 
     grasps: GraspEstimate
     pi: Array
 
     def moved(self, x: Array) -> Shared:
-        """Changed by x = (d_i, e_i for i >= 2, pi), shape (6 (N - 1) + 10,)."""
+        """Add the errors x = (d_i, e_i for i >= 2, pi), shape (6 (N - 1) + 10,)."""
         split = 6 * (self.grasps.robots - 1)
         return replace(self, grasps=self.grasps.moved(x[:split]), pi=self.pi + x[split:])
 
 
 @dataclass(frozen=True, eq=False)
 class Bases:
-    """Poses of the robots' bases in {b1} during one trial; index 0 is robot 1 itself.
+    """Poses of the robots' bases in {b1} during one trial; index 0 is robot 1.
 
-    ``R`` are rotations about z, shape (N, 3, 3), ``p`` positions [m], shape (N, 3).
+    ``R`` are rotations about z, shape (N, 3, 3); ``p`` are positions [m], shape (N, 3).
     """
 
     R: Array
     p: Array
 
     def moved(self, x: Array) -> Bases:
-        """Changed by x = (dx, dy, dz, dyaw for i >= 2), shape (4 (N - 1),)."""
+        """Add the changes x = (dx, dy, dz, dyaw for i >= 2), shape (4 (N - 1),)."""
         x = x.reshape(-1, 4)
         turn = Rotation.from_rotvec(np.column_stack([np.zeros((len(x), 2)), x[:, 3]])).as_matrix()
         return Bases(
@@ -311,17 +310,17 @@ class Bases:
 
 
 def poses(phi: Array, theta: Array, arms: Arms) -> tuple[Array, Array]:
-    """R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3)."""
+    """Return R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3)."""
     return levelled(arms, rotation(theta), forward_kinematics(phi, arms))
 
 
 def pose_residual(phi: Array, theta: Array, shared: Shared, bases: Bases, arms: Arms) -> Array:
-    """e_rot [rad] and e_pos [m] of the robots i >= 2, shape (Q, 6 (N - 1)), from true angles (Q, N, 3)."""
+    """Return e_rot [rad] and e_pos [m] of robots i >= 2, shape (Q, 6 (N - 1)), from true angles (Q, N, 3)."""
     return pose_error(*poses(phi, theta, arms), shared, bases)
 
 
 def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
-    """``pose_residual`` from R_bi (Q, N, 3, 3) and h (Q, N, 3)."""
+    """Return ``pose_residual`` from R_bi (Q, N, 3, 3) and h (Q, N, 3)."""
     grasps = shared.grasps
     parts = []
     for i in range(1, grasps.robots):
@@ -332,9 +331,9 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 
 
 def robot_data(s: Array, arms: Arms) -> ArmData:
-    """R_bi and h in level base frames, twist, twist_dot and wrench of robots whose true signals are s, (Q, ..., 21).
+    """Return poses in level base frames, twists and wrenches of robots with true signals s, shape (Q, ..., 21).
 
-    ``arms`` are of one robot, or of all in the axis before the last.
+    ``arms`` describes one robot, or all robots in the axis before the last.
     """
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
         s.reshape(*s.shape[:-1], 7, 3), -2, 0
@@ -345,7 +344,7 @@ def robot_data(s: Array, arms: Arms) -> ArmData:
 
 
 def payload_equations(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Y (Q, 6, 10) and (f, M) of the robots (Q, 6) [N, N m], which are Y pi for a rigid payload."""
+    """Return Y (Q, 6, 10) and the robots' wrench (f, M) (Q, 6) [N, N m], which equals Y pi for a rigid payload."""
     motion = fuse(data, grasps)
     specific = motion.acceleration + data.gravity_mps2 * motion.up
     Y = newton_euler_regressor(motion.omega, motion.alpha, specific)
@@ -353,21 +352,24 @@ def payload_equations(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Ar
 
 
 def balance(data: GraspData, shared: Shared) -> tuple[Array, Array]:
-    """(f, M) of the robots minus Y pi [N, N m], shape (Q, 6), and Y, shape (Q, 6, 10)."""
+    """Return the robots' (f, M) minus Y pi [N, N m], shape (Q, 6), and Y, shape (Q, 6, 10)."""
     Y, wrench = payload_equations(data, shared.grasps)
     return wrench - Y @ shared.pi, Y
 
 
 def grasp_data(s: Array, arms: Arms, rate_hz: float) -> GraspData:
-    """Data points of all robots from true signals s, shape (Q, N, 21); time is not needed here."""
+    """Return data points of all robots from true signals s, shape (Q, N, 21); the times are set to zero."""
     R, h, twist, twist_dot, wrench = robot_data(s, arms)
     return GraspData(np.zeros(len(s)), R, h, twist, twist_dot, wrench, rate_hz, arms.gravity_mps2)
 
 
 def start_bases(R: Array, h: Array, shared: Shared) -> Bases:
-    """Bases of one trial, in which all robots agree on average about where the payload is.
+    """Return base poses of one trial for which all robots agree, on average, on the payload's pose.
 
-    From orientations R_bi (Q, N, 3, 3), wrist positions in {b} (Q, N, 3) [m], and how the payload is held.
+    Args:
+        R: orientations R_bi, shape (Q, N, 3, 3).
+        h: wrist positions in {b} [m], shape (Q, N, 3).
+        shared: grasp frames of the payload.
     """
     turns, places = [np.eye(3)], [np.zeros(3)]
     for i in range(1, h.shape[1]):
@@ -381,13 +383,13 @@ def start_bases(R: Array, h: Array, shared: Shared) -> Bases:
 def needed_wrench(
     motion: Array, twist: Array, twist_dot: Array, gravity: Array, pi: Array
 ) -> tuple[Array, Array]:
-    """Force and moment that a change of the payload's motion asks for, in {1}, shape (..., 3) each.
+    """Return the change of force and moment for a change of the payload's motion, in {1}, shape (..., 3) each.
 
     Args:
-        motion: its twist, shape (Q, 6).
-        twist, twist_dot: changes of its twist, and of that one's rate, shape (..., Q, 6).
+        motion: twist of the payload, shape (Q, 6).
+        twist, twist_dot: changes of the twist and of its rate, shape (..., Q, 6).
         gravity: change of the vertical times gravity [m/s^2], shape (..., Q, 3).
-        pi: its inertial parameters, shape (10,).
+        pi: inertial parameters, shape (10,).
     """
     mass, mass_c, inertia = pi[0], pi[1:4], inertia_matrix(pi[4:])
     omega, v = motion[:, :3], motion[:, 3:]
@@ -400,6 +402,6 @@ def needed_wrench(
 
 
 def vee(A: Array) -> Array:
-    """Vector of the skew part of matrices, shapes (..., 3, 3) -> (..., 3)."""
+    """Return the vector of the skew part of matrices, shapes (..., 3, 3) -> (..., 3)."""
     low, high = A[..., (2, 0, 1), (1, 2, 0)], A[..., (1, 2, 0), (2, 0, 1)]
     return 0.5 * (low - high)

@@ -1,20 +1,20 @@
-"""The data points of a recording (paper, sections II and IV.B), and its static holds.
+"""Compute the data points of a recording (paper, sections II and IV.B), and find its static holds.
 
-In a hold the payload does not move and forces stay constant. The paper takes data "when the measured forces
-along all axes remained constant (with a tolerance of 0.01 N) for a continuous duration of six seconds". With torque
-noise of 0.01 N m the forces scatter by 0.016 N rms even after filtering, and the bare criterion never fires. Here a
-window of six seconds is part of a hold when
+In a hold the payload does not move and forces stay constant. The paper takes data "when the measured forces along all
+axes remained constant (with a tolerance of 0.01 N) for a continuous duration of six seconds". With torque noise of
+0.01 N m the filtered forces still scatter by 0.016 N rms, so the bare criterion is never met. Here a window of six
+seconds is part of a hold if
 
-* every force component stays within +-(0.01 N + 5 sigma) of its mid-range, where sigma is that component's
-  noise in the window, from its second differences over 0.1 s (blind to drift and to slow motion), as the
-  median over half seconds (blind to a jump);
-* its running mean over 1 s stays within +-(0.01 N + 4 sigma_1s), sigma_1s = sigma sqrt(0.1 / 1) for noise
-  below 5 Hz: a drift hidden by the noise in single samples shows here;
-* the encoders show a payload at rest: wrist speed and angular velocity below 5 mm/s and 0.02 rad/s rms.
-  This rejects fast vibration, which a difference over 0.1 s would take for noise.
+* every force component stays within +-(0.01 N + 5 sigma) of its mid-range. sigma is the component's noise in the
+  window, from its second differences over 0.1 s (insensitive to drift and slow motion), as the median over half
+  seconds (insensitive to a jump);
+* its running mean over 1 s stays within +-(0.01 N + 4 sigma_1s), with sigma_1s = sigma sqrt(0.1 / 1) for noise below 5
+  Hz. This detects a drift below the noise of single samples;
+* the encoders show a payload at rest: wrist speed and angular velocity below 5 mm/s and 0.02 rad/s rms. This rejects
+  fast vibration, which a difference over 0.1 s would take for noise.
 
-Without noise sigma is 0 and the first rule is the paper's criterion. With noise a hold may reach a little
-into the motion before and after it, so means are taken without half a second at either end.
+Without noise sigma is 0 and the first rule is the paper's criterion. With noise a hold may include some of the motion
+before and after it, so means exclude half a second at either end.
 """
 
 from __future__ import annotations
@@ -74,31 +74,31 @@ class GraspData:
         return self.twist.shape[0]
 
     def at(self, kept: NDArray[np.bool_] | slice) -> GraspData:
-        """Some of the samples, shape (Q,)."""
+        """Return some of the samples, selected by a mask or slice of shape (Q,)."""
         names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
     def every(self, stride: int) -> GraspData:
-        """One sample in ``stride``."""
+        """Return every ``stride``-th sample."""
         return replace(self.at(slice(None, None, stride)), rate_hz=self.rate_hz / stride)
 
 
 BLOCK = 16_384
-"""Samples of one robot that are converted at a time; the result does not depend on it."""
+"""Number of samples of one robot that are converted at a time; the result does not depend on it."""
 
 
 def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
     """Filter, differentiate and convert a recording to poses, twists, twist derivatives and wrenches.
 
-    Readings are corrected where the metadata know the robots as they are. Joint angles and torques pass
-    through the same zero-phase filter. Rates and accelerations come from sixth-order differences of the
-    *joint* angles; the twist (29), its derivative and the wrench then follow analytically.
+    If the metadata contain the robots' deviations, readings are corrected. Joint angles and torques pass through the
+    same zero-phase filter. Rates and accelerations come from sixth-order differences of the *joint* angles. The twist
+    (29), its derivative and the wrench then follow analytically.
 
     Args:
         recording: one trial.
-        cutoff_hz: cut-off of the Butterworth filter [Hz], at least 1/trim_s: transients die as
-            exp(-pi cutoff t), and what a lower cut-off leaves of them after trim_s is no motion.
-        trim_s: time dropped at each end against filter transients [s].
+        cutoff_hz: cut-off of the Butterworth filter [Hz], at least 1/trim_s. Transients decay as exp(-pi cutoff t), so
+            with a lower cut-off they would remain after trim_s.
+        trim_s: time dropped at each end because of filter transients [s].
 
     Raises:
         InputError: the recording is not usable (see ``check_recording``), or an option is out of range.
@@ -121,7 +121,7 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
         arm = recording.arm(robot)
         read = low_pass(np.concatenate(recording.joints(robot), axis=1), rate_hz, cutoff_hz)
         motion, tau = _derivatives(read[:, :6], rate_hz, keep), apart(read[keep, 6:], 1)
-        # In blocks: what lies between takes ten times the memory of the result.
+        # Convert in blocks: intermediate results take ten times the memory of the final ones.
         for first in range(0, len(time), BLOCK):
             block = slice(first, first + BLOCK)
             _fill(data, robot, block, motion[:, block, :3], motion[:, block, 3:], tau[block], arm)
@@ -129,13 +129,13 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
 
 
 def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
-    """Angles [rad], rates and accelerations of the samples to be kept, shape (3, q, 6)."""
+    """Return angles [rad], rates and accelerations of the kept samples, shape (3, q, 6)."""
     rate = differentiate(angles, rate_hz)
     return apart(np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]]), 1)
 
 
 def _fill(data: GraspData, robot: int, block: slice, phi: Array, theta: Array, tau: Array, arm: Arms) -> None:
-    """Data points of one robot from its angles with their derivatives, (3, q, 3), and its torques, (q, 3)."""
+    """Store data points of one robot from its angles with derivatives, (3, q, 3), and its torques, (q, 3)."""
     found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, arm)
     data.R_bi[block, robot], data.p_bi[block, robot] = levelled(arm, found.R_bi, found.h)
     data.twist[block, robot], data.twist_dot[block, robot] = found.twist, found.twist_dot
@@ -143,14 +143,14 @@ def _fill(data: GraspData, robot: int, block: slice, phi: Array, theta: Array, t
 
 
 TOLERANCE_N = 0.01
-"""How far a force component without noise may be from its mid-range in any window."""
+"""Largest distance of a noise-free force component from its mid-range in a window."""
 DURATION_S = 6.0
-"""Length of the window, and the least length of a hold."""
+"""Length of the window, and the shortest hold."""
 STILL_SPEED_MPS = 5e-3
 STILL_RATE_RADPS = 2e-2
 _SIGMAS = 5.0
-_SLOW_SIGMAS = 4.0  # fewer independent values in a window, and drift should not hide
-_LAG_S = 0.1  # noise below 5 Hz has forgotten itself after this time
+_SLOW_SIGMAS = 4.0  # lower, because a window has fewer independent values, and to detect drift
+_LAG_S = 0.1  # noise below 5 Hz is uncorrelated after this time
 _SMOOTH_S = 1.0
 BATCH_S = 0.5
 _MARGIN_S = 0.5
@@ -162,9 +162,9 @@ class Hold:
 
     Attributes:
         start_s, end_s: first and last sample time of the hold [s].
-        batches: means of the wrench over consecutive half seconds, shape (batches, N, 6); their scatter is
-            the measurement noise within the hold.
-        rounding_N2: variance of every component of a robot's mean force that rounding leaves [N^2].
+        batches: means of the wrench over consecutive half seconds, shape (batches, N, 6); their scatter is the
+            measurement noise within the hold.
+        rounding_N2: variance of each component of a robot's mean force due to rounding [N^2].
     """
 
     start_s: float
@@ -181,13 +181,13 @@ class Hold:
 
 
 def find_holds(data: GraspData) -> list[Hold]:
-    """All static holds of a trial, in order of time; empty when there are none."""
+    """Find all static holds of a trial, in order of time."""
     window = round(DURATION_S * data.rate_hz) + 1
     Q = data.samples
     if window > Q or window < 3:
         return []
     steady = np.ones(Q - window + 1, dtype=bool)
-    for robot in range(data.robots):  # one at a time, for the sake of memory
+    for robot in range(data.robots):  # one at a time to save memory
         steady &= _rests(data, robot, window)
     starts = np.flatnonzero(steady)
     if not len(starts):
@@ -196,21 +196,21 @@ def find_holds(data: GraspData) -> list[Hold]:
     holds: list[tuple[int, int]] = []
     for run in runs:
         first, last = int(run[0]), int(run[-1]) + window
-        if holds and first < holds[-1][1]:  # windows of one hold with a rejected one in between
+        if holds and first < holds[-1][1]:  # overlapping windows of one hold, with a rejected one in between
             first = holds.pop()[0]
         holds.append((first, last))
     return [_hold(data, first, last) for first, last in holds]
 
 
 def _rests(data: GraspData, robot: int, window: int) -> NDArray[np.bool_]:
-    """Whether one robot's forces are constant and its grasp is still, in every window; shape (Q - window + 1,)."""
+    """Return whether one robot's forces are constant and its grasp is still, per window; shape (Q - window + 1,)."""
     force = np.einsum("qab,qb->qa", data.R_bi[:, robot], data.wrench[:, robot, 3:])
     variance = _noise_variance(force, data.rate_hz, window)  # (windows, 3)
     smooth = uniform_filter1d(force, _odd(_SMOOTH_S * data.rate_hz), axis=0, mode="nearest")
     slow = variance * min(1.0, _LAG_S / _SMOOTH_S)
 
     steady = _half_range(force, window) <= TOLERANCE_N + _SIGMAS * np.sqrt(variance)
-    # The running mean looks half its length beyond the window, where the payload may already move.
+    # The running mean reaches half its length beyond the window, where the payload may already move.
     edge = min(_odd(_SMOOTH_S * data.rate_hz) // 2, (window - 1) // 2)
     inner = _half_range(smooth, window - 2 * edge)[edge : edge + len(steady)]
     steady &= inner <= TOLERANCE_N + _SLOW_SIGMAS * np.sqrt(slow)
@@ -232,7 +232,7 @@ def _hold(data: GraspData, first: int, last: int) -> Hold:
 
 
 def _noise_variance(force: Array, rate_hz: float, window: int) -> Array:
-    """Variance of uncorrelated-over-the-lag noise in every window, shape (Q - window + 1, components)."""
+    """Return the variance of noise that is uncorrelated over the lag, per window, (Q - window + 1, components)."""
     lag = max(1, min(round(_LAG_S * rate_hz), (window - 1) // 2))
     second = force[2 * lag :] - 2 * force[lag:-lag] + force[: -2 * lag]
     length = window - 2 * lag
@@ -240,7 +240,7 @@ def _noise_variance(force: Array, rate_hz: float, window: int) -> Array:
     means = _window_mean(second**2, piece) / 6  # var(a - 2b + c) = 6 var
     starts = np.arange(0, length - piece + 1, piece)
     count = len(second) - length + 1
-    # The median over half seconds: a jump, or the first instants of a motion, are not noise.
+    # The median over half seconds ignores a jump and the start of a motion, which are not noise.
     return np.median([means[start : start + count] for start in starts], axis=0)
 
 
@@ -250,7 +250,7 @@ def _window_mean(x: Array, window: int) -> Array:
 
 
 def _half_range(x: Array, window: int) -> Array:
-    """Half of max - min over every window, shape (Q - window + 1, components)."""
+    """Return half of max - min over every window, shape (Q - window + 1, components)."""
     ahead = -(window // 2)  # entry k is the window that starts at k
     high = maximum_filter1d(x, window, axis=0, origin=ahead)
     low = minimum_filter1d(x, window, axis=0, origin=ahead)

@@ -1,4 +1,4 @@
-"""The few SO(3) operations that scipy's ``Rotation`` lacks, or is slow at."""
+"""SO(3) operations that scipy's ``Rotation`` lacks or computes slowly."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -7,10 +7,10 @@ from estimator.arrays import Array
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross products along the last axis, shapes (..., 3); the bits of ``np.cross`` in a third of its time."""
+    """Return cross products along the last axis, (..., 3): bitwise equal to ``np.cross``, in a third of its time."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    # Components apart in memory, as in ``estimator.arrays``.
+    # Each component is contiguous in memory, as in ``estimator.arrays``.
     out = np.empty((3, *np.broadcast_shapes(a.shape, b.shape)[:-1]))
     np.subtract(y * w, z * v, out=out[0, ...])
     np.subtract(z * u, x * w, out=out[1, ...])
@@ -19,13 +19,13 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def times(matrix: Array, vector: Array) -> Array:
-    """Matrices (..., 3, 3) times vectors (..., 3); the same bits of each, however many there are, unlike ``einsum``."""
+    """Multiply matrices (..., 3, 3) by vectors (..., 3); unlike ``einsum``, results do not depend on the batch size."""
     x, y, z = (matrix[..., k] * vector[..., k, None] for k in range(3))
     return np.asarray(x + y + z)
 
 
 def skew(a: Array) -> Array:
-    """The matrix [a] with [a] b = a x b, shapes (..., 3) -> (..., 3, 3)."""
+    """Return the matrix [a] with [a] b = a x b, shapes (..., 3) -> (..., 3, 3)."""
     a = np.asarray(a, dtype=float)
     out = np.zeros((*a.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -a[..., 2], a[..., 1], -a[..., 0]
@@ -34,10 +34,10 @@ def skew(a: Array) -> Array:
 
 
 def left_jacobian(phi: Array) -> Array:
-    """J(phi) with exp(phi + d) = exp(J(phi) d) exp(phi) to first order in d, shapes (3,) -> (3, 3).
+    """Return J(phi) with exp(phi + d) = exp(J(phi) d) exp(phi) to first order in d, shapes (3,) -> (3, 3).
 
-    Closed form of the series sum_n [phi]^n / (n + 1)!, used itself below 0.01 rad where the
-    closed form cancels.
+    Closed form of the series sum_n [phi]^n / (n + 1)!. Below 0.01 rad, where the closed form loses precision, the
+    series itself is used.
     """
     angle = float(np.linalg.norm(phi))
     if angle < 1e-2:
@@ -49,11 +49,11 @@ def left_jacobian(phi: Array) -> Array:
 
 
 def inverse_left_jacobian(phi: Array) -> Array:
-    """J(phi)^-1 of ``left_jacobian``, shapes (..., 3) -> (..., 3, 3), for angles below 2 pi.
+    """Return J(phi)^-1 of ``left_jacobian``, shapes (..., 3) -> (..., 3, 3), for angles below 2 pi.
 
     exp(d) exp(phi) = exp(phi + J(phi)^-1 d), and exp(phi) exp(d) = exp(phi + J(-phi)^-1 d), to first order in d.
-    Closed form I - [phi] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [phi]^2 with the angle a; below 0.01 rad, where that
-    cancels, its series.
+    Closed form I - [phi] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [phi]^2 with the angle a. Below 0.01 rad, where it loses
+    precision, the series is used.
     """
     angle = np.linalg.norm(phi, axis=-1)[..., None, None]
     half = 0.5 * np.maximum(angle, 1e-2)
@@ -64,18 +64,18 @@ def inverse_left_jacobian(phi: Array) -> Array:
 
 
 def rotvec_covariance(R: Array, covariance: Array) -> Array:
-    """Covariance of the components of log(R) from that of a left error rotation [rad^2], (3, 3) both.
+    """Return the covariance of the components of log(R) from that of a left error rotation [rad^2], both (3, 3).
 
-    R is known up to exp(delta) R with the covariance given for delta; log(R) then moves by J(log R)^-1 delta.
+    The true rotation is exp(delta) R with the covariance given for delta; log(R) then changes by J(log R)^-1 delta.
     """
     J_inverse = np.linalg.inv(left_jacobian(Rotation.from_matrix(R).as_rotvec()))
     return J_inverse @ covariance @ J_inverse.T
 
 
 def chordal_mean(R: Array) -> Array:
-    """The rotation nearest (Frobenius) to the average of R, shapes (Q, ..., 3, 3) -> (..., 3, 3).
+    """Return the rotation nearest (Frobenius) to the average of R, shapes (Q, ..., 3, 3) -> (..., 3, 3).
 
-    The same as scipy's ``Rotation.mean``, which takes forty times as long for ten thousand matrices.
+    It equals scipy's ``Rotation.mean``, which takes forty times as long for ten thousand matrices.
     """
     U, _, Vt = np.linalg.svd(R.mean(axis=0))
     U[..., :, 2] *= np.linalg.det(U @ Vt)[..., None]

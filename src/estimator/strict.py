@@ -1,6 +1,6 @@
-"""Files of numbers, read strictly: what is unknown, missing or of the wrong kind is named, and nothing is guessed.
+"""Read structured files strictly: report unknown, missing or invalid keys, and guess nothing.
 
-Every sentence says which file, which key, which value, and what is allowed.
+Every message names the file, the key, the value and the allowed values.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 _LARGEST = 1e300
 Rules = Mapping[str, tuple[str, Callable[[Any], bool]]]
-"""By key: what is allowed, in words, and whether a value is."""
+"""By key: description of the allowed values, and a test of a value."""
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """Tables of a TOML file, which messages call ``what``, without an article.
+    """Read the tables of a TOML file; ``what`` is its description in messages, without an article.
 
     Raises:
         InputError: it cannot be read, or is not TOML.
@@ -40,10 +40,10 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def read_json(path: Path, what: str) -> dict[str, Any]:
-    """The object of a JSON file, which messages call ``what``, with its article.
+    """Read the object of a JSON file; ``what`` is its description in messages, with an article.
 
     Raises:
-        InputError: there is no such file, it cannot be read, or is not a JSON object.
+        InputError: the file is missing or unreadable, or is not a JSON object.
     """
     try:
         content = read_input(Path(path), JSON_BYTES)
@@ -57,7 +57,7 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
 
 
 def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
-    """A JSON object; no key twice, no NaN.
+    """Parse a JSON object without repeated keys or NaN.
 
     Raises:
         InputError: it is not one.
@@ -72,15 +72,15 @@ def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether it is a finite number, and no truth value."""
+    """Return whether a value is a finite number and not a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST
 
 
 def check_known(keys: Iterable[str], valid: Sequence[str], where: str, what: str = "key") -> None:
-    """Refuse a key that does not exist, with the nearest one that does.
+    """Refuse an unknown key, and suggest the nearest valid one.
 
     Raises:
-        InputError: there is one.
+        InputError: a key is unknown.
     """
     for key in keys:
         if key not in valid:
@@ -93,7 +93,7 @@ def check_known(keys: Iterable[str], valid: Sequence[str], where: str, what: str
 class Fields:
     """An object with required and optional keys; every reader raises ``InputError`` with the key's path.
 
-    Messages call the object ``where``, such as the file's name.
+    ``where`` is the name of the object in messages, such as the file's name.
     """
 
     values: Mapping[str, Any]
@@ -113,11 +113,11 @@ class Fields:
                 raise InputError(f"{self.where}: missing key {key!r}; {rule} {', '.join(self.required)}")
 
     def __contains__(self, key: str) -> bool:
-        """Whether an optional key is given."""
+        """Return whether an optional key is present."""
         return key in self.values
 
     def refuse(self, key: str, allowed: str) -> NoReturn:
-        """Say what a key's value must be.
+        """Report the allowed values of a key.
 
         Raises:
             InputError: always.
@@ -125,21 +125,21 @@ class Fields:
         raise InputError(f"{self.where}: {key} is {self.values[key]!r:.60}; it must be {allowed}")
 
     def check(self, rules: Rules) -> None:
-        """Refuse the first value that is not allowed; a key that is not given breaks no rule.
+        """Refuse the first value that is not allowed; absent keys are valid.
 
         Raises:
-            InputError: there is one.
+            InputError: a value is not allowed.
         """
         for key, (allowed, good) in rules.items():
             if key in self.values and not good(self.values[key]):
                 self.refuse(key, allowed)
 
     def within(self, key: str, required: Sequence[str], optional: Sequence[str] = ()) -> Fields:
-        """The object inside this one."""
+        """Read a nested object."""
         return Fields(self.object(key), required, f"{self.where}: {key}", optional)
 
     def number(self, key: str, least: float = -math.inf, *, above: float = -math.inf) -> float:
-        """A finite number, of at least ``least`` and greater than ``above``."""
+        """Read a finite number of at least ``least`` and greater than ``above``."""
         value = self.values[key]
         if not is_number(value):
             self.refuse(key, "a finite number")
@@ -150,49 +150,49 @@ class Fields:
         return float(value)
 
     def whole(self, key: str, least: int = 1) -> int:
-        """A whole number."""
+        """Read an integer of at least ``least``."""
         value = self.values[key]
         if type(value) is not int or value < least:
             self.refuse(key, f"a whole number of at least {least}")
         return value
 
     def flag(self, key: str) -> bool:
-        """True or false."""
+        """Read a boolean."""
         value = self.values[key]
         if type(value) is not bool:
             self.refuse(key, "true or false")
         return value
 
     def text(self, key: str) -> str:
-        """Printable text: control characters and half surrogates are not for terminals."""
+        """Read printable text: no control characters or lone surrogates, which may disturb a terminal."""
         value = self.values[key]
         if not isinstance(value, str) or not value or not value.isprintable():
             self.refuse(key, "printable text")
         return value
 
     def words(self, key: str) -> str:
-        """Text of any characters, such as a file's name."""
+        """Read text with any characters, such as a file's name."""
         value = self.values[key]
         if not isinstance(value, str):
             self.refuse(key, "a text")
         return value
 
     def one_of(self, key: str, allowed: Iterable[str]) -> Any:
-        """One of a few words."""
+        """Read one of the allowed words."""
         value, allowed = self.values[key], tuple(allowed)
         if not isinstance(value, str) or value not in allowed:
             self.refuse(key, f"one of {', '.join(map(repr, allowed))}")
         return value
 
     def object(self, key: str) -> dict[str, Any]:
-        """An object."""
+        """Read an object as a dictionary."""
         value = self.values[key]
         if not isinstance(value, dict):
             self.refuse(key, "an object")
         return value
 
     def list(self, key: str, length: int | None = None) -> list[Any]:
-        """A list, of a certain length if one is given."""
+        """Read a list, of a given length if not None."""
         value = self.values[key]
         if not isinstance(value, list) or length not in (None, len(value)):
             self.refuse(key, "a list" if length is None else f"a list of {length} entries")
@@ -201,7 +201,7 @@ class Fields:
     def objects(
         self, key: str, required: Sequence[str], optional: Sequence[str] = (), length: int | None = None
     ) -> list[Fields]:
-        """Objects in a list, which messages count from 1."""
+        """Read a list of objects, which messages count from 1."""
         values = self.list(key, length)
         return [
             Fields(value, required, f"{self.where}: {key}[{k}]", optional)
@@ -209,18 +209,18 @@ class Fields:
         ]
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Texts in a list."""
+        """Read a list of texts."""
         values = self.list(key)
         if not all(isinstance(value, str) for value in values):
             self.refuse(key, "a list of texts")
         return tuple(values)
 
     def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        """Finite numbers in nested lists of a shape."""
+        """Read nested lists of finite numbers of a given shape."""
         value = self.values[key]
         if not _is_array(value, shape):
             self.refuse(key, f"{' x '.join(map(str, shape))} finite numbers")
-        import numpy as np  # of no use to those who only read texts
+        import numpy as np  # not needed for reading text only
 
         return np.array(value, dtype=float)
 

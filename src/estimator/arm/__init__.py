@@ -1,1 +1,1 @@
-"""The arm: design, kinematics, dynamics."""
+"""Model of one arm: design, kinematics, dynamics."""

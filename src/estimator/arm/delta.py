@@ -1,9 +1,9 @@
-"""Kinematics of the three-legged Delta: wrist position from the driven angles, its derivatives, the inverse.
+"""Kinematics of the three-legged Delta: forward and inverse kinematics, and derivatives of the wrist position.
 
-Leg k lies at azimuth 0, 120, 240 deg. With u_k the horizontal unit vector of the leg and z up, shifting
-every platform joint onto the wrist (the platform only translates) turns the rods into three spheres:
-|h - c_k(phi_k)| = rod_length about c_k = (base_radius - platform_radius + L1 cos phi_k) u_k + L1 sin phi_k z.
-Everything here follows from that constraint; docs/method-arm.md has the derivation. Lengths may differ from leg to leg.
+Leg k lies at azimuth 0, 120, 240 deg. u_k is the horizontal unit vector of the leg, and z points up. The platform only
+translates, so every platform joint can be shifted onto the wrist. The rods then become three spheres |h - c_k(phi_k)|
+= rod_length about c_k = (base_radius - platform_radius + L1 cos phi_k) u_k + L1 sin phi_k z. Everything here follows
+from that constraint; docs/method-arm.md has the derivation. Lengths may differ between legs.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from estimator.arrays import Array, apart, matrices
 from estimator.errors import InputError
 from estimator.so3 import cross, times
 
-# Exact values: cos(2 pi / 3) in floating point is off by 2e-16, which would break the legs' symmetry.
+# Exact values: the floating-point cos(2 pi / 3) is off by 2e-16, which would break the legs' symmetry.
 _HALF_SQRT_3 = np.sqrt(3.0) / 2.0
 LEG_DIRECTIONS: Array = np.array([[1.0, 0.0, 0.0], [-0.5, _HALF_SQRT_3, 0.0], [-0.5, -_HALF_SQRT_3, 0.0]])
 _Z: Array = np.array([0.0, 0.0, 1.0])
@@ -26,15 +26,15 @@ _Z: Array = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class LegGeometry:
-    """The rods and knees of one Delta at given driven angles; vectors in {b}, axis -2 counts the legs.
+    """Rods and knees of one Delta at given driven angles; vectors in {b}, axis -2 is the leg.
 
     Attributes:
         h: wrist position [m], shape (..., 3).
         rod: wrist minus sphere centre, that is platform joint minus knee [m], shape (..., 3, 3).
         knee_d1: derivative of the knee position with respect to phi_k [m/rad], shape (..., 3, 3).
         knee_d2: second derivative [m/rad^2], shape (..., 3, 3).
-        leverage: rod . knee_d1 [m^2/rad], shape (..., 3); positive while the knee points outward, zero
-            where proximal link and rod are in line (singular).
+        leverage: rod . knee_d1 [m^2/rad], shape (..., 3); positive while the knee points outward, zero if proximal
+            link and rod are in line (singular).
     """
 
     h: Array
@@ -45,20 +45,20 @@ class LegGeometry:
 
     @cached_property
     def across_rods(self) -> Array:
-        """The wrist's displacement per rod_k . dh_k, the inverse of the rods [1/m], shape (..., 3, 3)."""
+        """Displacement of the wrist per rod_k . dh_k: inverse of the rod matrix [1/m], shape (..., 3, 3)."""
         return apart(np.asarray(np.linalg.inv(self.rod), dtype=np.float64), 2)
 
     def along_rods(self, force: Array) -> Array:
-        """Driven torques [N m] of a force at the wrist in {b} [N]: (dh/dphi)^T force, shape (..., 3)."""
+        """Return the driven torques [N m] of a force at the wrist in {b} [N]: (dh/dphi)^T force, shape (..., 3)."""
         return self.leverage * times(np.swapaxes(self.across_rods, -1, -2), force)
 
     def at_wrist(self, torque: Array) -> Array:
-        """The force at the wrist in {b} [N] that driven torques make [N m], (dh/dphi)^-T torque, shape (..., 3)."""
+        """Return the wrist force in {b} [N] of driven torques [N m]: (dh/dphi)^-T torque, shape (..., 3)."""
         return times(np.swapaxes(self.rod, -1, -2), torque / self.leverage)
 
 
 def forward_kinematics(phi: ArrayLike, design: Arms) -> Array:
-    """Wrist position h(phi) in {b} [m], shape (..., 3): equation (28); the higher of the two solutions.
+    """Return the wrist position h(phi) in {b} [m], shape (..., 3): equation (28), the higher of the two solutions.
 
     Driven angles phi [rad] have shape (..., 3); 0 is horizontal outward, positive raises the knee.
 
@@ -70,7 +70,7 @@ def forward_kinematics(phi: ArrayLike, design: Arms) -> Array:
 
 
 def _wrist(phi: Array, foot: Array, normal: Array, square: Array) -> Array:
-    """The wrist over the foot that ``_sphere_intersection`` finds; arguments and errors as there and above."""
+    """Return the wrist position from the result of ``_sphere_intersection``; errors as in ``forward_kinematics``."""
     if not np.all(square > 0):
         where = np.unravel_index(np.argmin(square > 0), square.shape)
         angles = ", ".join(f"{value:.4g}" for value in phi[where])
@@ -84,7 +84,7 @@ def is_reachable(phi: ArrayLike, design: Arms) -> NDArray[np.bool_]:
 
 
 def stretches(phi: ArrayLike, design: Arms) -> tuple[NDArray[np.bool_], Array]:
-    """The answer of ``is_reachable``, and the legs' leverage (..., 3), which means nothing where that is no."""
+    """Return ``is_reachable`` and the legs' leverage (..., 3), which is valid only if the wrist position exists."""
     phi = np.asarray(phi, dtype=float)
     centres = _sphere_centres(phi, design)
     foot, normal, square = _sphere_intersection(centres, design)
@@ -93,7 +93,7 @@ def stretches(phi: ArrayLike, design: Arms) -> tuple[NDArray[np.bool_], Array]:
 
 
 def leg_geometry(phi: ArrayLike, design: Arms) -> LegGeometry:
-    """Wrist, rods and knee derivatives at driven angles ``phi`` [rad], shape (..., 3).
+    """Return the wrist, rods and knee derivatives at driven angles ``phi`` [rad], shape (..., 3).
 
     Raises:
         InputError: the three spheres of the rods do not intersect at some configuration.
@@ -112,7 +112,7 @@ def _legs(phi: Array, h: Array, centres: Array, design: Arms) -> LegGeometry:
 
 
 def jacobian(phi: ArrayLike, design: Arms) -> Array:
-    """dh/dphi [m/rad], shape (..., 3, 3): rows x, y, z of {b}, columns phi_1..3.
+    """Return dh/dphi [m/rad], shape (..., 3, 3): rows x, y, z of {b}, columns phi_1..3.
 
     Raises:
         InputError: the three spheres of the rods do not intersect at some configuration.
@@ -121,15 +121,15 @@ def jacobian(phi: ArrayLike, design: Arms) -> Array:
 
 
 def jacobian_of(legs: LegGeometry) -> Array:
-    """dh/dphi [m/rad], shape (..., 3, 3), from rod_k . dh = leverage_k dphi_k."""
+    """Return dh/dphi [m/rad], shape (..., 3, 3), from rod_k . dh = leverage_k dphi_k."""
     return np.asarray(legs.across_rods * legs.leverage[..., None, :])
 
 
 def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arms) -> tuple[Array, Array, Array]:
-    """Derivatives of h by every leg's radius, proximal length and rod length, shape (..., 3, 3) each.
+    """Return derivatives of h by each leg's radius, proximal length and rod length, shape (..., 3, 3) each.
 
-    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs. ``legs`` is the
-    geometry at the driven angles phi [rad], shape (..., 3).
+    They follow from rod_k . (dh - dc_k) = rod_length_k d(rod_length_k). Rows are x, y, z of {b}, columns are legs.
+    ``legs`` is the geometry at the driven angles phi [rad], shape (..., 3).
     """
     phi = np.asarray(phi, dtype=float)
     along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
@@ -141,10 +141,10 @@ def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arms) -> tuple[A
 
 
 def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> tuple[Array, Array]:
-    """Velocity [m/s] and acceleration [m/s^2] of the wrist in {b}, each of shape (..., 3).
+    """Return velocity [m/s] and acceleration [m/s^2] of the wrist in {b}, each of shape (..., 3).
 
-    The constraint differentiated twice: rod_k . h_ddot = leverage_k phi_ddot_k
-    + rod_k . knee_d2_k phi_dot_k^2 - |d(rod_k)/dt|^2, from driven rates [rad/s] and accelerations [rad/s^2], (..., 3).
+    Differentiating the constraint twice gives rod_k . h_ddot = leverage_k phi_ddot_k + rod_k . knee_d2_k phi_dot_k^2 -
+    |d(rod_k)/dt|^2. Driven rates are in [rad/s] and accelerations in [rad/s^2], shape (..., 3).
     """
     phi_dot, phi_ddot = np.asarray(phi_dot, dtype=float), np.asarray(phi_ddot, dtype=float)
     h_dot = times(legs.across_rods, legs.leverage * phi_dot)
@@ -154,7 +154,7 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
 
 
 def inverse_kinematics(h: ArrayLike, design: Arms) -> Array:
-    """Driven angles phi(h) [rad] with every knee pointing outward, from wrist positions in {b} [m], shape (..., 3).
+    """Return driven angles phi(h) [rad] with every knee outward, from wrist positions in {b} [m], shape (..., 3).
 
     Raises:
         InputError: a leg is too long or too short for some position.
@@ -166,21 +166,21 @@ def inverse_kinematics(h: ArrayLike, design: Arms) -> Array:
         *where, leg = np.unravel_index(np.argmax(outside), outside.shape)
         position = ", ".join(f"{value:.4g}" for value in h[tuple(where)])
         raise InputError(f"leg {int(leg) + 1} cannot reach the wrist position ({position}) m")
-    # The outward knee lies clockwise of the line to the wrist if that points up, else counter-clockwise.
+    # The outward knee lies clockwise of the line to the wrist if that line points up, else counter-clockwise.
     return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
 
 
 def is_in_reach(h: ArrayLike, design: Arms) -> NDArray[np.bool_]:
-    """Whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
+    """Return whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
     return np.abs(_leg_triangles(np.asarray(h, dtype=float), design)[2]) <= 1.0
 
 
 def _leg_triangles(h: Array, design: Arms) -> tuple[Array, Array, Array]:
-    """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
+    """Return the wrist from each driven axis, outward and up [m], and the cosine of the angle there, (..., 3)."""
     l1, l2 = design.proximal_length_m, design.rod_length_m
-    # On the driven axis itself, or infinitely far, there is no cosine, and it is out of reach.
+    # On the driven axis itself, or at infinity, the cosine is not finite: out of reach.
     with np.errstate(all="ignore"):
-        # Once the platform joint is shifted onto the wrist.
+        # The platform joint is shifted onto the wrist.
         reach = h[..., None, :] - np.asarray(design.radius_m)[..., None] * LEG_DIRECTIONS
         outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
         distance = np.hypot(outward, up)
@@ -193,20 +193,20 @@ def _sphere_centres(phi: Array, design: Arms) -> Array:
 
 
 def _in_leg_planes(outward: Array, up: Array) -> Array:
-    """Vectors outward u_k + up z of the three legs, shapes (..., 3) -> (..., 3, 3)."""
+    """Return the vectors outward u_k + up z of the three legs, shapes (..., 3) -> (..., 3, 3)."""
     return matrices([
         [outward[..., k] * x, outward[..., k] * y, up[..., k]] for k, (x, y, _) in enumerate(LEG_DIRECTIONS)
     ])  # fmt: skip
 
 
 def _sphere_intersection(centres: Array, design: Arms) -> tuple[Array, Array, Array]:
-    """Point of the sphere centres' plane nearest the wrist, upward unit normal, squared height over it."""
+    """Return the foot of the wrist on the plane of sphere centres, its upward unit normal, and the squared height."""
     rod = np.asarray(design.rod_length_m)
     a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]
     normal = cross(a, b)
     normal_square = np.sum(normal**2, axis=-1, keepdims=True)
     a_square, b_square = np.sum(a**2, axis=-1, keepdims=True), np.sum(b**2, axis=-1, keepdims=True)
-    if rod.ndim:  # the difference of two spheres is a plane, off the middle where radii differ
+    if rod.ndim:  # unequal radii shift the radical plane of two spheres off the middle
         a_square = a_square + (rod[..., :1] ** 2 - rod[..., 1:2] ** 2)
         b_square = b_square + (rod[..., :1] ** 2 - rod[..., 2:] ** 2)
         rod = rod[..., 0]
@@ -216,29 +216,28 @@ def _sphere_intersection(centres: Array, design: Arms) -> tuple[Array, Array, Ar
 
 
 MAX_CONDITION = 1e4
-"""Condition of dh/dphi beyond which the arm counts as singular. Within the Omnid's joint limits it stays below 20; at
-the bound, rounding grows from 1e-16 to 1e-12."""
-_SAME_M = 1e-6  # wrist positions closer than this are one
+"""Condition number of dh/dphi above which the arm counts as singular. It stays below 20 within the Omnid's joint
+limits. At the bound, rounding errors grow from 1e-16 to 1e-12."""
+_SAME_M = 1e-6  # wrist positions closer than this are equal
 
 
 def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array, Array]:
-    """Wrist level: the same sensors told as wrist position h [m] and force of the springs on it [N] in {b}, (..., 3).
+    """Convert joint level to wrist level: wrist position h [m] and spring force on the wrist [N] in {b}, (..., 3).
 
-    The springs' torques balance a force on the wrist by virtual work, tau . phi_dot = force . h_dot, so
-    force = (dh/dphi)^-T tau (paper, section IV.B, for an arm without mass). Weight and inertia of the arm stay in it,
-    and the conversion is exact both ways.
+    By virtual work, tau . phi_dot = force . h_dot, so force = (dh/dphi)^-T tau (paper, section IV.B, for an arm
+    without mass). The force still includes weight and inertia of the arm. The conversion is exact both ways.
 
     Args:
         phi: driven angles [rad], shape (..., 3).
         tau: spring torques on the proximal links, positive raising them [N m], shape (..., 3).
-        design: the robot's numbers.
+        design: design parameters of the robot.
 
     Raises:
         InputError: at some configuration the rods cannot meet, a leg is past its stretched position, the wrist is not
             above the driven axes, or the arm is singular.
     """
     phi, tau = np.asarray(phi, dtype=float), np.asarray(tau, dtype=float)
-    legs = leg_geometry(phi, design)  # refuses what no wrist position reaches
+    legs = leg_geometry(phi, design)  # raises if no wrist position exists
     faults = {
         "a leg is folded past its stretched position": np.any(legs.leverage <= 0.0, axis=-1),
         "the wrist lies below the driven axes": legs.h[..., 2] <= 0.0,
@@ -254,10 +253,10 @@ def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array
 
 
 def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Array, Array]:
-    """Driven angles [rad] and spring torques [N m], the inverse of ``wrist_of``, shape (..., 3) each.
+    """Return driven angles [rad] and spring torques [N m], shape (..., 3) each: the inverse of ``wrist_of``.
 
     Raises:
-        InputError: some position is not one that ``wrist_of`` returns (see ``wrist_fault``).
+        InputError: ``wrist_of`` does not return some position (see ``wrist_fault``).
     """
     h, force = np.asarray(h, dtype=float), np.asarray(force, dtype=float)
     if (fault := wrist_fault(h, design)) is not None:
@@ -268,7 +267,7 @@ def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Arra
 
 
 def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tuple[Array, Array]:
-    """Inverse of ``wrist_motion``: driven rates [rad/s] and accelerations [rad/s^2], where no leg is stretched."""
+    """Invert ``wrist_motion``: driven rates [rad/s] and accelerations [rad/s^2], valid if no leg is stretched."""
     h_dot, h_ddot = np.asarray(h_dot, dtype=float), np.asarray(h_ddot, dtype=float)
     phi_dot = np.einsum("...kj,...j->...k", legs.rod, h_dot) / legs.leverage
     rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
@@ -277,10 +276,10 @@ def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tup
 
 
 def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str] | None:
-    """The first of wrist positions in {b} [m], shape (..., 3), that has no driven angles; None where all have.
+    """Find the first wrist position in {b} [m], shape (..., 3), without driven angles; None if all have them.
 
     Returns:
-        Its index in the leading axes, and a sentence that says what is wrong with it.
+        Its index in the leading axes, and a sentence that describes the fault.
     """
     h = np.asarray(h, dtype=float)
     within = is_in_reach(h, design)
@@ -288,7 +287,7 @@ def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str
         leg = int(np.argmin(within[index])) + 1
         return index, f"leg {leg} cannot reach the wrist position ({_numbers(h[index])}) m"
     phi = inverse_kinematics(h, design)
-    # The position itself is where the spheres about the knees meet, unless they only touch there.
+    # The spheres about the knees meet at the position itself; the arm is singular if they only touch.
     if (index := _first(~is_reachable(phi, design))) is not None:
         return index, f"the arm is singular at the wrist position ({_numbers(h[index])}) m"
     legs = leg_geometry(phi, design)
@@ -301,7 +300,7 @@ def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str
 
 
 def _is_singular(legs: LegGeometry) -> NDArray[np.bool_]:
-    """Whether dphi/dh, whose rows are rod_k / leverage_k, is too badly conditioned."""
+    """Return whether dphi/dh, whose rows are rod_k / leverage_k, is too badly conditioned."""
     stretched = np.any(legs.leverage <= 0.0, axis=-1)
     leverage = np.where(stretched[..., None], 1.0, legs.leverage)
     return stretched | ~(np.linalg.cond(legs.rod / leverage[..., None]) < MAX_CONDITION)

@@ -1,4 +1,4 @@
-"""Design numbers of one Omnid, shared by the estimator and the simulator."""
+"""Design parameters of one Omnid, for the estimator and the simulator."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class OmnidDesign:
 
     @property
     def radius_m(self) -> float:
-        """Base radius minus platform radius: all that kinematics sees of the two [m]."""
+        """Base radius minus platform radius [m]; the kinematics depends only on this difference."""
         return self.base_radius_m - self.platform_radius_m
 
     @property
@@ -87,7 +87,7 @@ class OmnidDesign:
         return cls(**out)
 
     def to_dict(self) -> dict[str, Any]:
-        """The numbers as plain JSON types, keys as in ``design.toml``."""
+        """Convert to plain JSON types, with the keys of ``design.toml``."""
         return {k: list(v) if isinstance(v, tuple) else v for k, v in dataclasses.asdict(self).items()}
 
 

@@ -1,9 +1,9 @@
-"""The passive gimbal, inverse dynamics of one Omnid arm alone, and the wrench that it exerts on the payload.
+"""Dynamics of one Omnid arm: passive gimbal, inverse dynamics, and wrench on the payload.
 
-Gimbal angles come in column order (theta_z, theta_y, theta_x): z is proximal, then y, then x, through the wrist centre.
-The spring torque drives the arm's own bodies and the payload. The first part is computed from the motion and taken away
-from the second (derivation: docs/method-arm.md). The paper (section IV.B) writes f_i = (dh/dphi)^-T tau_i for an arm
-without mass; the motor's rotor lies before the spring and never appears.
+Gimbal angles have the column order (theta_z, theta_y, theta_x): z is proximal, then y, then x, all through the wrist
+centre. The spring torque drives the arm's own bodies and the payload. The torque of the arm's bodies is computed from
+the motion and subtracted (derivation: docs/method-arm.md). The paper (section IV.B) uses f_i = (dh/dphi)^-T tau_i for
+an arm without mass. The motor's rotor is on the other side of the spring and does not enter.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from estimator.so3 import cross, times
 
 
 class Gimbal(NamedTuple):
-    """A gimbal at given angles (theta_z, theta_y, theta_x): their cosines and sines, shape (...) each.
+    """Cosines and sines of gimbal angles (theta_z, theta_y, theta_x), shape (...) each.
 
     R_bi = Rz(theta_z) Ry(theta_y) Rx(theta_x).
     """
@@ -35,17 +35,17 @@ class Gimbal(NamedTuple):
 
     @classmethod
     def at(cls, theta: ArrayLike) -> Gimbal:
-        """At gimbal angles [rad], shape (..., 3)."""
+        """Make the gimbal at angles [rad], shape (..., 3)."""
         angles = components(theta)
         return cls(*np.cos(angles), *np.sin(angles))
 
     @property
     def before_x(self) -> Gimbal:
-        """The same with theta_x at zero: its middle body."""
+        """The gimbal with theta_x = 0: the frame of its middle body."""
         return self._replace(cx=1.0, sx=0.0)
 
     def rotation(self) -> Array:
-        """Orientation R_bi of the grasp frame {i} in the base frame {b}, equation (28), shape (..., 3, 3)."""
+        """Return the orientation R_bi of the grasp frame {i} in the base frame {b}, equation (28), (..., 3, 3)."""
         cz, cy, cx, sz, sy, sx = self
         return matrices([
             [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
@@ -54,17 +54,17 @@ class Gimbal(NamedTuple):
         ])  # fmt: skip
 
     def axes(self) -> Array:
-        """E of omega_i = E theta_dot, shape (..., 3, 3): its columns are the z, y and x axes of the gimbal in {i}.
+        """Return E of omega_i = E theta_dot, shape (..., 3, 3): its columns are the z, y and x gimbal axes in {i}.
 
-        det E = -cos(theta_y): singular where theta_y is +-90 deg.
+        det E = -cos(theta_y), so E is singular at theta_y = +-90 deg.
         """
         _, cy, cx, _, sy, sx = self
         return matrices([[-sy, 0.0, 1.0], [cy * sx, cx, 0.0], [cy * cx, -sx, 0.0]])
 
     def motion(self, theta_dot: ArrayLike, theta_ddot: ArrayLike) -> tuple[Array, Array]:
-        """Angular velocity omega_i [rad/s] of {i} in {b}, expressed in {i}, and its derivative [rad/s^2], (..., 3).
+        """Return angular velocity [rad/s] of {i} in {b}, expressed in {i}, and its derivative [rad/s^2], (..., 3).
 
-        E theta_dot and E theta_ddot + dE/dt theta_dot, without their zeros.
+        These are E theta_dot and E theta_ddot + dE/dt theta_dot, without multiplications by zero.
         """
         _, cy, cx, _, sy, sx = self
         z, y, x = components(theta_dot)
@@ -79,37 +79,37 @@ class Gimbal(NamedTuple):
         return omega, omega_dot
 
     def about_axes(self, moment: Array) -> Array:
-        """Torques about the axes (z, y, x) [N m] of a moment in {i} [N m]: E^T moment, shape (..., 3)."""
+        """Return torques about the axes (z, y, x) [N m] of a moment in {i} [N m]: E^T moment, shape (..., 3)."""
         _, cy, cx, _, sy, sx = self
         x, y, z = components(moment)
         return vectors(cy * sx * y + cy * cx * z - sy * x, cx * y - sx * z, x)
 
     def moment(self, torque: ArrayLike) -> Array:
-        """Moment in {i} [N m] with given components about the axes (z, y, x) [N m]: E^-T torque, shape (..., 3)."""
+        """Return the moment in {i} [N m] with given torques about axes (z, y, x) [N m]: E^-T torque, (..., 3)."""
         _, cy, cx, _, sy, sx = self
         about_z, about_y, about_x = components(torque)
-        # {i} before its turn about x: there y is the middle axis, and the first axis is (-sin, 0, cos) of theta_y.
+        # In {i} before the rotation about x, y is the middle axis and the first axis is (-sin, 0, cos) of theta_y.
         up = (about_z + sy * about_x) / cy
         return vectors(about_x, cx * about_y + sx * up, cx * up - sx * about_y)
 
 
 def rotation(theta: ArrayLike) -> Array:
-    """``Gimbal.rotation`` at gimbal angles [rad], shape (..., 3)."""
+    """Return ``Gimbal.rotation`` at gimbal angles [rad], shape (..., 3)."""
     return Gimbal.at(theta).rotation()
 
 
 def rate_matrix(theta: ArrayLike) -> Array:
-    """``Gimbal.axes`` at gimbal angles [rad], shape (..., 3)."""
+    """Return ``Gimbal.axes`` at gimbal angles [rad], shape (..., 3)."""
     return Gimbal.at(theta).axes()
 
 
 def angular_motion(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike) -> tuple[Array, Array]:
-    """``Gimbal.motion`` at gimbal angles [rad], with their rates and accelerations, shape (..., 3) each."""
+    """Return ``Gimbal.motion`` at gimbal angles [rad], with their rates and accelerations, shape (..., 3) each."""
     return Gimbal.at(theta).motion(theta_dot, theta_ddot)
 
 
 def moment_about_axes(theta: ArrayLike, torque: ArrayLike) -> Array:
-    """``Gimbal.moment`` at gimbal angles [rad], shape (..., 3)."""
+    """Return ``Gimbal.moment`` at gimbal angles [rad], shape (..., 3)."""
     return Gimbal.at(theta).moment(torque)
 
 
@@ -121,15 +121,15 @@ def arm_torque(
     legs: LegGeometry | None = None,
     h_ddot: Array | None = None,
 ) -> Array:
-    """Spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
+    """Return the spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
 
-    Covers the driven links, the rods as uniform slender bodies and everything that translates with the
-    wrist; the gimbal's bodies are balanced, so their rotation does not reach the driven joints.
+    They include the driven links, the rods as uniform slender bodies, and all bodies that translate with the wrist.
+    The gimbal's bodies are balanced, so their rotation does not affect the driven joints.
 
     Args:
         phi, phi_dot, phi_ddot: driven angles [rad], rates and accelerations, shape (..., 3) each.
-        design: the robot's numbers.
-        legs, h_ddot: geometry at ``phi`` and the wrist's acceleration [m/s^2], if they are known.
+        design: parameters of the robot.
+        legs, h_ddot: geometry at ``phi`` and the wrist's acceleration [m/s^2], if known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
@@ -140,7 +140,7 @@ def arm_torque(
     g = design.gravity_mps2 * up
     h_ddot = wrist_motion(legs, phi_dot, phi_ddot)[1] if h_ddot is None else h_ddot
     knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
-    # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
+    # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), with half of the weight at each end.
     wrist_ddot = h_ddot[..., None, :]
     rod_mass = np.asarray(design.rod_mass_kg)[..., None]
     at_knee = rod_mass * ((2.0 * knee_ddot + wrist_ddot) / 6.0 + g[..., None, :] / 2.0)
@@ -159,12 +159,12 @@ def arm_torque(
 def gimbal_torque(
     theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arms, gimbal: Gimbal | None = None
 ) -> Array:
-    """Torques about the gimbal's axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
+    """Return the torques about the gimbal axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
 
     Args:
         theta, theta_dot, theta_ddot: gimbal angles [rad], rates and accelerations, shape (..., 3) each.
-        design: the robot's numbers.
-        gimbal: the gimbal at ``theta``, if it is known.
+        design: parameters of the robot.
+        gimbal: the gimbal at ``theta``, if known.
     """
     gimbal = Gimbal.at(theta) if gimbal is None else gimbal
     theta_dot, theta_ddot = np.asarray(theta_dot, dtype=float), np.asarray(theta_ddot, dtype=float)
@@ -186,7 +186,7 @@ def wrench_on_payload(
     R_bi: Array | None = None,
     h_ddot: Array | None = None,
 ) -> Array:
-    """Wrench (m_i [N m], f_i [N]) of the robot ON the payload at the origin of {i}, in {i}, shape (..., 6).
+    """Return the wrench (m_i [N m], f_i [N]) of the robot ON the payload at the origin of {i}, in {i}, shape (..., 6).
 
     f_i = R_bi^T (dh/dphi)^-T (tau - arm_torque); the gimbal is passive, so m_i = -E^-T gimbal_torque.
 
@@ -194,9 +194,9 @@ def wrench_on_payload(
         phi: driven angles [rad], rates and accelerations, each of shape (..., 3).
         theta: gimbal angles (theta_z, theta_y, theta_x) [rad], rates and accelerations, each (..., 3).
         tau: spring torques [N m], shape (..., 3).
-        design: the robot's numbers.
+        design: parameters of the robot.
         legs, gimbal, R_bi, h_ddot: geometry at ``phi``, gimbal and orientation at ``theta`` and the wrist's
-            acceleration [m/s^2], if they are known.
+            acceleration [m/s^2], if known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
@@ -211,7 +211,7 @@ def wrench_on_payload(
 
 
 def _rotor_torque(gimbal: Gimbal, theta_dot: Array, theta_ddot: Array, inertia: Triple) -> Array:
-    """Joint torques E^T (I omega_dot + omega x I omega) of one balanced body fixed in {i}."""
+    """Return joint torques E^T (I omega_dot + omega x I omega) of one balanced body fixed in {i}."""
     omega, omega_dot = gimbal.motion(theta_dot, theta_ddot)
     principal = np.array(inertia)
     return gimbal.about_axes(principal * omega_dot + cross(omega, principal * omega))

@@ -1,4 +1,4 @@
-"""From an arm's joint signals to pose, twist and wrench at its grasp, and how these change with the signals."""
+"""Convert an arm's joint signals to pose, twist and wrench at its grasp, with derivatives by the signals."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from estimator.so3 import cross, times
 
 
 class Kind(NamedTuple):
-    """Three of the 21 numbers that describe one robot at an instant, one a joint.
+    """Three of the 21 signals of one robot at an instant, one per joint.
 
-    ``step`` is that by which they are moved for a central difference, in their unit.
+    ``step`` is the step of a finite difference, in their unit.
     """
 
     name: str
@@ -40,16 +40,16 @@ PHI, PHI_DOT, PHI_DDOT, THETA, THETA_DOT, THETA_DDOT, TAU = (slice(k, k + 3) for
 
 
 def with_its_rates(angle: slice) -> slice:
-    """``PHI`` or ``THETA`` with rates and accelerations."""
+    """Extend ``PHI`` or ``THETA`` to the slice with rates and accelerations."""
     return slice(angle.start, angle.start + 9)
 
 
 class ArmData(NamedTuple):
-    """What one arm tells of its grasp; leading axes are samples, or anything else.
+    """Pose, twist and wrench of one arm at its grasp; leading axes are samples, or anything else.
 
     Attributes:
         R_bi: orientation of {i} in the arm's base frame, shape (..., 3, 3).
-        h: wrist position there [m], shape (..., 3).
+        h: wrist position in that frame [m], shape (..., 3).
         twist: body twist (omega_i [rad/s], v_i [m/s]) in {i}, equation (29), shape (..., 6).
         twist_dot: its component-wise time derivative, shape (..., 6).
         wrench: (m_i [N m], f_i [N]) of the arm ON the payload at the origin of {i}, in {i}, shape (..., 6).
@@ -65,13 +65,13 @@ class ArmData(NamedTuple):
 def arm_data(
     phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arms
 ) -> ArmData:
-    """Kinematics and dynamics of an arm (paper, equations (28)-(29), section IV.B).
+    """Compute kinematics and dynamics of an arm (paper, equations (28)-(29), section IV.B).
 
     Args:
         phi: driven angles [rad], rates and accelerations, each of shape (..., 3).
         theta: gimbal angles (z, y, x) [rad], rates and accelerations, each (..., 3).
         tau: spring torques [N m], shape (..., 3).
-        arm: the arm's numbers; leading axes of theirs go with those of the angles.
+        arm: parameters of the arm; their leading axes correspond to those of the angles.
 
     Raises:
         InputError: no wrist position exists at some configuration.
@@ -94,23 +94,23 @@ LENGTHS: NDArray[np.intp] = np.r_[AT["radius"], AT["proximal_length"], AT["rod_l
 MASSES: NDArray[np.intp] = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
 TILT: NDArray[np.intp] = np.r_[AT["tilt"]]
 BY_UNIT: NDArray[np.intp] = np.concatenate([LENGTHS, MASSES, TILT])
-"""Deviations that change more than what sensors read."""
-_LENGTH, _MASS, _TILT = 1e-6, 1e-4, 1e-6  # steps of differences
+"""Deviations that affect more than the sensor readings."""
+_LENGTH, _MASS, _TILT = 1e-6, 1e-4, 1e-6  # steps of finite differences
 _NONE = np.zeros(3)
 _Wrist = tuple[Array, Array, Array, Array]
-"""Wrist (position [m], velocity, acceleration) and force on the payload [N], in the arm's own frame."""
+"""Wrist position [m], velocity, acceleration and force on the payload [N], in the arm's own frame."""
 
 
 class ArmChanges:
     """Derivatives of ``robot_data`` of one arm at n instants.
 
-    Differences of what is not linear, each taken where it arises: driven angles move the legs alone, gimbal angles the
-    gimbal alone, and masses the torques of the arm alone. What follows from there (see ``arm_data``) is linear, and so
-    are accelerations and torques.
+    Nonlinear parts use finite differences, each restricted to what it affects. Driven angles move only the legs,
+    gimbal angles only the gimbal, and masses only the arm's torques. The remaining steps (see ``arm_data``),
+    accelerations and torques are linear.
     """
 
     def __init__(self, s: Array, unit: ArmUnit) -> None:
-        """At true signals s, shape (n, ``SLOTS``), which the arm must reach."""
+        """Take true signals s, shape (n, ``SLOTS``), within the arm's reach."""
         self._s, self._unit = apart(s, 1), unit
         self._legs = leg_geometry(self._at(PHI), unit)
         self._wrist = self._at_wrist(self._legs, self._at(PHI), self._at(PHI_DOT), unit)
@@ -121,7 +121,7 @@ class ArmChanges:
         self._v = times(self._R_ib, self._wrist[1])
 
     def by_signals(self) -> ArmData:
-        """By the signals in their order, shapes (``SLOTS``, n, ...)."""
+        """Return derivatives by the signals in their order, shapes (``SLOTS``, n, ...)."""
         phi, phi_dot, phi_ddot = self._at(PHI), self._at(PHI_DOT), self._at(PHI_DDOT)
         moved = _each(phi, step := STEPS[PHI][0])
         parts = [
@@ -129,7 +129,7 @@ class ArmChanges:
         ]
         moved = _each(phi_dot, step := STEPS[PHI_DOT][0])
         parts.append(self._driven(self._at_wrist(self._legs, phi, moved, self._unit), step))
-        # Accelerations act linearly.
+        # Accelerations enter linearly.
         h, h_dot, h_ddot, force = self._wrist
         faster = h_ddot + np.moveaxis(jacobian_of(self._legs), -1, 0)
         torque = arm_torque(phi, phi_dot, _each(phi_ddot, 1.0), self._unit, self._legs, faster)
@@ -150,7 +150,7 @@ class ArmChanges:
         return self._levelled(parts)
 
     def by_unit(self) -> ArmData:
-        """By the deviations ``BY_UNIT``, shapes (their number, n, ...)."""
+        """Return derivatives by the deviations ``BY_UNIT``, shapes (their number, n, ...)."""
         phi, phi_dot = self._at(PHI), self._at(PHI_DOT)
         longer = self._deviating(LENGTHS, _LENGTH)
         legs = leg_geometry(np.broadcast_to(phi, (len(LENGTHS), *phi.shape)), longer)
@@ -180,12 +180,12 @@ class ArmChanges:
         return legs.h, h_dot, h_ddot, legs.at_wrist(self._at(TAU) - torque)
 
     def _turn(self, gimbal: Gimbal, rate: Array, faster: Array) -> tuple[Array, Array, Array]:
-        """Angular velocity and its derivative, and the moment on the payload, in {i}."""
+        """Return angular velocity, its derivative, and the moment on the payload, in {i}."""
         torque = gimbal_torque(np.empty(0), rate, faster, self._unit, gimbal)
         return *gimbal.motion(rate, faster), -gimbal.moment(torque)
 
     def _driven(self, moved: _Wrist, step: float) -> ArmData:
-        """Changes of all data by those of the wrist, in the arm's own frame."""
+        """Convert changes of the wrist to changes of all data, in the arm's own frame."""
         d_h, d_h_dot, d_h_ddot, d_force = (
             (after - before) / step for after, before in zip(moved, self._wrist, strict=True)
         )
@@ -194,7 +194,7 @@ class ArmChanges:
         return _changes(_NONE[:, None], d_h, _NONE, _NONE, d_v, d_v_dot, _NONE, times(self._R_ib, d_force))
 
     def _turned(self, d_R: Array, moved: tuple[Array, Array, Array], step: float) -> ArmData:
-        """Changes of all data by those of the gimbal, in the arm's own frame."""
+        """Convert changes of the gimbal to changes of all data, in the arm's own frame."""
         d_omega, d_omega_dot, d_moment = (
             (after - before) / step for after, before in zip(moved, self._turning, strict=True)
         )
@@ -210,7 +210,7 @@ class ArmChanges:
 
 
 def _each(x: Array, step: float) -> Array:
-    """Each of the components moved, shapes (n, 3) -> (3, n, 3)."""
+    """Return copies with one component changed in each, shapes (n, 3) -> (3, n, 3)."""
     out = np.repeat(components(x)[:, None], 3, axis=1)
     out[range(3), range(3)] += step
     return out.transpose(1, 2, 0)
@@ -219,7 +219,7 @@ def _each(x: Array, step: float) -> Array:
 def _changes(
     R: Array, h: Array, omega: Array, omega_dot: Array, v: Array, v_dot: Array, moment: Array, force: Array
 ) -> ArmData:
-    """Put together; what does not change broadcasts to the rest."""
+    """Assemble the changes; unchanged parts broadcast."""
     shape = force.shape
     h, *rest = (np.broadcast_to(part, shape) for part in (h, omega, v, omega_dot, v_dot, moment, force))
     twist, twist_dot, wrench = (np.concatenate(rest[k : k + 2], axis=-1) for k in (0, 2, 4))

@@ -1,4 +1,4 @@
-"""Arms as they are: deviations from the design, their JSON, and the frames that encoder zeros define."""
+"""Arms with deviations from the design, their JSON, and the frames that encoder zeros define."""
 
 from __future__ import annotations
 
@@ -41,25 +41,25 @@ GROUPS = (
     Group("rod_mass_ratio", "", _LEGS),
     Group("wrist_mass_ratio", "", ("",)),
 )
-"""What ``ArmUnit.x`` holds, in order. Zeros are reading minus truth; lengths and ratios as built minus design; a
-radius is the base's minus the platform's, which is all that kinematics sees of the two."""
+"""Groups in ``ArmUnit.x``, in order. Zeros are reading minus truth; lengths and ratios are as built minus design. A
+radius is the base's minus the platform's, because the kinematics depends only on this difference."""
 _ENDS = np.cumsum([0, *(len(group.entries) for group in GROUPS)])
 AT: dict[str, slice] = {
     group.name: slice(int(first), int(last))
     for group, first, last in zip(GROUPS, _ENDS, _ENDS[1:], strict=False)
 }
-"""Where each group lies in ``ArmUnit.x``."""
+"""Slice of each group in ``ArmUnit.x``."""
 COUNT = int(_ENDS[-1])
 
 
 @dataclass(frozen=True, eq=False)
 class ArmUnit:
-    """One arm as it is, or several side by side in leading axes of ``x``; numbers have the names of ``OmnidDesign``.
+    """One arm with its deviations, or several in leading axes of ``x``; properties have the names of ``OmnidDesign``.
 
-    Lengths and masses of legs have shape (..., 3). Inertias grow with the mass, centres of mass stay as designed.
+    Lengths and masses of legs have shape (..., 3). Inertias scale with the mass; centres of mass stay as designed.
 
     Attributes:
-        design: what all arms of the kind have in common.
+        design: common design of the arms.
         x: deviations from it, in the order of ``GROUPS``, shape (..., ``COUNT``).
     """
 
@@ -67,15 +67,15 @@ class ArmUnit:
     x: Array
 
     def of(self, name: str) -> Array:
-        """Deviations of one group, shape (..., entries)."""
+        """Return the deviations of one group, shape (..., entries)."""
         return self.x[..., AT[name]]
 
     def moved(self, dx: Array) -> ArmUnit:
-        """With deviations added, shape (..., ``COUNT``)."""
+        """Add deviations of shape (..., ``COUNT``)."""
         return replace(self, x=self.x + dx)
 
     def true_tau(self, reading: Array) -> Array:
-        """Spring torques [N m] from readings, which take the springs to be as designed."""
+        """Convert readings, which assume springs as designed, to true spring torques [N m]."""
         return (reading - self.of("tau_zero")) * (1.0 + self.of("stiffness_ratio"))
 
     @property
@@ -92,83 +92,83 @@ class ArmUnit:
 
     @property
     def radius_m(self) -> Array:
-        """Base radius minus platform radius."""
+        """Base radius minus platform radius [m]."""
         return self.design.radius_m + self.of("radius")
 
     @property
     def proximal_length_m(self) -> Array:
-        """Driven axis to knee."""
+        """Distance from driven axis to knee [m]."""
         return self.design.proximal_length_m + self.of("proximal_length")
 
     @property
     def rod_length_m(self) -> Array:
-        """Knee to platform joint."""
+        """Distance from knee to platform joint [m]."""
         return self.design.rod_length_m + self.of("rod_length")
 
     @property
     def proximal_mass_kg(self) -> Array:
-        """Mass of a driven link."""
+        """Mass of a driven link [kg]."""
         return self.design.proximal_mass_kg * (1.0 + self.of("proximal_mass_ratio"))
 
     @property
     def proximal_com_m(self) -> float:
-        """Driven axis to the link's centre of mass."""
+        """Distance from driven axis to the link's centre of mass [m]."""
         return self.design.proximal_com_m
 
     @property
     def proximal_inertia_kgm2(self) -> Array:
-        """Inertia of a driven link about its axis."""
+        """Inertia of a driven link about its axis [kg m^2]."""
         return self.design.proximal_inertia_kgm2 * (1.0 + self.of("proximal_mass_ratio"))
 
     @property
     def rod_mass_kg(self) -> Array:
-        """Mass of a leg's rod, or rods."""
+        """Total mass of the rods of a leg [kg]."""
         return self.design.rod_mass_kg * (1.0 + self.of("rod_mass_ratio"))
 
     @property
     def wrist_mass_kg(self) -> Array:
-        """Mass of all that translates with the wrist, shape (..., 1)."""
+        """Mass of all bodies that translate with the wrist [kg], shape (..., 1)."""
         return self.design.wrist_mass_kg * (1.0 + self.of("wrist_mass_ratio"))
 
     @property
     def yoke_inertia_kgm2(self) -> Triple:
-        """Principal moments of the gimbal's first body."""
+        """Principal moments of the gimbal's first body [kg m^2]."""
         return self.design.yoke_inertia_kgm2
 
     @property
     def ring_inertia_kgm2(self) -> Triple:
-        """Principal moments of its second body."""
+        """Principal moments of the gimbal's second body [kg m^2]."""
         return self.design.ring_inertia_kgm2
 
     @property
     def flange_inertia_kgm2(self) -> Triple:
-        """Principal moments of its last body."""
+        """Principal moments of the gimbal's last body [kg m^2]."""
         return self.design.flange_inertia_kgm2
 
     @property
     def gravity_mps2(self) -> float:
-        """Magnitude of gravity."""
+        """Magnitude of gravity [m/s^2]."""
         return self.design.gravity_mps2
 
 
 Arms = OmnidDesign | ArmUnit
-"""One arm or several: as designed, all alike, or as they are, side by side in leading axes of ``ArmUnit.x``."""
+"""One arm or several: all as designed, or with deviations, in leading axes of ``ArmUnit.x``."""
 
 
 def design_of(arms: Arms) -> OmnidDesign:
-    """What arms are meant to be."""
+    """Return the common design of arms."""
     return arms.design if isinstance(arms, ArmUnit) else arms
 
 
 def arm_of(arms: Arms, robot: int) -> Arms:
-    """The arm of one robot (from 0) among several."""
+    """Return the arm of one robot (from 0) among several."""
     return ArmUnit(arms.design, arms.x[robot]) if isinstance(arms, ArmUnit) else arms
 
 
 def true_joints(arms: Arms, phi: Array, theta: Array, tau: Array) -> tuple[Array, Array, Array]:
-    """True driven angles [rad], gimbal angles [rad] and spring torques [N m] from readings, shape (..., 3) each.
+    """Convert readings to true driven angles [rad], gimbal angles [rad] and spring torques [N m], shape (..., 3) each.
 
-    Arms as designed read the truth: the arrays themselves come back.
+    Arms as designed have exact readings: the function returns the arrays themselves.
     """
     if not isinstance(arms, ArmUnit):
         return phi, theta, tau
@@ -176,22 +176,22 @@ def true_joints(arms: Arms, phi: Array, theta: Array, tau: Array) -> tuple[Array
 
 
 def levelled(arms: Arms, R: Array, h: Array) -> tuple[Array, Array]:
-    """Orientations (..., 3, 3) and wrists (..., 3) [m] from the arms' own frames to {b}, which is level."""
+    """Rotate orientations (..., 3, 3) and wrist positions (..., 3) [m] from the arms' own frames to the level {b}."""
     if not isinstance(arms, ArmUnit) or not arms.of("tilt").any():
         return R, h
     return arms.R_ba @ R, (arms.R_ba @ h[..., None])[..., 0]
 
 
 def units_to_list(units: ArmUnit) -> list[dict[str, list[float]]]:
-    """One object per robot, with every group of ``GROUPS`` as a list; ``x`` has shape (N, ``COUNT``)."""
+    """Convert to one object per robot, with every group of ``GROUPS`` as a list; ``x`` has shape (N, ``COUNT``)."""
     return [{group.key: x[AT[group.name]].tolist() for group in GROUPS} for x in units.x]
 
 
 def units_from_list(values: list[Any], design: OmnidDesign, where: str) -> ArmUnit:
-    """Inverse of ``units_to_list``; messages call the list ``where``.
+    """Inverse of ``units_to_list``; ``where`` is the name of the list in messages.
 
     Raises:
-        InputError: a key is unknown or missing, or a value is not finite, or not such that an arm can have it.
+        InputError: a key is unknown or missing, or a value is not finite or physically impossible.
     """
     x = np.empty((len(values), COUNT))
     for i, entry in enumerate(values):
@@ -203,10 +203,10 @@ def units_from_list(values: list[Any], design: OmnidDesign, where: str) -> ArmUn
 
 
 def check_units(units: ArmUnit, where: str) -> None:
-    """Whether such arms can be: lengths and masses, and the springs' stiffness, are greater than 0.
+    """Check that lengths, masses and spring stiffnesses are greater than 0.
 
     Raises:
-        InputError: they cannot.
+        InputError: one of them is not.
     """
     for group in GROUPS:
         if group.name.endswith("_ratio"):
@@ -222,28 +222,28 @@ def check_units(units: ArmUnit, where: str) -> None:
             raise InputError(f"{where}[{robot}]: {group.key} is {value:g}; it must be greater than {least:g}")
 
 
-# The zero of theta_x turns {i} about its x axis, and no carry shows it: frames are the encoders' or the drawing's.
+# The zero of theta_x rotates {i} about its x axis and is unobservable with a payload, so results state their frames.
 ENCODERS = "frames {i} as the encoders define them: each turned about its x axis by the zero of that theta_x"
 MIXED = "Frames are the encoders' in one and the drawing's in the other: of the payload, the mass alone is compared."
 
 
 def frames_said(zero_sd_rad: float) -> str:
-    """The frames of encoders, with the tolerance of their zeros."""
+    """Describe the encoders' frames, with the standard deviation of their zeros."""
     return f"{ENCODERS} (0 +- {np.rad2deg(zero_sd_rad):.2g} deg, which is not in the standard errors)"
 
 
 def in_encoder_frames(units: ArmUnit | None) -> bool:
-    """Whether theta_x is taken as it is read, for robots as designed (None) or as calibrated."""
+    """Return whether theta_x readings are used without zeros, for robots as designed (None) or calibrated."""
     return units is None or not units.of("theta_zero")[..., 2].any()
 
 
 def seen_by_encoders(zeros: Array, R_1i: Array, p_1i: Array, *vectors: Array) -> list[Array]:
-    """What a drawing has, in the frames of encoders.
+    """Convert vectors and grasps from the drawing's frames to the encoders' frames.
 
     Args:
-        zeros: of theta_x of every robot, reading minus truth [rad], shape (N,).
+        zeros: theta_x zeros of every robot, reading minus truth [rad], shape (N,).
         R_1i, p_1i: grasp frames, shapes (N, 3, 3) and (N, 3).
-        vectors: any others in {1}, as columns.
+        vectors: other vectors in {1}, as columns.
     """
     turn = Rotation.from_rotvec(np.outer(zeros, [1.0, 0.0, 0.0])).as_matrix()
     return [turn[0].T @ R_1i @ turn, p_1i @ turn[0], *(turn[0].T @ vector for vector in vectors)]

@@ -1,1 +1,1 @@
-"""Robots as they are: geometry, springs, zeros and masses from recordings of a team that carries one payload."""
+"""Calibrate geometry, springs, zeros and masses of robots from recordings of a team that carries one payload."""

@@ -1,4 +1,4 @@
-"""Calibrate a team from recordings of what it carries: from recordings to a ``Calibration``."""
+"""Calibrate a team of robots from recordings of the payloads that it carries."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from estimator.recording.model import Recording
 from estimator.rigid_team import Bases, Shared, robot_data, start_bases
 
 LEAST_ROWS = 8
-"""Fewest rows of a recording that are worth a fit. Chosen: two seconds of motion."""
+"""Fewest rows of a usable recording. Chosen: two seconds of motion."""
 
 
 def calibrate(
@@ -36,20 +36,20 @@ def calibrate(
     robots: Calibration | None = None,
     starts: Mapping[str | None, PayloadEstimate] | None = None,
 ) -> Calibration:
-    """Geometry, springs, zeros and, where asked, masses of every robot, with what they carry.
+    """Estimate geometry, springs, zeros and optionally masses of every robot, together with the payloads.
 
     One nonlinear least squares over closed loops and balance of wrenches of all recordings. Recordings with the same
-    payload label are of one payload; without labels all are.
+    payload label share one payload; without labels all do.
 
     Args:
         recordings: trials with a payload, of the same robots.
-        free: recordings of the same robots with nothing in their hands.
-        prior: how far the robots may be off; None for robots out of the box.
-        known_mass: weighed mass of payloads by label, with its standard error [kg]; "" for one without a label.
-        say: takes the name of the stage that begins.
-        robots: an earlier calibration of the same robots, which are held as it found them: the payloads alone are
-            estimated, and its covariance goes on to theirs. Excludes ``free``, ``prior`` and ``known_mass``.
-        starts: what ``start_estimate`` makes of each payload's recordings, by its label; None to make it here.
+        free: recordings of the same robots, unloaded.
+        prior: prior of the robots; None for uncalibrated robots.
+        known_mass: weighed mass of payloads by label, with its standard error [kg]; "" for a payload without a label.
+        say: callback for the name of each stage.
+        robots: an earlier calibration of the same robots. They are held, only the payloads are estimated, and its
+            covariance propagates to theirs. Excludes ``free``, ``prior`` and ``known_mass``.
+        starts: result of ``start_estimate`` for each payload label; None to compute it here.
 
     Raises:
         InputError: the recordings do not belong together, do not move enough, or cannot be solved.
@@ -126,13 +126,13 @@ def calibrate(
 
 
 def start_estimate(trials: Sequence[Trial]) -> PayloadEstimate:
-    """What a calibration starts from: grasps, mass, centre of mass and inertia as robots as designed would have them.
+    """Estimate grasps, mass, centre of mass and inertia with robots as designed, as the start of a calibration.
 
     Args:
-        trials: of one payload, processed by ``trial_of``.
+        trials: trials of one payload, processed by ``trial_of``.
 
     Raises:
-        InputError: they are not of one payload, or tell nothing of it.
+        InputError: the trials are of different payloads, or determine nothing.
     """
     return estimate_from_trials(trials, "auto", compare_masses=True, withhold=False)
 
@@ -197,7 +197,7 @@ def _start(estimate: PayloadEstimate, members: Sequence[Recording]) -> Shared:
 
 
 def bases_of(rows: Rows, units: ArmUnit, shared: Shared) -> Bases:
-    """Where the robots stood in a trial, from the averages of its rows."""
+    """Return the base poses of the robots in a trial, from its mean signals per row."""
     data = robot_data(corrected(rows(rows.s), units), units)
     return start_bases(data.R_bi, data.h, shared)
 
@@ -226,7 +226,7 @@ def _weights(known: Mapping[str, tuple[float, float]], labels: Sequence[str | No
 def _trials(
     found: Fit, recordings: Sequence[Recording], free: Sequence[Recording], payload_of: Sequence[int]
 ) -> tuple[CalibratedTrial, ...]:
-    """How well every recording fits, free ones last."""
+    """Summarize the fit of every recording, free ones last."""
     out, share = [], shares(found)
     for k, (recording, left) in enumerate(zip(recordings, held_out(found), strict=True)):
         done = found.point.trials[k]

@@ -1,4 +1,4 @@
-"""A calibration: the robots as they are, what they carried, how well each is known, and how well it predicts."""
+"""Result of a calibration: robots with their deviations, payloads, uncertainties and quality of fit."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from estimator.rigid_team import Bases
 from estimator.strict import check_known, is_number, read_toml
 
 GRASPS, INERTIAL = "grasps", "inertial_parameters"
-"""Kinds of unknowns besides ``GROUPS``, in ``CalibratedTrial.shares``."""
+"""Kinds of unknowns in ``CalibratedTrial.shares`` besides ``GROUPS``."""
 MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
 
 
 @dataclass(frozen=True)
 class Prior:
-    """Standard deviations of the deviations in ``estimator.arm.unit.GROUPS``; 0 holds a group as designed.
+    """Prior standard deviations of the deviations in ``estimator.arm.unit.GROUPS``; 0 holds a group as designed.
 
-    The defaults are the spread of robots out of the box that reproduces the errors of the paper's team. A wrong prior
-    hardly matters where the data tell: three times too narrow or too wide gives the same.
+    The defaults describe uncalibrated robots and reproduce the errors of the paper's team. If the data determine the
+    deviations, the prior matters little: a factor of three either way gives the same result.
 
     Attributes:
         encoder_zero_rad: of phi, theta_z and theta_y zeros [rad]; theta_x zeros only turn the grasp frames.
@@ -39,8 +39,8 @@ class Prior:
         stiffness_ratio: of each spring's relative stiffness [-]; their mean is held unless a weight is known.
         tau_zero_Nm: of each torque zero [N m].
         tilt_rad: of a base about x and y [rad].
-        arm_mass_ratio: of the mass of each proximal link and rod and of all at the wrist, relative [-].
-        arm_weight_ratio: of all arms' masses together, relative [-].
+        arm_mass_ratio: of the mass of each proximal link, each rod and the wrist, relative [-].
+        arm_weight_ratio: of the common factor of all arm masses, relative [-].
     """
 
     encoder_zero_rad: float = float(np.deg2rad(1.0))
@@ -52,9 +52,9 @@ class Prior:
     arm_weight_ratio: float = 0.05
 
     def factor(self, robots: int, *, hold_scale: bool) -> Array:
-        """A matrix B, shape (N ``COUNT``, k): the deviations of N robots are B z, z standard normal and independent.
+        """Return B of shape (N ``COUNT``, k): B z are deviations of N robots, with z standard normal and independent.
 
-        ``hold_scale`` makes the mean of all springs' ratios 0.
+        ``hold_scale`` constrains the mean of all springs' ratios to 0.
         """
         columns = np.diag(np.tile(self._sd(), robots))
         springs = (np.arange(robots)[:, None] * COUNT + np.r_[AT["stiffness_ratio"]]).ravel()
@@ -71,7 +71,7 @@ class Prior:
         return factor[:, factor.any(axis=0)]
 
     def _sd(self) -> Array:
-        """Standard deviations in the order of ``ArmUnit.x``, shape (``COUNT``,)."""
+        """Return the standard deviations in the order of ``ArmUnit.x``, shape (``COUNT``,)."""
         out = np.zeros(COUNT)
         out[AT["phi_zero"]] = out[AT["theta_zero"]] = self.encoder_zero_rad
         out[AT["theta_zero"].stop - 1] = 0.0
@@ -84,7 +84,7 @@ class Prior:
         return out
 
     def scaled(self, factor: float) -> Prior:
-        """All of them larger or smaller."""
+        """Return the prior with all standard deviations multiplied by a factor."""
         return Prior(*(factor * getattr(self, field.name) for field in fields(self)))
 
 
@@ -97,14 +97,14 @@ LARGEST = {
     "arm_mass_ratio": 0.5,
     "arm_weight_ratio": 0.5,
 }
-"""Largest standard deviation that can be meant, by field: above, somebody wrote degrees, millimetres or percent."""
+"""Largest plausible standard deviation by field; larger values suggest degrees, millimetres or percent."""
 
 
 def read_prior(path: Path | str) -> Prior:
-    """Read a prior: any of the fields of ``Prior``, defaults for the others.
+    """Read a prior from TOML: any of the fields of ``Prior``, defaults for the others.
 
     Raises:
-        InputError: the file cannot be read, a key is unknown, or a value is outside what it may be.
+        InputError: the file cannot be read, a key is unknown, or a value is out of range.
     """
     path = Path(path)
     values = read_toml(path, "prior of a calibration")
@@ -121,15 +121,15 @@ def read_prior(path: Path | str) -> Prior:
 
 @dataclass(frozen=True, eq=False)
 class CalibratedPayload:
-    """One payload, in the frames that ``Calibration.zero_sd_rad`` speaks of.
+    """One payload, in the frames that ``Calibration.zero_sd_rad`` describes.
 
     Attributes:
         label: its name, or None.
-        grasps: grasp frames; their covariance is that of ``covariance``.
+        grasps: grasp frames; their covariance is part of ``covariance``.
         parameters: (m [kg], m p_1c [kg m], J about {1} [kg m^2]: xx, xy, xz, yy, yz, zz), shape (10,).
-        covariance: of (d_2, e_2, ...) as in ``GraspEstimate`` and the parameters, shape (6 (N - 1) + 10, .), the common
-            spring scale held.
-        by_scale: derivative of the same by that scale; its standard deviation is ``Calibration.scale_sd``.
+        covariance: of (d_2, e_2, ...) as in ``GraspEstimate`` and the parameters, shape (6 (N - 1) + 10, .), with the
+            common spring scale held.
+        by_scale: derivative of the same unknowns by that scale, whose standard deviation is ``Calibration.scale_sd``.
     """
 
     label: str | None
@@ -141,18 +141,18 @@ class CalibratedPayload:
 
 @dataclass(frozen=True, eq=False)
 class CalibratedTrial:
-    """How well one recording fits; pairs are (loops, balance), chi2 over the numbers compared.
+    """Quality of fit of one recording; pairs are (loops, balance), each chi2 per number compared.
 
     Attributes:
         kind: "random", "periodic", "static" or "free".
         payload: index into ``Calibration.payloads``, or None.
         duration_s: evaluated length [s].
-        count: numbers compared.
+        count: number of residuals.
         before: with the robots as designed, payload and bases fitted; None for a free trial.
         after: with the calibration.
-        held_out: by the calibration from all other recordings, bases fitted; None where it cannot be had.
-        bases: where the robots stood in {b1}; None for a free trial.
-        shares: its share in what is known of each kind of unknown, by name (``outcome.shares``); empty if not known.
+        held_out: predicted by the calibration from all other recordings, bases fitted; None if those do not suffice.
+        bases: base poses of the robots in {b1}; None for a free trial.
+        shares: share in the information on each kind of unknown, by name (``findings.shares``); empty if unknown.
     """
 
     name: str
@@ -169,20 +169,20 @@ class CalibratedTrial:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The result of ``calibrate``.
+    """Result of ``calibrate``.
 
     Attributes:
         units: the robots, ``x`` of shape (N, ``COUNT``).
-        covariance: of ``units.x`` in a row, the common spring scale held, shape (N ``COUNT``, N ``COUNT``).
+        covariance: of flattened ``units.x``, with the common spring scale held, shape (N ``COUNT``, N ``COUNT``).
         by_scale: derivative of ``units.x`` by that scale, shape (N, ``COUNT``).
-        scale_sd: standard deviation of the common spring scale [-]; 0 where a known weight decided it.
-        prior: what was assumed of robots beforehand.
-        payloads: what they carried.
+        scale_sd: standard deviation of the common spring scale [-]; 0 if a known weight determined it.
+        prior: prior of the robots.
+        payloads: calibrated payloads.
         trials: the recordings, in the order given, free ones last.
-        known_mass: labels of payloads whose weight was known.
-        steps: Gauss-Newton steps taken.
-        findings: what a reader must know before trusting the numbers, one sentence each.
-        open: what these recordings do not decide, and what would, one sentence each.
+        known_mass: labels of payloads with known weight.
+        steps: number of Gauss-Newton steps.
+        findings: caveats on the numbers, one sentence each.
+        open: what these recordings do not determine, and what would, one sentence each.
     """
 
     units: ArmUnit
@@ -199,7 +199,7 @@ class Calibration:
 
     @property
     def design(self) -> OmnidDesign:
-        """What all robots have in common."""
+        """Common design of all robots."""
         return self.units.design
 
     @property
@@ -209,43 +209,43 @@ class Calibration:
 
     @property
     def zero_sd_rad(self) -> float:
-        """Standard deviation of the theta_x zeros that the payloads' frames are off by; 0 in the drawing's frames."""
+        """Standard deviation of the theta_x zeros, which turn the payloads' frames; 0 in the drawing's frames."""
         return self.prior.encoder_zero_rad if in_encoder_frames(self.units) else 0.0
 
     @cached_property
     def prior_sd(self) -> Array:
-        """Prior standard deviation of every deviation, 0 where held, shape (N, ``COUNT``)."""
+        """Prior standard deviation of every deviation, 0 if held, shape (N, ``COUNT``)."""
         factor = self.prior.factor(self.robots, hold_scale=not self.known_mass)
         return np.sqrt(np.sum(factor**2, axis=1)).reshape(self.robots, COUNT)
 
     @cached_property
     def sd(self) -> Array:
-        """Standard error of every deviation, the uncertainty of a held scale included, shape (N, ``COUNT``)."""
+        """Standard error of every deviation, including the uncertainty of a held scale, shape (N, ``COUNT``)."""
         variance = np.diag(self.covariance).reshape(self.robots, COUNT)
         return np.sqrt(np.maximum(variance + (self.scale_sd * self.by_scale) ** 2, 0.0))
 
     @property
     def untouched(self) -> tuple[str, ...]:
-        """Deviations of which the recordings told hardly anything: their error is above 0.9 of the prior's."""
+        """Names of deviations with little information: their standard error exceeds 0.9 of the prior's."""
         prior, own = self.prior_sd.ravel(), np.sqrt(np.diag(self.covariance))
         names = deviation_names(self.robots)
         return tuple(names[k] for k in np.flatnonzero((prior > 0) & (own > 0.9 * prior)))
 
 
 def deviation_names(robots: int) -> list[str]:
-    """``omnid1.phi_zero1`` and so on: a name for every entry of ``ArmUnit.x``, robot by robot."""
+    """Return a name for every entry of ``ArmUnit.x``, robot by robot: ``omnid1.phi_zero1`` and so on."""
     entries = [f"{group.name}{entry}" for group in GROUPS for entry in group.entries]
     return [f"omnid{robot}.{entry}" for robot in range(1, robots + 1) for entry in entries]
 
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A payload's mass, centre of mass in {1}, inertia about it in the axes of {1}, and principal moments.
+    """Mass of a payload, centre of mass in {1}, inertia about it in the axes of {1}, and principal moments.
 
     Attributes:
-        covariance: of the mass, p_1c and xx, xy, xz, yy, yz, zz of the inertia, that of a held spring scale included,
+        covariance: of the mass, p_1c and xx, xy, xz, yy, yz, zz of the inertia, including that of a held spring scale,
             shape (10, 10).
-        by_scale: derivative of the same by the common spring scale, shape (10,).
+        by_scale: derivative of the same quantities by the common spring scale, shape (10,).
     """
 
     mass_kg: float
@@ -272,17 +272,17 @@ class Carried:
 
 
 def grasps_of(payload: CalibratedPayload, scale_sd: float) -> GraspEstimate:
-    """A payload's grasps with the error of a held spring scale in their covariance."""
+    """Return a payload's grasps with the uncertainty of a held spring scale added to their covariance."""
     by_scale = payload.by_scale[:-10]
     covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
     return replace(payload.grasps, covariance=covariance)
 
 
 def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
-    """Numbers about the centre of mass; ``scale_sd`` is that of ``Calibration``."""
+    """Convert a payload's parameters to its centre of mass; ``scale_sd`` is that of ``Calibration``."""
     at = payload.parameters
     values = about_com(at)
-    step = np.maximum(np.abs(at), 1e-3)  # parameters of different units
+    step = np.maximum(np.abs(at), 1e-3)  # the parameters have different units
     J = numerical_jacobian(lambda x: about_com(at + step * x), np.zeros(10)) / step
     by_scale = J @ payload.by_scale[-10:]
     covariance = J @ payload.covariance[-10:, -10:] @ J.T + scale_sd**2 * np.outer(by_scale, by_scale)
@@ -292,12 +292,12 @@ def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:
 
 
 def calibrated(recording: Recording, calibration: Calibration, called: str = "the calibration") -> Recording:
-    """A recording with the calibration's robots in its metadata; its samples stay as they were read.
+    """Put the calibration's robots into the metadata of a recording; its samples stay unchanged.
 
-    What the metadata said of the robots before gives way. ``called`` is how messages call the calibration.
+    Robots already in the metadata are replaced. ``called`` is the name of the calibration in messages.
 
     Raises:
-        InputError: it is of another number of robots, or of another design.
+        InputError: the recording has another number of robots or another design.
     """
     metadata = recording.metadata
     units = units_for(calibration, metadata.robots, metadata.design, recording.name, called)
@@ -307,10 +307,10 @@ def calibrated(recording: Recording, calibration: Calibration, called: str = "th
 def units_for(
     calibration: Calibration, robots: int, design: OmnidDesign, name: str, called: str = "the calibration"
 ) -> ArmUnit:
-    """The calibration's robots, for a log of so many robots of a design; messages use the names of both.
+    """Return the calibration's robots, after a check of number and design; messages use ``name`` and ``called``.
 
     Raises:
-        InputError: it is of another number of robots, or of another design.
+        InputError: the log has another number of robots or another design.
     """
     if calibration.robots != robots:
         raise InputError(

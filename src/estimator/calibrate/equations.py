@@ -1,9 +1,9 @@
-"""Loops and balance of one trial as rows, with their derivatives by the unknowns and the covariance of their noise.
+"""Rows of loops and balance of one trial, with derivatives by the unknowns and the covariance of their noise.
 
-Residual and signs as in ``estimator.rigid_team``, here of robots as they are. The residual is evaluated at the
-thinned instants and averaged into rows; derivatives are taken at the rows' mean signals, which vary slowly, after these
-were adjusted towards the model (W. E. Deming, Statistical Adjustment of Data, 1943; in geodesy the Gauss-Helmert
-model): of signals as measured, noise is in derivative and residual alike, and shrank the mass by 3.6 %.
+Residuals and signs are those of ``estimator.rigid_team``, with the robots' deviations. The residual is evaluated at
+the thinned instants and averaged into rows. Derivatives are evaluated at the rows' mean signals, which vary slowly.
+These signals are first adjusted to the model (W. E. Deming, Statistical Adjustment of Data, 1943; Gauss-Helmert model
+in geodesy). Without the adjustment, derivative and residual share the same noise, which biases the mass by -3.6 %.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from estimator.so3 import cross
 
 
 def corrected(s: Array, units: ArmUnit) -> Array:
-    """True signals of the robots from what they read, shape (..., N, ``SLOTS``)."""
+    """Convert sensor readings to true signals, shape (..., N, ``SLOTS``)."""
     s = s.copy()
     s[..., PHI], s[..., THETA], s[..., TAU] = true_joints(units, s[..., PHI], s[..., THETA], s[..., TAU])
     return s
@@ -50,11 +50,11 @@ _AXES = np.eye(3)[:, :2]
 
 
 def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array]:
-    """Derivatives of the loops' 6 (N - 1) channels; n rows.
+    """Return derivatives of the loops' 6 (N - 1) channels in n rows.
 
     Returns:
-        By the robots' deviations, shape (n, 6 (N - 1), N, ``COUNT``), by ``Shared.moved``, (n, ., 6 (N - 1) + 10), and
-        by ``Bases.moved``, (n, ., 4 (N - 1)).
+        Derivatives by the robots' deviations, shape (n, 6 (N - 1), N, ``COUNT``); by ``Shared.moved``, (n, ., 6 (N -
+        1) + 10); and by ``Bases.moved``, (n, ., 4 (N - 1)).
     """
     s = corrected(rows.s, units)
     R_bi, h, turn, shift = _by_unit(s, units)
@@ -83,7 +83,7 @@ def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -
 
 
 def _by_unit(s: Array, units: ArmUnit) -> tuple[Array, Array, Array, Array]:
-    """R_bi, h, and how deviations turn and shift them, shape (q, N, 3, len(_POSE)), in level base frames."""
+    """Return R_bi, h, and their rotations and shifts per deviation, (q, N, 3, len(_POSE)), in level base frames."""
     phi, theta = s[..., PHI], s[..., THETA]
     legs = leg_geometry(phi, units)
     R_ai = rotation(theta)
@@ -101,18 +101,18 @@ def _by_unit(s: Array, units: ArmUnit) -> tuple[Array, Array, Array, Array]:
     return R_bi, h, turn, shift
 
 
-# Value, rate and acceleration of each joint; the three torques.
+# Signals with correlated noise: value, rate and acceleration of each joint; the three torques.
 _CHAINS = [np.array([first + k + 3 * order for order in range(3)]) for first in (0, 9) for k in range(3)] + [
     np.arange(18, 21)
 ]
 
 
 def covariance_of(J: Array, noise: Array) -> Array:
-    """Covariance of the rows' residual, shape (n, C, C).
+    """Return the covariance of the rows' residual, shape (n, C, C).
 
     Args:
-        J: derivative by the rows' signals, shape (n, C, N, ``SLOTS``).
-        noise: theirs, as ``noise_of`` has it.
+        J: derivative of the residual by the rows' signals, shape (n, C, N, ``SLOTS``).
+        noise: covariance of the signals, as from ``noise_of``.
     """
     total = np.zeros((len(J), J.shape[1], J.shape[1]))
     for robot in range(J.shape[2]):
@@ -123,12 +123,12 @@ def covariance_of(J: Array, noise: Array) -> Array:
 
 
 def adjustment_of(J: Array, noise: Array, covariance: Array, residual: Array) -> Array:
-    """The likeliest change of the rows' signals that makes loops and balance close, shape (n, N, ``SLOTS``).
+    """Return the likeliest change of the rows' signals that makes loops and balance zero, shape (n, N, ``SLOTS``).
 
     Args:
         J, noise: as for ``covariance_of``.
-        covariance: what that gives.
-        residual: what is to be closed, shape (n, C).
+        covariance: result of ``covariance_of``.
+        residual: residual to remove, shape (n, C).
     """
     weighed = np.linalg.solve(covariance, residual[..., None])
     out = np.zeros((len(J), J.shape[2], SLOTS))
@@ -140,7 +140,7 @@ def adjustment_of(J: Array, noise: Array, covariance: Array, residual: Array) ->
 
 
 def noise_of(rows: Rows, variances: tuple[Array, Array]) -> Array:
-    """Covariance of every joint's (value, rate, acceleration) and of every torque in the rows: (n, N, 7, 3, 3)."""
+    """Return the covariance of (value, rate, acceleration) per joint, and of the torques, (n, N, 7, 3, 3)."""
     moving, held = variances
     n, N = moving.shape[:2]
     out = np.zeros((n, N, 7, 3, 3))
@@ -159,11 +159,11 @@ class Rowed(NamedTuple):
     Attributes:
         residual: shape (n, C).
         by_units: derivative by every robot's deviations, shape (n, C, N, ``COUNT``).
-        by_carried: by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
-        by_bases: by ``Bases.moved``, shape (n, C, 4 (N - 1)).
-        covariance: of the residual's noise as it counts: errors that come again are not averaged out, shape (n, C, C).
-        scatter: of the residual's noise as it shows, shape (n, C, C).
-        adjustment: what moves the rows' signals towards the model, shape (n, N, ``SLOTS``).
+        by_carried: derivative by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
+        by_bases: derivative by ``Bases.moved``, shape (n, C, 4 (N - 1)).
+        covariance: of the residual noise for the fit: repeating errors do not average out, shape (n, C, C).
+        scatter: of the residual noise as visible in the scatter of the rows, shape (n, C, C).
+        adjustment: change of the rows' signals towards the model, shape (n, N, ``SLOTS``).
     """
 
     residual: Array
@@ -176,7 +176,7 @@ class Rowed(NamedTuple):
 
 
 class Curvature(NamedTuple):
-    """Corrections of the balance's derivatives for motion within a row; shapes as of ``Rowed``, with 6 channels."""
+    """Corrections of the balance's derivatives for motion within a row; shapes as in ``Rowed``, with 6 channels."""
 
     by_units: Array
     by_carried: Array
@@ -184,14 +184,14 @@ class Curvature(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TrialEquations:
-    """One trial's rows for any values of the unknowns.
+    """Rows of one trial as a function of the unknowns.
 
     Attributes:
-        rows: its signals, and how they are averaged.
-        variances: of one sample in motion, as it counts, and of a hold's mean, shape (n, N, 9) each.
-        shown: the same, as it shows.
+        rows: signals of the trial and their averaging.
+        variances: for the fit, of one sample in motion and of a hold's mean, shape (n, N, 9) each.
+        shown: the same, as visible in the scatter of the rows.
         mean: averaged readings, shape (n, N, ``SLOTS``).
-        held: whether derivatives by the robots' lengths and masses are left out (0), for nobody asks.
+        held: whether to omit derivatives by the robots' lengths and masses (set to 0).
     """
 
     rows: Rows
@@ -202,15 +202,15 @@ class TrialEquations:
 
     @classmethod
     def of(cls, rows: Rows, sensing: Sensing, *, held: bool = False) -> TrialEquations:
-        """Equations of a trial whose sensors are known."""
+        """Make the equations of a trial from its rows and the resolution of its sensors."""
         mean = rows(rows.s)
-        # A hold is at rest: what rates it shows are noise.
+        # Rates in a hold are noise.
         mean[rows.moving :, :, 3:9] = mean[rows.moving :, :, 12:18] = 0.0
         shown = sensing.variances(replace(rows, repeats=1.0))
         return cls(rows, sensing.variances(rows), shown, mean, held)
 
     def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
-        """Rows of the residual, shape (n, C)."""
+        """Return the rows of the residual, shape (n, C)."""
         data = robot_data(corrected(self.rows.s, units), units)
         pose = pose_error(data.R_bi, data.h, shared, bases)
         force, moment = total_wrench(data.wrench, shared.grasps)
@@ -221,11 +221,12 @@ class TrialEquations:
     def curvature(
         self, units: ArmUnit, shared: Shared, bases: Bases, before: Curvature | None = None
     ) -> Curvature:
-        """What the balance's derivatives, averaged over each row, have beyond those at its mean signals.
+        """Return the row average of the balance's derivatives minus their value at the mean signals.
 
-        Those by the payload are averaged over all instants: one that turns about one axis shows moments of inertia
-        about the others by products of rates, which mean rates do not tell. At rest there is none, but noise of rates.
-        Those by the robots take longer and vary less: they are as found ``before``.
+        Derivatives by the payload are averaged over all instants. If the payload turns about one axis, products of
+        rates determine moments of inertia about the other axes, and mean rates lose them. Holds get no correction,
+        because their rates are noise. Derivatives by the robots are slower to compute and vary less, so ``before``
+        supplies them if given.
         """
         s, mean = corrected(self.rows.s, units), corrected(self.mean, units)
         fine, coarse = (_by_carried(robot_data(x, units), units, shared)[:, -6:] for x in (s, mean))
@@ -240,7 +241,7 @@ class TrialEquations:
                 _by_robots(x, units, shared, bases)[1][:, -6:]
                 for x in (corrected(self.rows.s[::every], units), mean)
             )
-            # Each instant stands for those around it.
+            # Nearest-neighbour interpolation.
             near = np.minimum((np.arange(len(s)) + every // 2) // every, len(fine) - 1)
             by_units = self.rows(fine[near]) - coarse
             by_units[self.rows.moving :] = 0.0
@@ -254,12 +255,12 @@ class TrialEquations:
         adjustment: Array | None = None,
         curvature: Curvature | None = None,
     ) -> Rowed:
-        """Everything at some unknowns.
+        """Evaluate residual, derivatives and covariances at some unknowns.
 
         Args:
             units, shared, bases: the unknowns.
-            adjustment: of the signals, as found at unknowns near these; None for none yet.
-            curvature: of the balance's derivatives, as found at unknowns near these; None to leave it out.
+            adjustment: signal adjustment from nearby unknowns; None at first.
+            curvature: curvature of the balance's derivatives from nearby unknowns; None to omit it.
         """
         s = corrected(self.mean, units)
         if adjustment is not None:
@@ -268,8 +269,8 @@ class TrialEquations:
         by_signals, by_units = _by_robots(s, units, shared, bases, held=self.held)
         by_carried = _by_carried(robot_data(s, units), units, shared)
         by_bases = np.zeros((*residual.shape, 4 * (shared.grasps.robots - 1)))
-        # Loops alone hardly tell a common scale of all lengths, and an error of a thousandth in one derivative would
-        # hide it: theirs are averaged exactly.
+        # Loops barely determine a common scale of all lengths; a relative error of 1e-3 in one derivative would hide
+        # it. So derivatives of loops are averaged exactly.
         loops = slice(0, residual.shape[1] - 6)
         by_units[:, loops], by_carried[:, loops], by_bases[:, loops] = pose_derivatives(
             self.rows, units, shared, bases
@@ -286,11 +287,12 @@ class TrialEquations:
 
 
 class _Motion(NamedTuple):
-    """Motion of the payload in {1}: its twist and that one's rate, shape (Q, 6) each, and what goes with it.
+    """Motion of the payload in {1}.
 
     Attributes:
-        up: direction against gravity, shape (Q, 3).
-        length: of the sum of the robots' directions that it is the mean of, shape (Q, 1).
+        twist, twist_dot: twist and its rate, shape (Q, 6) each.
+        up: direction against gravity, the mean over the robots, shape (Q, 3).
+        length: length of the sum of the robots' directions, shape (Q, 1).
         G: V_1 = G [V_1; ...; V_N], shape (6, 6 N).
     """
 
@@ -301,14 +303,14 @@ class _Motion(NamedTuple):
     G: Array
 
     def regressor(self, units: ArmUnit) -> Array:
-        """What moves the payload, by its ten inertial parameters, shape (Q, 6, 10)."""
+        """Return the regressor of the wrench by the ten inertial parameters, shape (Q, 6, 10)."""
         omega = self.twist[:, :3]
         specific = self.twist_dot[:, 3:] + cross(omega, self.twist[:, 3:]) + units.gravity_mps2 * self.up
         return newton_euler_regressor(omega, self.twist_dot[:, :3], specific)
 
 
 def _ratio(units: ArmUnit) -> float:
-    """Weights as equal encoders would have them, which turn the driven links and so move the wrist."""
+    """Return the weight of linear residuals for equal encoder noise, which moves the wrist through the driven links."""
     return 1.0 / units.design.proximal_length_m
 
 
@@ -323,7 +325,7 @@ def _motion(data: ArmData, units: ArmUnit, shared: Shared) -> _Motion:
 def _by_robots(
     s: Array, units: ArmUnit, shared: Shared, bases: Bases, *, held: bool = False
 ) -> tuple[Array, Array]:
-    """Derivatives of the residual by signals (n, C, N, ``SLOTS``) and units (n, C, N, ``COUNT``)."""
+    """Return derivatives of the residual by signals (n, C, N, ``SLOTS``) and by units (n, C, N, ``COUNT``)."""
     n, N = s.shape[:2]
     data = robot_data(s, units)
     motion = _motion(data, units, shared)
@@ -347,7 +349,7 @@ def _by_robots(
 def _chain(
     i: int, d: ArmData, R_bi: Array, motion: _Motion, shared: Shared, bases: Bases, gravity: float
 ) -> Array:
-    """What changes d of robot i's data, shapes (K, n, ...), do to the residual, shape (K, n, C)."""
+    """Return the changes of the residual, (K, n, C), due to changes d of robot i's data, (K, n, ...)."""
     grasps = shared.grasps
     out = np.zeros((*d.h.shape[:2], 6 * grasps.robots))
     turn = vee(d.R_bi @ np.swapaxes(R_bi, -1, -2))
@@ -370,7 +372,7 @@ def _chain(
 
 
 def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
-    """Derivative of the balance by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10); zero for the loops."""
+    """Return the derivative of the balance by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10); zero for the loops."""
     motion = _motion(data, units, shared)
     n, N = data.h.shape[:2]
     grasped = 6 * (N - 1)
@@ -393,10 +395,10 @@ _UNIT_STEPS = np.concatenate([np.full(11, 1e-6), np.full(7, 1e-4)])
 
 @dataclass(frozen=True, eq=False)
 class AloneEquations:
-    """Rows of one recording of unloaded arms, whose inverse dynamics must give the springs' torques.
+    """Rows of one recording of unloaded arms, whose inverse dynamics must equal the spring torques.
 
     Attributes:
-        rows: its signals, and how they are averaged.
+        rows: signals of the recording and their averaging.
         variances: of one sample in motion and of a hold's mean, shape (n, N, 9) each.
         mean: averaged readings, shape (n, N, 21).
     """
@@ -407,17 +409,17 @@ class AloneEquations:
 
     @classmethod
     def of(cls, rows: Rows, sensing: Sensing) -> AloneEquations:
-        """Equations of a recording whose sensors are known."""
+        """Make the equations of a recording from its rows and the resolution of its sensors."""
         mean = rows(rows.s)
         mean[rows.moving :, :, 3:9] = 0.0
         return cls(rows, sensing.variances(rows), mean)
 
     def residual(self, units: ArmUnit) -> Array:
-        """Spring torques minus those that move the arm, shape (n, N, 3) [N m]."""
+        """Return spring torques minus the torques that move the arm, shape (n, N, 3) [N m]."""
         return self.rows(_left(corrected(self.rows.s, units), units))
 
     def at(self, units: ArmUnit) -> tuple[Array, Array, Array]:
-        """Residual (n, N, 3), derivative by own deviations (n, N, 3, ``COUNT``), covariance (n, N, 3, 3)."""
+        """Return residual (n, N, 3), derivative by own deviations (n, N, 3, ``COUNT``), covariance (n, N, 3, 3)."""
         s = corrected(self.mean, units)
         base = _left(s, units)
         by_signals = np.zeros((*base.shape, 9))

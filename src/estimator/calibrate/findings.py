@@ -1,7 +1,7 @@
-"""What a calibration is worth: misfits and their causes, trials left out, shares of recordings, what stays open.
+"""Assess a calibration: misfits and their causes, held-out trials, shares of recordings, open questions.
 
-The problem is linear near its solution, so "what if" takes one solution of normal equations. Only where a misfit has no
-such explanation, the calibration is repeated without each recording.
+The problem is nearly linear at its solution, so each alternative takes one solution of the normal equations. Only if
+no alternative explains a misfit, the calibration is repeated without each recording.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from estimator.calibrate.least_squares import Fit, Given, Quadratic, fit, normal
 from estimator.errors import InputError
 
 UNKNOWN_MASSES = 0.05
-"""Relative error of arm masses that is taken for granted where nobody has weighed them."""
+"""Assumed relative error of arm masses that were not weighed."""
 _SENSORS = (
     ("phi_zero", "the encoder of phi{entry}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
     ("theta_zero", "the encoder of theta_{axis}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
@@ -29,9 +29,9 @@ _SENSORS = (
 
 
 class Change(NamedTuple):
-    """Something that may have been otherwise in one recording (from 0) than in all others.
+    """A possible change in one recording (index from 0) relative to all others.
 
-    ``what`` says it in words; chi2 then falls by ``drop``, for so many ``unknowns``.
+    ``what`` describes it; chi2 falls by ``drop`` for this number of ``unknowns``.
     """
 
     trial: int
@@ -41,12 +41,12 @@ class Change(NamedTuple):
 
 
 def findings(found: Fit, given: Given, names: Sequence[str]) -> list[str]:
-    """Sentences on what no calibration explains; none on good recordings.
+    """Return sentences on data that the calibration does not explain; none for good recordings.
 
     Args:
         found: the calibration.
-        given: what it was made from.
-        names: of the recordings with a payload.
+        given: its input.
+        names: names of the recordings with a payload.
     """
     trials = found.point.trials
     odd = [k for k, trial in enumerate(trials) if trial.loops.misfits or trial.balance.misfits]
@@ -57,11 +57,11 @@ def findings(found: Fit, given: Given, names: Sequence[str]) -> list[str]:
             f"The calibration did not settle within {rules.MAX_STEPS} steps, so its numbers are not to be used: "
             f"{', '.join(names)} leave too much open. Add a recording of another motion."
         ]
-    if found.converged:  # elsewhere, derivatives say nothing of what would explain it
+    if found.converged:  # derivatives at another point do not predict the effect of a change
         worth = {change: _worth(found, change) for change in _changes(found, names)}
         enough = [change for change in worth if worth[change] > 0 and _suffices(found, change)]
         if enough:
-            # A slip of a last gimbal turns a grasp, too: take the simplest change that is enough.
+            # A slip of theta_x also turns a grasp: take the simplest change that suffices.
             best = min(enough, key=lambda change: (change.unknowns, -worth[change]))
             rest = "the other recordings" if len(names) > 2 else "the other recording"
             return [f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again."]
@@ -83,7 +83,7 @@ def _unexplained(found: Fit, odd: Sequence[int], names: Sequence[str]) -> str:
 
 
 def _suffices(found: Fit, change: Change) -> bool:
-    """Whether nothing would be left, or next to nothing of much: what is large is not quite linear."""
+    """Return whether a change explains the misfit, or almost all of a large one, which is not exactly linear."""
     whole = [trial.all for trial in found.point.trials]
     total, count = sum(part.c for part in whole), sum(part.count for part in whole)
     left = total - change.drop
@@ -91,17 +91,17 @@ def _suffices(found: Fit, change: Change) -> bool:
 
 
 def _worth(found: Fit, change: Change) -> float:
-    """Drop in chi2 beyond what as many free numbers buy (Schwarz)."""
+    """Return the drop in chi2 beyond the penalty for its free parameters (Schwarz's criterion)."""
     return change.drop - change.unknowns * np.log(found.point.trials[change.trial].all.count)
 
 
 def _changes(found: Fit, names: Sequence[str]) -> list[Change]:
-    """Every sensor's zero, the payload and its grasps, each otherwise in one recording."""
+    """Return the candidate changes: every sensor's zero, the payload, and its grasps, each in one recording."""
     if len(names) < 2:
         return []
     out = []
     layout, trials = found.layout, found.point.trials
-    first = [int(trial.all.index[layout.of_units.stop]) for trial in trials]  # of the payload that it carries
+    first = [int(trial.all.index[layout.of_units.stop]) for trial in trials]  # first index of its payload
     for k, trial in enumerate(trials):
         for robot in range(layout.robots):
             for group, sensor, moved, scale in _SENSORS:
@@ -124,7 +124,7 @@ def _changes(found: Fit, names: Sequence[str]) -> list[Change]:
 
 
 def _freed(found: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float, Array]:
-    """Drop in chi2 if unknowns were others in one recording and the rest refitted, and by how much they would be."""
+    """Free some unknowns in one recording and refit the rest: return the drop in chi2 and their changes."""
     own = np.searchsorted(part.index, places)
     H_ee, H_ex, g_e = part.H[np.ix_(own, own)], part.H[own], part.g[own]
     C = found.covariance[np.ix_(part.index, part.index)]
@@ -138,7 +138,7 @@ def _freed(found: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float
 
 
 def _contradicting(given: Given, names: Sequence[str]) -> str | None:
-    """A sentence on the recording without which all others fit one team of robots; None if there is none."""
+    """Return a sentence on the recording without which the others fit one team of robots, or None."""
     every = range(len(names))
     if len(every) < 2:
         return None
@@ -159,7 +159,7 @@ def _contradicting(given: Given, names: Sequence[str]) -> str | None:
 
 
 def _fits(given: Given, chosen: Sequence[int]) -> bool:
-    """Whether some of the trials, by index, fit one team of robots."""
+    """Return whether some of the trials, by index, fit one team of robots."""
     try:
         found = fit(given.only(chosen))
     except (InputError, np.linalg.LinAlgError):
@@ -169,9 +169,9 @@ def _fits(given: Given, chosen: Sequence[int]) -> bool:
 
 
 def held_out(found: Fit) -> list[tuple[float, float] | None]:
-    """chi2 per number of loops and balance of every trial with a payload; None where the others do not suffice.
+    """Return chi2/n of loops and balance of every trial, predicted from the others; None if they do not suffice.
 
-    The bases stood elsewhere in every trial and are fitted to the trial itself.
+    The bases differ in every trial, so they are fitted to the predicted trial itself.
     """
     out: list[tuple[float, float] | None] = []
     layout, point = found.layout, found.point
@@ -198,12 +198,12 @@ def held_out(found: Fit) -> list[tuple[float, float] | None]:
 
 
 def undecided(found: Fit, prior: Prior, scale_sd: float, *, alone: bool, single: list[str]) -> list[str]:
-    """Sentences on what the recordings do not decide.
+    """Return sentences on what the recordings do not determine.
 
     Args:
         found: the calibration.
-        prior: what was assumed.
-        scale_sd: standard deviation of the held common spring scale; 0 if it is not held.
+        prior: prior of the robots.
+        scale_sd: standard deviation of the held common spring scale; 0 if it is free.
         alone: whether unloaded arms were recorded.
         single: names of payloads with one recording.
     """
@@ -246,7 +246,7 @@ def undecided(found: Fit, prior: Prior, scale_sd: float, *, alone: bool, single:
 
 
 def _by_masses(found: Fit, payload: int) -> float:
-    """Relative error of a payload's mass from errors of ``UNKNOWN_MASSES`` in every arm mass alone."""
+    """Return the relative error of a payload's mass if each arm mass has an error of ``UNKNOWN_MASSES``."""
     layout, point = found.layout, found.point
     parts = [*(trial.all for trial in point.trials), *point.alone, *point.known]
     H, _ = normal_equations(parts, layout.size)
@@ -256,15 +256,15 @@ def _by_masses(found: Fit, payload: int) -> float:
 
 
 def shares(found: Fit) -> list[dict[str, float]]:
-    """Whose noise is left in the result: each recording's mean share in each kind of unknown.
+    """Return each recording's mean share in the information on each kind of unknown.
 
-    With whitened rows the covariance C of all unknowns is the sum of C H_k C over recordings, weights and the prior,
-    H_k being their information. The share of recording k in unknown j is (C H_k C)_jj / C_jj; what recordings leave of
-    1 is the prior's and that of known weights.
+    With whitened rows, the covariance C of all unknowns is the sum of C H_k C over recordings, known weights and the
+    prior, with H_k their information. The share of recording k in unknown j is (C H_k C)_jj / C_jj. The rest up to 1
+    belongs to the prior and the known weights.
 
     Returns:
-        By the names of ``GROUPS``, ``GRASPS`` and ``INERTIAL``; recordings with a payload first, then the others. Kinds
-        that are held are left out.
+        Shares by the names of ``GROUPS``, ``GRASPS`` and ``INERTIAL``; recordings with a payload first, then the
+        others. Held kinds are omitted.
     """
     layout, point, C = found.layout, found.point, found.covariance
     variance = np.diag(C)

@@ -1,9 +1,9 @@
-"""Zeros of the last gimbal joints from flanges that are known to be parallel.
+"""Determine zeros of the last gimbal joints from flanges that are known to be parallel.
 
-A calibration knows frame {i} but for a turn about its x axis, by the zero z_i of that encoder: R_1i as built is
-Rx(z_1) R_1i Rx(z_i)^T, with R_1i as the encoders define it. Where the z axes of all flanges are parallel in the
-payload's drawing, each of them must come out parallel to that of {1}: two equations per robot i >= 2 and payload. They
-leave open what turns all flanges alike: a common turn about x axes that are parallel, too. That is left to the prior.
+A calibration determines frame {i} up to a rotation about its x axis by the encoder zero z_i. R_1i as built is Rx(z_1)
+R_1i Rx(z_i)^T, with R_1i in the encoders' frames. If the z axes of all flanges are parallel in the payload's drawing,
+each must be parallel to that of {1}. This gives two equations per robot i >= 2 and payload. If the x axes of all
+flanges are parallel as well, a common rotation about them remains, and the prior determines it.
 """
 
 from __future__ import annotations
@@ -22,25 +22,26 @@ from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.estimate.uncertainty import numerical_jacobian, standard_errors
 
 FLOOR_RAD = 2e-6
-"""Error of a flange's direction beside that of its grasp: what the simulation's own welds give."""
+"""Error of a flange's direction besides the error of its grasp: compliance of the simulated welds."""
 OPEN = 0.5
-"""Share of the prior's standard deviation above which a zero, or a common turn, counts as not decided."""
+"""Share of the prior standard deviation above which a zero, or a common rotation, counts as undetermined."""
 NOT_PARALLEL_RAD = float(np.deg2rad(0.1))
-"""Angle left between flanges from which on they are not parallel: ten times what a careful workshop makes."""
+"""Remaining angle above which flanges are not parallel: ten times the tolerance of a careful workshop."""
 BEYOND_CHANCE = 7.0
-"""chi2 a degree of freedom from which on the flanges' own errors count; chance gives it once in a hundred times."""
+"""chi2 per degree of freedom above which flange errors inflate the noise; chance exceeds it once in a hundred times.
+"""
 _X = AT["theta_zero"].stop - 1
 
 
 @dataclass(frozen=True, eq=False)
 class Flanges:
-    """What parallel flanges say.
+    """Result of the parallel-flange equations.
 
     Attributes:
-        zeros: of every theta_x, reading minus truth [rad], shape (N,).
-        covariance: of them, shape (N, N).
-        by_grasps: derivative of the zeros by the errors (d_2, e_2, ...) of every payload's grasps, one after the other.
-        misfit_rad: largest angle left between a flange and that of robot 1 [rad].
+        zeros: theta_x zeros, reading minus truth [rad], shape (N,).
+        covariance: of the zeros, shape (N, N).
+        by_grasps: derivative of the zeros by the grasp errors (d_2, e_2, ...) of all payloads in sequence.
+        misfit_rad: largest remaining angle between a flange and that of robot 1 [rad].
     """
 
     zeros: Array
@@ -50,18 +51,18 @@ class Flanges:
 
 
 def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Flanges:
-    """Zeros that make all flanges parallel.
+    """Estimate the zeros that make all flanges parallel.
 
     Args:
-        payloads: of a calibration, in the frames that the encoders define.
-        sd_rad: standard deviation of a zero beforehand [rad].
+        payloads: payloads of a calibration, in the encoders' frames.
+        sd_rad: prior standard deviation of a zero [rad].
     """
     N = payloads[0].grasps.robots
     covariance = np.asarray(block_diag(*(payload.grasps.covariance for payload in payloads)))
     sign = [np.where(payload.grasps.R_1i[1:, 2, 2] < 0, -1.0, 1.0) for payload in payloads]
 
     def slant(zeros: Array, errors: Array | None = None) -> Array:
-        """z axes of the flanges of robots 2 to N across that of robot 1, all payloads, shape (P (N - 1) 2,)."""
+        """Return components of the flange z axes of robots 2 to N across that of robot 1, shape (P (N - 1) 2,)."""
         out = []
         for k, payload in enumerate(payloads):
             moved = (
@@ -72,7 +73,7 @@ def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Fl
         return np.concatenate(out).ravel()
 
     count = len(covariance)
-    # The noise's directions turn with the zeros, which is little.
+    # Neglects the small rotation of the noise covariance with the zeros.
     by_grasps = numerical_jacobian(lambda errors: slant(np.zeros(N), errors), np.zeros(count))
     noise = by_grasps @ covariance @ by_grasps.T + FLOOR_RAD**2 * np.eye(len(by_grasps))
     white = np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=float)
@@ -84,7 +85,7 @@ def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Fl
     whitened = white @ J
     spare = max(1, len(left) - N)
     chi2 = float(np.sum((white @ left) ** 2))
-    excess = chi2 / spare if chi2 > BEYOND_CHANCE * spare else 1.0  # parallel but for a little
+    excess = chi2 / spare if chi2 > BEYOND_CHANCE * spare else 1.0  # flanges are not exactly parallel
     information = whitened.T @ whitened / excess + np.eye(N) / sd_rad**2
     posterior = np.asarray(np.linalg.inv(information), dtype=float)
     by_errors = -posterior @ whitened.T @ (white @ by_grasps) / excess
@@ -92,18 +93,19 @@ def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Fl
 
 
 def turned(R_1i: Array, zeros: Array) -> Array:
-    """R_1i as built from what the encoders define, and the zeros of theta_x [rad]; shapes (N, 3, 3) and (N,)."""
+    """Return R_1i as built, from R_1i in the encoders' frames and theta_x zeros [rad]; shapes (N, 3, 3) and (N,)."""
     about_x = Rotation.from_euler("x", np.asarray(zeros)[:, None]).as_matrix()
     return about_x[0] @ R_1i @ np.swapaxes(about_x, -1, -2)
 
 
 def in_drawing_frames(calibration: Calibration) -> Calibration:
-    """A calibration with the zeros of theta_x that parallel flanges decide, in the frames of the drawings.
+    """Apply the theta_x zeros that parallel flanges determine: convert a calibration to the drawing's frames.
 
-    Correlations between these zeros and all else are left out of the covariance; payloads' own include them.
+    The robots' covariance omits correlations between these zeros and all other unknowns; the payloads' covariances
+    include them.
 
     Args:
-        calibration: in the frames that the encoders define, with at least one payload.
+        calibration: in the encoders' frames, with at least one payload.
     """
     N, payloads = calibration.robots, calibration.payloads
     found = parallel_flanges(payloads, calibration.prior.encoder_zero_rad)
@@ -135,7 +137,7 @@ def _in_drawing(
     R_as_built = turned(grasps.R_1i, found.zeros)
 
     def moved(errors: Array, zeros: Array) -> Array:
-        """(d_i, e_i, parameters) relative to the result, of errors in encoder frames and other zeros."""
+        """Return (d_i, e_i, parameters) relative to the result, for errors in the encoders' frames and other zeros."""
         held = grasps.moved(errors[:count])
         first = Rotation.from_euler("x", zeros[0]).as_matrix()
         d = Rotation.from_matrix(turned(held.R_1i, zeros) @ np.swapaxes(R_as_built, -1, -2)).as_rotvec()[1:]
@@ -156,7 +158,7 @@ def _in_drawing(
     own = np.zeros((len(found.zeros), count + 10))
     own[:, :count] = np.split(found.by_grasps, payloads, axis=1)[k]
     total = by_errors + by_zeros @ own
-    # What the zeros owe to this payload's own grasps is in ``total`` already; the rest comes on top.
+    # ``total`` already includes errors of the zeros due to this payload's grasps; add the remaining ones.
     rest = found.covariance - own @ payload.covariance @ own.T
     values, axes = np.linalg.eigh(rest)
     covariance = total @ payload.covariance @ total.T

@@ -1,19 +1,19 @@
-"""A calibration as strict JSON: plain types, no NaN, units in the keys; null is what is not known.
+"""Read and write a calibration as strict JSON: plain types, no NaN, units in the keys; null is unknown.
 
 format, version            "mocobot-calibration", 1
 robots                     N
-design                     what the robots are off from: keys of models/omnid/design.toml
-deviations                 list of N objects, one a robot, with the keys phi_zero_rad [3: legs], theta_zero_rad [3: z,
+design                     reference of the deviations: keys of models/omnid/design.toml
+deviations                 list of N objects, one per robot, with the keys phi_zero_rad [3: legs], theta_zero_rad [3: z,
                            y, x], radius_m [3: legs], proximal_length_m [3], rod_length_m [3], stiffness_ratio [3],
                            tau_zero_Nm [3], tilt_rad [2: x, y], proximal_mass_ratio [3], rod_mass_ratio [3],
                            wrist_mass_ratio [1]; each {value, se, prior_se, by_scale}, lists of that length. Zeros are
                            reading minus truth, all others as built minus design; a radius is the base's minus the
-                           platform's. ``se`` includes the uncertainty of a held spring scale; prior_se 0 marks what
-                           was held; by_scale is the derivative by the common spring scale
-covariance                 {names, matrix}: of the deviations that are not exactly known, the spring scale held; SI
-scale_sd                   standard deviation of the common spring scale [-]; 0 where a known weight decided it
+                           platform's. ``se`` includes the uncertainty of a held spring scale; prior_se 0 marks a held
+                           deviation; by_scale is the derivative by the common spring scale
+covariance                 {names, matrix}: of the deviations that are not held, with the spring scale held; SI
+scale_sd                   standard deviation of the common spring scale [-]; 0 if a known weight determined it
 prior                      {encoder_zero_rad, geometry_m, stiffness_ratio, tau_zero_Nm, tilt_rad, arm_mass_ratio,
-                           arm_weight_ratio}: standard deviations assumed of robots beforehand
+                           arm_weight_ratio}: prior standard deviations of the robots
 payloads                   list of
     label                  or null
     grasps                 list of {i, R_axis_angle_deg [3], R_se_deg [3], p_m [3], p_se_m [3]} for i = 2..N: {i} in {1}
@@ -21,26 +21,27 @@ payloads                   list of
     principal_se_kgm2 [3]  mass, centre of mass in {1}, inertia about it in the axes of {1}, and its principal moments
     parameters             {m_kg, mp_1c_kgm [3], J_1_kgm2 [6]: xx, xy, xz, yy, yz, zz about the origin of {1}}
     covariance             of (d_2, e_2, ...) as in ``GraspEstimate`` and the parameters, 6 (N - 1) + 10 square
-    by_scale               derivative of the same by the common spring scale
+    by_scale               derivative of these unknowns by the common spring scale
 trials                     list of
-    name, kind             the recording's; "random", "periodic", "static" or "free" (with nothing in the hands)
+    name, kind             name of the recording; "random", "periodic", "static" or "free" (unloaded)
     payload                index into payloads from 0; null for a free one
     duration_s             evaluated length
-    count                  {loops, balance}: numbers compared
+    count                  {loops, balance}: number of residuals
     chi2_per_n             {before, after, held_out}: with the robots as designed, with the calibration, with one from
-                           all other recordings; each {loops, balance}, or null where it cannot be had
+                           all other recordings; each {loops, balance}, or null if not available
     bases                  list of {i, yaw_deg, p_m [3]} for i = 2..N: bases in {b1}; null for a free one
-    shares                 {kind: its share in what is known of it}, by the names of the deviations without unit,
-                           "grasps" and "inertial_parameters"; the rest up to 1 is the prior's and that of known weights
-known_mass                 labels of payloads whose weight was known
+    shares                 {kind: share of the recording in the information on it}, by the names of the deviations
+                           without unit, "grasps" and "inertial_parameters"; the rest up to 1 belongs to the prior and
+                           to known weights
+known_mass                 labels of payloads with known weight
 steps                      Gauss-Newton steps
-findings                   sentences: what to know before trusting the numbers
-open                       sentences: what these recordings do not decide, and what would
+findings                   sentences: caveats on the numbers
+open                       sentences: what these recordings do not determine, and what would
 
-frames                     {defined_by, theta_x_zero_sd_deg}: "encoders", each {i} turned about its x axis by the zero
-                           of that theta_x, of which a standard deviation is assumed; or "drawing", and 0
+frames                     {defined_by, theta_x_zero_sd_deg}: "encoders" if each {i} is turned about its x axis by the
+                           zero of that theta_x, with its assumed standard deviation; or "drawing", and 0
 
-Files add ``provenance`` (``mocobot.results``); readers ignore it, ``frames`` and any other key at the top.
+Files add ``provenance`` (``mocobot.results``); readers ignore it, ``frames`` and any other top-level key.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ _KINDS = ("random", "periodic", "static", "free")
 
 
 def calibration_to_dict(calibration: Calibration) -> dict[str, Any]:
-    """A calibration as documented at the head of this module."""
+    """Convert a calibration to the format documented in this module."""
     names = deviation_names(calibration.robots)
     free = np.flatnonzero(np.diag(calibration.covariance) > 0)
     parts = {
@@ -128,14 +129,14 @@ def calibration_to_dict(calibration: Calibration) -> dict[str, Any]:
 
 
 def calibration_from_dict(values: Mapping[str, Any], where: str = "calibration") -> Calibration:
-    """Inverse of ``calibration_to_dict``.
+    """Read a calibration: the inverse of ``calibration_to_dict``.
 
     Args:
-        values: the object; keys besides the documented ones are ignored at its top.
-        where: how messages call it, such as the file's name.
+        values: the object; other keys at its top level are ignored.
+        where: name of the object in messages, such as the file's name.
 
     Raises:
-        InputError: it is not a calibration, of another version, or not whole; the sentence names the key.
+        InputError: the object is not a calibration, has another version, or is incomplete; the sentence names the key.
     """
     given = values if isinstance(values, Mapping) else {}
     if given.get("format") != FORMAT or type(given.get("version")) is not int or given["version"] != VERSION:
@@ -167,7 +168,7 @@ def calibration_from_dict(values: Mapping[str, Any], where: str = "calibration")
 
 
 def _deviations(read: Fields, N: int) -> tuple[Array, Array]:
-    """Values and their derivative by the spring scale, shape (N, ``COUNT``) each."""
+    """Read the values and their derivative by the spring scale, shape (N, ``COUNT``) each."""
     x, by_scale = np.zeros((N, COUNT)), np.zeros((N, COUNT))
     for robot, unit in enumerate(read.objects("deviations", [group.key for group in GROUPS], length=N)):
         for group in GROUPS:
@@ -190,7 +191,7 @@ def _covariance(read: Fields, N: int) -> Array:
 
 
 def _payload_to_dict(payload: CalibratedPayload, scale_sd: float) -> dict[str, Any]:
-    """Plain values of a payload; standard errors include that of a held spring scale."""
+    """Convert a payload to plain values; standard errors include that of a held spring scale."""
     grasps, whole, about = grasps_of(payload, scale_sd), carried(payload, scale_sd), payload.parameters
     pairs = [grasps.pair(1, j).to_dict() for j in range(2, grasps.robots + 1)]
     of_pair = ("R_axis_angle_deg", "R_se_deg", "p_m", "p_se_m")
@@ -299,7 +300,7 @@ def _bases(read: Fields, N: int) -> Bases:
 def _of_robots(
     read: Fields, key: str, N: int, keys: tuple[str, ...], more: tuple[str, ...] = ()
 ) -> Iterator[tuple[int, Fields]]:
-    """Entries of a list for robots 2 to N, in order, with their index from 0; ``i`` is among their keys."""
+    """Iterate over list entries for robots 2 to N, with their index from 0; check their key ``i``."""
     for k, one in enumerate(read.objects(key, keys, more, N - 1), 1):
         if one.values["i"] != k + 1:
             one.refuse("i", f"{k + 1}")

@@ -1,7 +1,7 @@
-"""The least squares of a calibration: loops and balance of all trials, priors on the robots, weighed payloads.
+"""Least squares of a calibration: loops and balance of all trials, priors on the robots, weighed payloads.
 
-Gauss-Newton from the robots as designed, on few rows first, then on all. Coordinates z are such that the robots' prior
-is standard normal; unknowns that are held have none.
+Gauss-Newton starts from the robots as designed, on few rows first and then on all rows. In coordinates z the robots'
+prior is standard normal; held unknowns have no coordinates.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from estimator.rigid_team import Bases, Shared
 
 
 class Unknowns(NamedTuple):
-    """The robots side by side, grasps and inertial parameters of every payload, and bases in every trial."""
+    """Robots side by side, grasps and inertial parameters of each payload, and bases in each trial."""
 
     units: ArmUnit
     carried: tuple[Shared, ...]
@@ -34,7 +34,7 @@ class Unknowns(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each unknown lies in one vector: robots, then payloads, then trials, as many as there are of each."""
+    """Position of each unknown in one vector: robots, then payloads, then trials; the fields are their numbers."""
 
     robots: int
     payloads: int
@@ -42,41 +42,41 @@ class Layout:
 
     @property
     def of_units(self) -> slice:
-        """All robots, ``COUNT`` each."""
+        """Slice of all robots, ``COUNT`` entries each."""
         return slice(0, self.robots * COUNT)
 
     @property
     def per_payload(self) -> int:
-        """Grasps of robots 2 on, and ten inertial parameters."""
+        """Number of unknowns per payload: grasps of robots 2 to N, and ten inertial parameters."""
         return 6 * (self.robots - 1) + 10
 
     def of_payload(self, payload: int) -> slice:
-        """One payload's grasps (d_i, e_i for i >= 2), then (m, m c, J about {1})."""
+        """Return the slice of one payload: grasps (d_i, e_i for i >= 2), then (m, m c, J about {1})."""
         start = self.of_units.stop + payload * self.per_payload
         return slice(start, start + self.per_payload)
 
     def of_inertia(self, payload: int) -> slice:
-        """The latter part of it."""
+        """Return the slice of the inertial parameters of one payload."""
         stop = self.of_payload(payload).stop
         return slice(stop - 10, stop)
 
     def of_trial(self, trial: int) -> slice:
-        """One trial's bases (x, y, z, yaw for i >= 2)."""
+        """Return the slice of one trial's bases (x, y, z, yaw for i >= 2)."""
         size = 4 * (self.robots - 1)
         start = self.of_payload(self.payloads).start + trial * size
         return slice(start, start + size)
 
     @property
     def size(self) -> int:
-        """Number of unknowns, held ones included."""
+        """Number of unknowns, including held ones."""
         return self.of_trial(self.trials).start
 
     def unit_indices(self, places: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Where the same entries of ``ArmUnit.x`` of all robots lie, robot by robot."""
+        """Return the indices of the entries ``places`` of ``ArmUnit.x`` for all robots, robot by robot."""
         return (np.arange(self.robots)[:, None] * COUNT + places).ravel()
 
     def moved(self, at: Unknowns, dx: Array) -> Unknowns:
-        """Unknowns changed by a step."""
+        """Return the unknowns changed by a step."""
         return Unknowns(
             at.units.moved(dx[self.of_units].reshape(self.robots, COUNT)),
             tuple(shared.moved(dx[self.of_payload(k)]) for k, shared in enumerate(at.carried)),
@@ -86,12 +86,12 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """A sum of squares of whitened rows near some unknowns: chi2(dx) = c + 2 g . dx + dx . H dx.
+    """Sum of squares of whitened rows near some unknowns: chi2(dx) = c + 2 g . dx + dx . H dx.
 
     Attributes:
-        index: which unknowns dx are.
-        H, g, c: as above, shapes (k, k), (k,), ().
-        count: rows in it.
+        index: indices of the unknowns dx.
+        H, g, c: see above, shapes (k, k), (k,), ().
+        count: number of rows.
     """
 
     index: NDArray[np.intp]
@@ -102,7 +102,7 @@ class Quadratic:
 
     @classmethod
     def of(cls, J: Array, residual: Array, covariance: Array, index: NDArray[np.intp]) -> Quadratic:
-        """From rows (n, C), their derivative (n, C, k) and the covariance of their noise (n, C, C)."""
+        """Whiten rows (n, C) and their derivative (n, C, k) by the noise covariance (n, C, C); sum the squares."""
         factor = np.linalg.cholesky(covariance)
         white = np.linalg.solve(factor, np.concatenate([J, residual[..., None]], axis=2))
         flat = white.reshape(residual.size, -1)
@@ -116,23 +116,23 @@ class Quadratic:
 
     @property
     def misfits(self) -> bool:
-        """Whether that is more than noise leaves."""
+        """Whether ``ratio`` is larger than noise explains."""
         return self.ratio > max(rules.MISFIT, 1.0 + rules.MISFIT_SIGMAS * np.sqrt(2.0 / max(1, self.count)))
 
     def plus(self, other: Quadratic) -> Quadratic:
-        """The sum of both, of the same unknowns."""
+        """Return the sum of two quadratics in the same unknowns."""
         return Quadratic(
             self.index, self.H + other.H, self.g + other.g, self.c + other.c, self.count + other.count
         )
 
     def at(self, dx: Array) -> float:
-        """chi2 after a step of all unknowns, shape (K,)."""
+        """Return chi2 after a step of all unknowns, shape (K,)."""
         own = dx[self.index]
         return float(self.c + 2.0 * self.g @ own + own @ self.H @ own)
 
 
 def normal_equations(parts: Sequence[Quadratic], size: int) -> tuple[Array, Array]:
-    """H (K, K) and g (K,) of all unknowns, summed over parts."""
+    """Return H (K, K) and g (K,) of all unknowns, summed over the parts."""
     H, g = np.zeros((size, size)), np.zeros(size)
     for part in parts:
         H[np.ix_(part.index, part.index)] += part.H
@@ -141,14 +141,14 @@ def normal_equations(parts: Sequence[Quadratic], size: int) -> tuple[Array, Arra
 
 
 def solved(H: Array, g: Array) -> tuple[Array, Array]:
-    """Step -H^-1 g and H^-1 of normal equations whose unknowns have different units."""
+    """Return the step -H^-1 g, and H^-1; scale the unknowns, which have different units."""
     scale = 1.0 / np.sqrt(np.diag(H))
     factor = cho_factor(H * np.outer(scale, scale))
     return -scale * cho_solve(factor, scale * g), scale[:, None] * cho_solve(factor, np.diag(scale))
 
 
 class KnownMass(NamedTuple):
-    """A weighed payload: which one (from 0), what the scales say [kg], and its standard error [kg]."""
+    """A weighed payload: its index (from 0), measured mass [kg] and standard error [kg]."""
 
     payload: int
     mass_kg: float
@@ -156,7 +156,7 @@ class KnownMass(NamedTuple):
 
 
 class CarriedTrial(NamedTuple):
-    """Rows of a trial, which payload it carries (from 0), and the sensors of its robots."""
+    """Rows of a trial, the index of its payload (from 0), and the sensors of its robots."""
 
     rows: Rows
     payload: int
@@ -165,17 +165,17 @@ class CarriedTrial(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """All that a calibration is made from.
+    """Input of a calibration.
 
     Attributes:
-        trials: those with a payload.
-        start: values to start from, the robots as designed, or as calibrated before.
-        prior: spread of the robots.
+        trials: trials with a payload.
+        start: initial values: robots as designed, or as calibrated before.
+        prior: prior standard deviations of the robots.
         alone: recordings of unloaded arms.
-        known_mass: weighed payloads; with one, the common spring scale is free.
-        robots: an earlier calibration, whose robots are held; their errors go on to the rest.
-        held: the robots are those of the start and have no errors (``prior`` has no spread): a third quicker, and
-            trials know nothing of them.
+        known_mass: weighed payloads; with at least one, the common spring scale is free.
+        robots: an earlier calibration whose robots are held; their covariance propagates to the other unknowns.
+        held: hold the robots at the start without errors (``prior`` is zero). The trials then have no derivatives by
+            the robots, which saves a third of the time.
     """
 
     trials: Sequence[CarriedTrial]
@@ -187,7 +187,7 @@ class Given:
     held: bool = False
 
     def only(self, chosen: Sequence[int]) -> Given:
-        """Some of the trials, by index, with what they carry."""
+        """Return the input restricted to some of the trials, by index, and their payloads."""
         carried = sorted({self.trials[k].payload for k in chosen})
         start = Unknowns(
             self.start.units,
@@ -204,7 +204,7 @@ class Given:
 
 
 class TrialFit(NamedTuple):
-    """One trial at the solution: all its rows together, and either kind alone."""
+    """One trial at the solution: all its rows together, its loops alone, and its balance alone."""
 
     all: Quadratic
     loops: Quadratic
@@ -212,15 +212,15 @@ class TrialFit(NamedTuple):
 
 
 class Point(NamedTuple):
-    """The sum of squares near some unknowns.
+    """Sum of squares near some unknowns.
 
     Attributes:
-        unknowns: where.
-        z: the same in coordinates of ``Problem.basis``, relative to the start, shape (k,).
-        trials, alone, known: its parts: trials with a payload, recordings of unloaded arms, weighed masses.
+        unknowns: the point.
+        z: the point in coordinates of ``Problem.basis``, relative to the start, shape (k,).
+        trials, alone, known: parts: trials with a payload, recordings of unloaded arms, weighed masses.
         H, g: normal equations of all unknowns without the prior, shapes (K, K) and (K,).
-        value: chi2 of all rows, and of the prior.
-        rows: how many there are, and coordinates that have a prior.
+        value: chi2 of all rows and the prior.
+        rows: number of rows, plus number of coordinates with a prior.
     """
 
     unknowns: Unknowns
@@ -235,17 +235,17 @@ class Point(NamedTuple):
 
 
 class Problem:
-    """Everything that is held against the unknowns, on some of the rows at first.
+    """Sum of squares to minimize, on some of the rows at first.
 
     Attributes:
-        layout: where each unknown lies.
-        basis: unknowns from coordinates z, shape (K, k).
+        layout: position of each unknown.
+        basis: matrix from coordinates z to unknowns, shape (K, k).
         prior: information of the prior on z: 1 for the robots, 0 for the rest, shape (k,).
-        complete: whether all rows are in it.
+        complete: whether all rows are in use.
     """
 
     def __init__(self, given: Given) -> None:
-        """On evenly spaced rows first, ``rules.COARSE_ROWS`` in all."""
+        """Start with evenly spaced rows, ``rules.COARSE_ROWS`` in all."""
         self._given, start = given, given.start
         self.layout = layout = Layout(len(start.units.x), len(start.carried), len(given.trials))
         of_units = np.zeros((layout.of_units.stop, 0))
@@ -254,9 +254,9 @@ class Problem:
         self.basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
         self.prior = np.zeros(self.basis.shape[1])
         self.prior[: of_units.shape[1]] = 1.0
-        # A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
-        # derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way. And
-        # where robots are held, motion may be so weak that those errors exceed what it shows of the inertia.
+        # Derivatives at a row's mean signals have errors of up to 2 %. Free arm masses and a common spring scale differ
+        # by no more than that, so a Gauss-Newton step would cover only a fifth of the distance. With held robots and
+        # weak motion, the errors may exceed the information on the inertia. Both cases need averaged derivatives.
         self._averaged = given.prior.arm_mass_ratio > 0.0 or not self.prior.any()
         self._use_rows(max(1, sum(len(trial.rows.time) for trial in given.trials) // rules.COARSE_ROWS))
 
@@ -271,19 +271,19 @@ class Problem:
         ]
 
     def on_all_rows(self, point: Point, dz: Array) -> Point:
-        """A step, and every row from there on."""
+        """Take a step, and use every row from there on."""
         self._use_rows(1)
         return self.moved(point, dz)
 
     def start(self) -> Point:
-        """The sum of squares at the start, loops and balance apart."""
+        """Evaluate the sum of squares at the start, with loops and balance separate."""
         return self.at(self._given.start, np.zeros(self.basis.shape[1]), split=True)
 
     def at(self, unknowns: Unknowns, z: Array, *, split: bool = False) -> Point:
-        """The sum of squares near some unknowns, which z says, too; loops and balance are told apart if ``split``.
+        """Evaluate the sum of squares near some unknowns, given also as z; ``split`` separates loops and balance.
 
         Raises:
-            InputError: robots are such that their arms cannot be where they were.
+            InputError: arms of these robots cannot reach their recorded poses.
         """
         split = split or self.complete
         done = tuple(self._trial(k, unknowns, split=split) for k in range(self.layout.trials))
@@ -296,24 +296,26 @@ class Problem:
         return Point(unknowns, z, done, alone, known, H, g, value, count)
 
     def normal(self, point: Point) -> tuple[Array, Array]:
-        """Normal equations of z, prior included, shapes (k, k) and (k,)."""
+        """Return the normal equations of z with the prior, shapes (k, k) and (k,)."""
         H = self.basis.T @ point.H @ self.basis + np.diag(self.prior)
         return H, self.basis.T @ point.g + self.prior * point.z
 
     def moved(self, point: Point, dz: Array) -> Point:
-        """The same after a step; errors as for ``at``."""
+        """Evaluate the point after a step; errors as for ``at``."""
         return self.at(self.layout.moved(point.unknowns, self.basis @ dz), point.z + dz)
 
     def lower(self, point: Point, damping: float, most: int) -> tuple[Point | None, int, float]:
-        """A damped step (D. W. Marquardt, J. SIAM 11, 1963): a point no higher, number of tries, next damping.
+        """Take a damped step (D. W. Marquardt, J. SIAM 11, 1963) to a point that is not higher.
 
-        The point is None if all that were tried are higher. The covariance of the rows' noise is each point's own, so
-        that the sum may rise a little where it is least.
+        The sum may rise slightly near its minimum, because the covariance of the row noise depends on the point.
 
         Args:
-            point: from where.
-            damping: by how much of itself the diagonal of the normal equations is raised; 0 is Gauss-Newton.
-            most: to be tried.
+            point: start of the step.
+            damping: relative increase of the diagonal of the normal equations; 0 is Gauss-Newton.
+            most: largest number of tries.
+
+        Returns:
+            The new point or None if all tries are higher, the number of tries, and the next damping.
         """
         H, g = self.normal(point)
         every = [block for blocks in self._blocks for block in blocks]
@@ -322,7 +324,7 @@ class Problem:
             dz = solved(H + damping * np.diag(np.diag(H)), g)[0]
             try:
                 there = self.moved(point, dz)
-            except (InputError, np.linalg.LinAlgError):  # no arm reaches there
+            except (InputError, np.linalg.LinAlgError):  # unreachable poses
                 there = None
             if there is not None and there.value <= point.value * (1.0 + rules.RISE):
                 return there, tried, 0.0 if damping <= rules.LEAST_DAMPING else damping / rules.DAMPING
@@ -332,7 +334,7 @@ class Problem:
         return None, most, damping
 
     def _trial(self, k: int, at: Unknowns, *, split: bool) -> TrialFit:
-        """A trial at some unknowns; loops and balance apart only where asked."""
+        """Evaluate one trial; separate loops and balance only if ``split``."""
         payload, layout = self._given.trials[k].payload, self.layout
         of_units = slice(0, 0) if self._given.held else layout.of_units
         index = np.r_[of_units, layout.of_payload(payload), layout.of_trial(k)]
@@ -360,9 +362,9 @@ class Problem:
 
 @dataclass(eq=False)
 class _Block:
-    """Rows of a trial, and what earlier steps found: how signals are adjusted, and the derivatives' curvature.
+    """Rows of a trial, with state from earlier steps: signal adjustment and curvature of the derivatives.
 
-    Derivatives of the balance are ``averaged`` over each row where every row counts.
+    If ``averaged``, derivatives of the balance are averaged over each row.
     """
 
     equations: TrialEquations
@@ -371,7 +373,7 @@ class _Block:
     curvature: Curvature | None = None
 
     def at(self, units: ArmUnit, shared: Shared, bases: Bases) -> Rowed:
-        """The rows at some unknowns; what is found of them is kept."""
+        """Evaluate the rows at some unknowns, and keep adjustment and curvature."""
         if self.averaged:
             self.curvature = self.equations.curvature(units, shared, bases, self.curvature)
         rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature)
@@ -380,7 +382,7 @@ class _Block:
 
 
 def _equations(trial: CarriedTrial, every: int, *, held: bool) -> list[TrialEquations]:
-    """Equations of one row in ``every``, in blocks; robots that are held need no derivatives."""
+    """Return equations of one row in ``every``, in blocks; held robots need no derivatives."""
     chosen = np.arange(0, len(trial.rows.time), every)
     parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
     return [TrialEquations.of(trial.rows.take(part), trial.sensing, held=held) for part in parts]
@@ -400,15 +402,16 @@ def _alone(equations: AloneEquations, units: ArmUnit) -> Quadratic:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What came out.
+    """Result of the least squares.
 
     Attributes:
         point: the solution.
-        layout, basis, prior: as of ``Problem``.
-        covariance: of all unknowns, the mean spring scale held; zero for held ones, shape (K, K).
-        by_scale: derivative of all unknowns by the common spring scale that is held, shape (K,); zero where it is free.
+        layout, basis, prior: those of ``Problem``.
+        covariance: of all unknowns, with the mean spring scale held; zero for held ones, shape (K, K).
+        by_scale: derivative of all unknowns with respect to the held common spring scale, shape (K,); zero if it is
+            free.
         before: chi2/n of loops and balance of every trial with the robots as designed, shape (trials, 2).
-        steps: Gauss-Newton steps.
+        steps: number of Gauss-Newton steps.
         converged: whether the last step was small.
     """
 
@@ -423,7 +426,7 @@ class Fit:
     converged: bool
 
     def payload(self, k: int, label: str | None) -> CalibratedPayload:
-        """A payload's numbers, by its index from 0."""
+        """Return the calibrated payload with index ``k`` from 0."""
         of, grasped = self.layout.of_payload(k), 6 * (self.layout.robots - 1)
         shared, covariance = self.point.unknowns.carried[k], self.covariance[of, of]
         grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
@@ -431,10 +434,10 @@ class Fit:
 
 
 def fit(given: Given) -> Fit:
-    """Calibrate.
+    """Minimize the sum of squares of a calibration.
 
     Raises:
-        InputError, LinAlgError: arms cannot be where they were, or the equations cannot be solved.
+        InputError, LinAlgError: arms cannot reach their recorded poses, or the equations are singular.
     """
     problem = Problem(given)
     layout, basis = problem.layout, problem.basis
@@ -443,7 +446,7 @@ def fit(given: Given) -> Fit:
     while True:
         H, g = problem.normal(point)
         dz, covariance_z = solved(H, g)
-        # Where much is left that no calibration explains, steps are small against what is left.
+        # If the calibration leaves a large misfit, compare steps with errors scaled by that misfit.
         left = max(1.0, np.sqrt(point.value / point.rows))
         size = float(np.max(np.abs(dz) / np.sqrt(np.diag(covariance_z)))) / left
         if problem.complete:
@@ -463,7 +466,7 @@ def fit(given: Given) -> Fit:
             point = problem.on_all_rows(point, np.zeros(len(point.z)))
 
     def followed(held: Array) -> Array:
-        """Changes of all unknowns with one of what is held, shapes (K, ...)."""
+        """Return changes of all unknowns per change of a held quantity, shape (K, ...)."""
         return held - basis @ (covariance_z @ (basis.T @ (point.H @ held)))
 
     by_scale, covariance = np.zeros(layout.size), basis @ covariance_z @ basis.T
@@ -478,7 +481,7 @@ def fit(given: Given) -> Fit:
 
 
 def _with_robots_held(point: Point, layout: Layout) -> Array:
-    """chi2/n of loops and balance of every trial when payloads and bases alone are fitted, shape (trials, 2)."""
+    """Return chi2/n of loops and balance of every trial if only payloads and bases are fitted, shape (trials, 2)."""
     rest = np.arange(layout.of_units.stop, layout.size)
     dx = np.zeros(layout.size)
     if len(rest):

@@ -1,4 +1,4 @@
-"""From the samples of a trial to nearly independent rows with known noise."""
+"""Reduce the samples of a trial to nearly independent rows with known noise."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from estimator.recording.model import Recording
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Signals of one trial, thinned, and the linear map from there to rows.
+    """Thinned signals of one trial, and the linear map from them to rows.
 
     Attributes:
-        s: filtered readings with rates and accelerations (``slots``), shape (q, N, 21).
-        operator: rows from the q instants, shape (n, q); rows in motion first.
+        s: filtered readings with rates and accelerations, shape (q, N, 21).
+        operator: matrix from the q instants to rows, shape (n, q); rows in motion first.
         time: middle of every row [s], shape (n,).
-        moving: how many rows are in motion.
-        gain: of white noise of one sample of an angle: covariance of what it leaves in a row of angle, rate and
-            acceleration, in units of its variance, shape (3, 3); in motion.
-        length: samples that a row averages over in a hold, shape (n,); 0 in motion.
-        travel: way that each driven and gimbal joint goes while a row is averaged [rad], shape (n, N, 6).
-        rate_hz: of the samples.
-        repeats: how often the same rounding errors come again, because the motion does, shape (N, 9) or 1.
+        moving: number of rows in motion.
+        gain: covariance of (angle, rate, acceleration) in a row in motion, for white angle noise of unit variance,
+            shape (3, 3).
+        length: number of samples that a row averages in a hold, shape (n,); 0 in motion.
+        travel: path of each driven and gimbal joint during a row [rad], shape (n, N, 6).
+        rate_hz: sampling rate.
+        repeats: number of times that the same rounding errors occur in a periodic motion, shape (N, 9) or 1.
     """
 
     s: Array
@@ -47,11 +47,11 @@ class Rows:
     repeats: Array | float
 
     def __call__(self, x: Array) -> Array:
-        """Rows of samples, shape (q, ...) -> (n, ...)."""
+        """Average samples into rows, shape (q, ...) -> (n, ...)."""
         return np.asarray(self.operator @ x.reshape(len(x), -1)).reshape(-1, *x.shape[1:])
 
     def take(self, chosen: NDArray[np.intp]) -> Rows:
-        """Some of the rows, in order, with the instants that they need."""
+        """Return some of the rows, in order, with the instants that they need."""
         operator = self.operator[chosen]
         needed = np.unique(operator.indices)
         return replace(
@@ -66,7 +66,7 @@ class Rows:
 
     @classmethod
     def of(cls, recording: Recording) -> Rows:
-        """Rows of one recording, from where its joints move and rest."""
+        """Divide a recording into rows: overlapping averages in motion, one mean per hold."""
         rate = recording.metadata.rate_hz
         cutoff = min(rules.PRE_HZ, 0.4 * rate)
         angles = np.concatenate([recording.phi, recording.theta], axis=2)
@@ -89,7 +89,7 @@ class Rows:
         centres, length = [], []
         beside = round(rules.BESIDE_S * rate)
         for centre in range(first, last, spacing):
-            # Beside a hold, the kernel takes in the one rounding error that the hold's own row has already.
+            # Next to a hold, the kernel would include the rounding error that the hold's own row already contains.
             if not still[max(0, at[centre] - beside) : at[centre] + beside + 1].any():
                 rows.append((np.arange(centre - half, centre + half + 1), kernel))
                 centres.append(at[centre])
@@ -131,10 +131,10 @@ class Rows:
 
 
 def _repeats(angles: Array, rate_hz: float) -> Array | float:
-    """Times that readings (Q, N, 6) come again to the last digit, of each angle and torque, shape (N, 9); 1 for none.
+    """Count how often readings (Q, N, 6) repeat exactly, for each angle and torque, shape (N, 9); 1 if they do not.
 
-    A commanded motion that repeats in whole samples repeats its rounding errors, too, and averaging over them does not
-    help. Periods are looked for where the autocorrelation of one joint is high.
+    If a commanded motion has a period of whole samples, its rounding errors repeat and do not average out. Candidate
+    periods are the peaks of one joint's autocorrelation.
     """
     shortest = round(rules.SHORTEST_PERIOD_S * rate_hz)
     if len(angles) < 2 * shortest:
@@ -148,22 +148,23 @@ def _repeats(angles: Array, rate_hz: float) -> Array | float:
     shares = np.array([np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0) for lag in lags])
     if not len(lags) or shares.mean(axis=(1, 2)).max() < rules.REPEATED:
         return 1.0
-    # The shortest multiple of the period after which a joint reads much the same: a slow one does after any.
+    # The shortest candidate period with at least 80 % of the largest share of repeats.
     first = np.argmax(shares > 0.8 * shares.max(axis=0), axis=0)
     again = 1.0 + np.take_along_axis(shares, first[None], axis=0)[0] * (len(angles) / lags[first] - 1.0)
     return np.concatenate([again, again[:, :3]], axis=1)
 
 
 def _kernel(rate_hz: float) -> tuple[Array, int]:
-    """Weights of a row in motion, their sum 1, and instants between rows.
+    """Return the weights of a row in motion, with sum 1, and the number of instants between rows.
 
-    A root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph Transmission
-    Theory, 1928): white noise in different rows does not correlate, so that what varies slowly is known as well as the
-    rows' covariance says. A windowed sinc's neighbours correlate by an eighth, which claims a seventh too much.
+    The kernel is a root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph
+    Transmission Theory, 1928). White noise in different rows is then uncorrelated, so the rows' covariance is valid
+    for slowly varying quantities. With a windowed sinc, neighbouring rows correlate by an eighth, and the claimed
+    precision is a seventh too high.
     """
     spacing, b = max(1, round(rules.ROW_S * rate_hz)), rules.ROLL_OFF
     half = rules.LOBES * spacing
-    # An offset of a millionth keeps off the removable singularities at 0 and 1 / (4 b).
+    # The offset of 1e-6 avoids the removable singularities at 0 and 1 / (4 b).
     x = np.arange(-half, half + 1) / spacing + 1e-6
     weights = np.sin(np.pi * x * (1.0 - b)) + 4.0 * b * x * np.cos(np.pi * x * (1.0 + b))
     weights /= np.pi * x * (1.0 - (4.0 * b * x) ** 2)
@@ -172,7 +173,7 @@ def _kernel(rate_hz: float) -> tuple[Array, int]:
 
 
 def _gain(rate_hz: float, cutoff_hz: float, stride: int, kernel: Array) -> Array:
-    """What a unit impulse in one sample leaves in a row, squared and summed over all samples, shape (3, 3)."""
+    """Return a row's response to a unit impulse in one sample, squared and summed over all samples, shape (3, 3)."""
     half = max(round(1.5 * rate_hz), MIN_SAMPLES)
     impulse = np.zeros(2 * half + 1)
     impulse[half] = 1.0
@@ -181,12 +182,12 @@ def _gain(rate_hz: float, cutoff_hz: float, stride: int, kernel: Array) -> Array
     spread = np.zeros(stride * (len(kernel) - 1) + 1)
     spread[::stride] = kernel
     chains = np.array([np.convolve(x, spread) for x in (value, speed, differentiate(speed, rate_hz))])
-    # Even and odd parts: rates do not correlate with the others.
+    # Values and accelerations are even, rates odd, so rates do not correlate with the others.
     return chains @ chains.T
 
 
 def _holds(angles: Array, rate_hz: float, trim: int) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
-    """Spans of samples in which no joint of any robot moves, and all samples at rest, shape (Q,)."""
+    """Return spans of samples in which no joint of any robot moves, and a mask of the samples at rest, shape (Q,)."""
     flat = angles.reshape(len(angles), -1)
     speed = np.abs(differentiate(low_pass(flat, rate_hz, rules.STILL_HZ), rate_hz)).max(axis=1)
     still = speed < rules.STILL_RADPS
@@ -198,11 +199,11 @@ def _holds(angles: Array, rate_hz: float, trim: int) -> tuple[list[tuple[int, in
 
 
 class Resolution(NamedTuple):
-    """What one recording says of its sensors; arrays of shape (N, 9): phi, theta, tau.
+    """Sensor resolution according to one recording; arrays of shape (N, 9): phi, theta, tau.
 
     Attributes:
         step: rounding step, 0 for a continuous channel [rad, N m].
-        white: standard deviation of all that is white in a sample, rounding included [rad, N m].
+        white: standard deviation of all white noise in a sample, including rounding [rad, N m].
         share: as in ``Sensing``, shape (N, 1).
     """
 
@@ -212,10 +213,10 @@ class Resolution(NamedTuple):
 
     @classmethod
     def of(cls, recording: Recording) -> Resolution:
-        """What one recording says."""
+        """Estimate the resolution from one recording."""
         step, white = _steps(recording), _white(recording)
         if recording.metadata.sampling is None:
-            # The ripple of a slow joint's rounding is no noise: without noise, no reading goes to and fro.
+            # The rounding ripple of a slow joint is not noise: without noise, no reading steps back and forth.
             to_and_fro = _to_and_fro(recording, step)
             noise = np.where(
                 to_and_fro < rules.TO_AND_FRO, rules.NOISE_TO_AND_FRO * to_and_fro * step, np.inf
@@ -230,9 +231,9 @@ class Sensing:
 
     Attributes:
         step: rounding step, 0 for a continuous channel [rad, N m].
-        sigma: standard deviation of white noise of a sample before rounding [rad, N m].
-        share: samples over readings, shape (N, 1) or 1: white errors of several readings that went into a sample, or
-            of one that went into several, have this share of their variance, as far as frequencies in a row go.
+        sigma: standard deviation of the white noise of a sample before rounding [rad, N m].
+        share: sampling rate over reading rate, shape (N, 1) or 1. Resampling multiplies the variance of white reading
+            errors by this factor, at the frequencies within a row.
     """
 
     step: Array
@@ -241,12 +242,12 @@ class Sensing:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording]) -> Sensing:
-        """Resolution of the sensors behind some recordings of the same robots, read and converted alike."""
+        """Pool the resolution over recordings of the same robots that were read and converted alike."""
         return cls.pooled([Resolution.of(recording) for recording in recordings])
 
     @classmethod
     def pooled(cls, found: Sequence[Resolution]) -> Sensing:
-        """The same from what each says."""
+        """Pool the resolutions of several recordings."""
         step = np.median([one.step for one in found], axis=0)
         white = np.sqrt(np.mean([one.white**2 for one in found], axis=0))
         share = np.mean([one.share for one in found], axis=0)
@@ -254,7 +255,7 @@ class Sensing:
 
     @classmethod
     def of_each(cls, found: Sequence[Resolution]) -> list[Sensing]:
-        """The same for each recording, from all that were read and converted alike."""
+        """Return the resolution for each recording, pooled over recordings that were read and converted alike."""
         rates = [tuple(np.round(one.share.ravel(), 3)) for one in found]
         pools = {
             rate: cls.pooled([one for one, its in zip(found, rates, strict=True) if its == rate])
@@ -263,17 +264,17 @@ class Sensing:
         return [pools[rate] for rate in rates]
 
     def variances(self, rows: Rows) -> tuple[Array, Array]:
-        """Variance of one sample in motion, and of a row's mean in a hold, shape (n, N, 9) each.
+        """Return the variance of one sample in motion, and of a row's mean in a hold, shape (n, N, 9) each.
 
-        In motion a joint that makes few steps while a row is averaged has few independent rounding errors; at rest it
-        has one, unless noise moves the reading to and fro.
+        A joint that makes few steps during a row has few independent rounding errors. A joint at rest has one, unless
+        noise dithers the reading.
         """
         least = np.repeat([rules.PHI_FLOOR_RAD, rules.THETA_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3) ** 2
         floor = least * rows.rate_hz / rules.FLOOR_HZ
         rounding, noise = self.step**2 / 12.0, self.sigma**2
         step = np.maximum(self.step, 1e-300)
         dithered = self.sigma > rules.DITHER * step * np.sqrt(self.share)
-        # Readings that count in a row in motion: those of a white signal.
+        # Effective number of independent readings in a row in motion.
         samples = 1.0 / rows.gain[0, 0] / self.share
         way = np.concatenate([rows.travel, np.full((*rows.travel.shape[:2], 3), np.inf)], axis=2)
         independent = np.clip(1.0 + way / step, 1.0, samples)
@@ -298,7 +299,7 @@ def _steps(recording: Recording) -> Array:
 
 
 def _to_and_fro(recording: Recording, step: Array) -> Array:
-    """Share of slow changes, of a step at most, that the next one takes back, shape (N, 9); 1 where few are slow."""
+    """Return the share of slow changes (one step at most) that the next change reverses, (N, 9); 1 if few are slow."""
     change = np.rint(np.diff(_columns(recording), axis=0) / np.where(step > 0, step, np.inf))
     slow = np.all([np.abs(change[1:]) <= 1, np.abs(change[:-1]) <= 1], axis=0)
     back, count = np.sum(slow & (change[1:] * change[:-1] < 0), axis=0), np.sum(slow, axis=0)
@@ -306,7 +307,7 @@ def _to_and_fro(recording: Recording, step: Array) -> Array:
 
 
 def _share(recording: Recording) -> Array:
-    """Rate of the samples over that of each robot's readings, shape (N, 1)."""
+    """Return the sampling rate over each robot's reading rate, shape (N, 1)."""
     told, rate = recording.metadata.sampling, recording.metadata.rate_hz
     if told is None:
         return np.ones((recording.metadata.robots, 1))
@@ -314,10 +315,10 @@ def _share(recording: Recording) -> Array:
 
 
 def _white(recording: Recording) -> Array:
-    """Standard deviation of all that is white in a sample, rounding included, shape (N, 9).
+    """Return the standard deviation of all white noise in a sample, including rounding, shape (N, 9).
 
-    As it is told by what lies above all motion; of samples that were converted little is left there, and it is told by
-    the highest frequencies that a conversion lets pass.
+    It is measured in the band above all motion. Converted samples have little noise there, so the highest frequencies
+    that the conversion passes are used instead.
     """
     told, rate = recording.metadata.sampling, recording.metadata.rate_hz
     if told is None:

@@ -1,81 +1,88 @@
-"""Constants of the calibration, each with where it comes from."""
+"""Constants of the calibration and where each comes from."""
 
 PRE_HZ = 12.0
-"""Cut-off of joint signals before they are mapped to poses and wrenches. Measured: angles filtered at 5 Hz and then
-mapped leave harmonics of micrometres and millinewtons, which moved spring scales by two to five standard errors."""
+"""Cut-off of the low-pass on joint signals before they are mapped to poses and wrenches. Measured: mapping angles
+filtered at 5 Hz leaves harmonics of micrometres and millinewtons, which bias spring scales by two to five standard
+errors."""
 SAMPLE_HZ = 33.0
-"""Instants at which loops and balance are evaluated, before the residual is averaged into rows. Derived: above twice
+"""Rate at which loops and balance are evaluated, before the residual is averaged into rows. Derived: more than twice
 ``PRE_HZ``."""
 ROW_S = 0.25
-"""Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter
-(one standard error at 0.12 s)."""
+"""Time between rows. Measured: acceleration noise grows with frequency, so shorter rows bias the spring scales (by one
+standard error at 0.12 s)."""
 LOBES = 3
-"""Half length, in rows, of the kernel that they are weighed with. Chosen: white noise then correlates by 0.013."""
+"""Half length of the row kernel, in rows. Chosen: the residuals of neighbouring rows under white noise then correlate
+by 0.013."""
 ROLL_OFF = 0.5
-"""Roll-off of that kernel. Chosen: nothing passes above 3 Hz."""
+"""Roll-off of the row kernel. Chosen: nothing above 3 Hz passes."""
 TRIM_S = 2.0
-"""Dropped at both ends against the filters' transients. Chosen, as in the paper."""
+"""Time dropped at both ends because of filter transients. Chosen, as in the paper."""
 STILL_RADPS = 1.5e-3
-"""Joint speed below which an encoder's rounding counts as one error that lasts. Chosen: a 16 bit encoder makes sixteen
-steps a second at this speed."""
+"""Joint speed below which the rounding of an encoder counts as one lasting error. Chosen: a 16-bit encoder makes
+sixteen steps per second at this speed."""
 STILL_HZ = 2.0
-"""Cut-off of the joint speeds that are held against it. Chosen: rounding at rest then stays below a twentieth."""
+"""Cut-off of the joint speeds that are compared with ``STILL_RADPS``. Chosen: the rounding of a resting joint then
+stays below a twentieth of that limit."""
 SETTLING_S, SHORTEST_HOLD_S = 0.4, 1.0
-"""Left out at both ends of a hold, and the least that must be left of it. Chosen: twice what ``STILL_HZ`` takes."""
+"""Time dropped at both ends of a hold, and the shortest hold that must remain. Chosen: twice the settling time of
+``STILL_HZ``."""
 BESIDE_S = 0.5
-"""Least time between a row in motion and a rest. Chosen: 98 % of a row's weight lie within it."""
+"""Shortest time between a row in motion and a rest. Chosen: 98 % of a row's weight lie within it."""
 SHORTEST_PERIOD_S, PERIODS, REPEATED = 1.0, 20, 0.2
-"""Period of a motion that repeats, the number of them looked at, and the least share of readings that are the same
-again. Chosen: random motion has less than a thousandth."""
+"""Detection of periodic motion: shortest period, number of candidate periods, and smallest share of readings that must
+repeat. Chosen: random motion repeats less than a thousandth of its readings."""
 NOISE_ABOVE_HZ = 25.0
-"""Above it a signal is noise. Measured: commanded motion ends at 5 Hz."""
+"""Frequency above which a signal is noise. Measured: commanded motion ends at 5 Hz."""
 PASSED = 0.17
-"""Frequency, over the rate of the samples, up to which a conversion leaves everything. Derived: its low-pass
-filter's passband ends at 0.18."""
+"""Highest frequency that a conversion leaves unchanged, relative to the sampling rate. Derived: the passband of the
+conversion's low-pass filter ends at 0.18."""
 DITHER = 0.35
-"""White noise, in steps, from which on rounding errors of neighbouring samples are independent. Derived: their
-correlation is exp(-4 pi^2 0.35^2), below one percent."""
+"""White noise, in rounding steps, from which the rounding errors of neighbouring samples are independent. Derived:
+their correlation is exp(-4 pi^2 0.35^2), below one percent."""
 TO_AND_FRO, NOISE_TO_AND_FRO, LEAST_SLOW = 0.1, 1.77, 50
-"""Share of slow readings that go a step to and fro below which it tells the noise, in steps: sqrt(pi) times that share.
-Derived: a reading between two values takes one with chance p and the other with q, and the mean of p q over a step is
-sigma / sqrt(pi) where sigma is small; of 50 readings a noise of ``DITHER`` moves ten."""
+"""Noise of slow readings from the share that step back and forth: largest usable share, noise in steps per share, and
+fewest slow readings. Derived: a reading between two values takes one with probability p and the other with q. The mean
+of p q over a step is sigma / sqrt(pi) for small sigma, so sigma is sqrt(pi) times the share. Noise of ``DITHER`` moves
+ten of 50 readings."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TORQUE_FLOOR_NM = 4e-6, 8e-7, 3e-4
-"""What the model itself leaves in motion at 100 Hz beside any sensor: soft rods and welds shift a wrist by micrometres
-and hardly turn it. Measured on trials with ideal sensors and with encoders of 19 and 20 bits: loops of random trials
-leave 0.55, and 0.8 to 1.2, of what is claimed with these."""
+"""Errors of the simulated mechanics in motion at 100 Hz, besides any sensor: soft rods and welds shift a wrist by
+micrometres and hardly turn it. Measured: with these floors, the loops of random trials leave 0.55 (ideal sensors) and
+0.8 to 1.2 (encoders of 19 and 20 bits) of the predicted residual."""
 AT_REST = 0.2
-"""Share of these that a rest shows, at any rate. Measured: static trials with ideal sensors leave a fiftieth of the
-floors' variance, and less."""
+"""Share of these floors that applies at rest, at any rate. Measured: static trials with ideal sensors show at most a
+fiftieth of the floors' variance."""
 FLOOR_HZ = 100.0
-"""Rate that the floors above are given for. Chosen."""
+"""Sampling rate at which the floors above hold. Chosen."""
 CURVATURE_EVERY = 3
-"""Instants between those at which derivatives are taken where they are averaged. Chosen: eleven a second."""
+"""Stride of the instants at which averaged derivatives are evaluated. Chosen: eleven per second."""
 BLOCK_ROWS = 512
-"""Rows whose derivatives are held at a time. Chosen; the result does not depend on it."""
+"""Number of rows whose derivatives are in memory at a time. Chosen; the result does not depend on it."""
 COARSE_ROWS = 250
-"""Rows that the first steps take, evenly from all trials. Chosen: the way to the solution needs no more."""
+"""Number of rows used in the first steps, evenly spaced over all trials. Chosen: the early steps need no more."""
 MAX_STEPS, MAX_COARSE_STEPS = 40, 30
-"""Steps in all, and on few rows. Chosen: forty teams of the prior's spread needed six at most."""
+"""Most steps in all, and on ``COARSE_ROWS``. Chosen: forty teams drawn from the prior needed six at most."""
 LEAST_DAMPING, DAMPING = 1e-3, 10.0
-"""Share of the diagonal that damps a step after one that went up, and by how much it then grows and falls. Chosen, as
-in Marquardt's paper."""
+"""Levenberg-Marquardt damping: first share of the diagonal after a step that raised the sum of squares, and the factor
+by which it then grows or falls. Chosen, as in Marquardt's paper."""
 RISE = 0.01
-"""Rise of the sum of squares that a step may still make, for rows' noise is each point's own. Chosen: whole steps of
-teams that fit made none; a whole step between two teams made it ten times larger and more."""
+"""Relative rise of the sum of squares that a step may cause, because the row covariance depends on the point. Chosen:
+full steps of teams that fit cause no rise; a full step between two different teams multiplies the sum by ten or more.
+"""
 FLAT = 0.01
-"""Share of the sum of squares by which a damped step must lower it, or the descent ends. Chosen: recordings of other
-robots than the rest's leave a valley whose floor falls by a thousandth a step."""
+"""Relative decrease of the sum of squares below which a damped step ends the descent. Chosen: if one recording is of
+other robots, the sum falls by a thousandth per step along a valley."""
 COARSE = 0.5
-"""Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
+"""Largest step of any unknown, in posterior standard errors, that ends the steps on ``COARSE_ROWS``. Chosen."""
 CONVERGED = 0.001
-"""The same that ends all. Measured: at 0.02, signals were adjusted to unknowns a step back; at 0.002, what held robots'
-errors do to the payload was predicted up to 3.4 % off, at 0.001 and at 0.0001 less than 3 %."""
+"""Largest step of any unknown, in posterior standard errors, at convergence. Measured: at 0.001 and 0.0001, the effect
+of held robots' errors on the payload is predicted to within 3 %; at 0.002, to within 3.4 %."""
 MISFIT = 1.3
-"""chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
-teams with nothing else wrong; what noise adds to it is 0.03."""
+"""chi2/n of the loops or balance of a recording above which the calibration does not explain it. Measured: below 1.1
+on uncalibrated teams with no other error; noise adds 0.03."""
 MISFIT_SIGMAS = 4.0
-"""The same where rows are few, in standard deviations of chi2/n, which are sqrt(2/n). Chosen: a static trial of two
-robots has three dozen rows, and noise alone makes 1.3 of one in ten of them."""
+"""The same limit for few rows, in standard deviations sqrt(2/n) of chi2/n. Chosen: a static trial of two robots has
+three dozen rows, and noise alone exceeds 1.3 in one of ten such trials."""
 SUFFICES = 0.99
-"""Share of a misfit that one change in one recording must explain to be named where it does not explain all. Measured:
-slips of 0.2 to 1 deg 0.9999 and more, by derivatives; the best change where a joint rubs in all recordings 0.07."""
+"""Share of a misfit that a change in one recording must explain to be reported, if it does not explain all of it.
+Measured: slips of 0.2 to 1 deg explain 0.9999 and more by derivatives. If a joint rubs in all recordings, the best
+change explains 0.07."""

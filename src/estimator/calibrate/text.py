@@ -1,4 +1,4 @@
-"""A calibration for readers: the text report, and one robot's numbers as TOML for other programs."""
+"""Text report of a calibration, and one robot's parameters as TOML for other programs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from estimator.statistics import measured
 
 
 class Shown(NamedTuple):
-    """How a kind of deviation is shown: its name, and by which factor in which unit."""
+    """Display of a kind of deviation: name, factor and unit."""
 
     name: str
     scale: float
@@ -44,23 +44,23 @@ SHOWN = {
     "rod_mass_ratio": Shown("rod mass", 100.0, "%"),
     "wrist_mass_ratio": Shown("wrist mass", 100.0, "%"),
 }
-"""By group; deviations are as built minus design, zeros reading minus truth."""
+"""Display by group; deviations are as built minus design, zeros are reading minus truth."""
 
 
 WIDTH = 118
-"""Columns that sentences are wrapped to."""
+"""Column at which sentences wrap."""
 MASSES = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
 
 
 def frames_sentence(calibration: Calibration) -> str:
-    """In which frames the results are."""
+    """State the frames of the results."""
     if not in_encoder_frames(calibration.units):
         return "frames {i} as in the drawing, from flanges that are parallel"
     return frames_said(calibration.zero_sd_rad)
 
 
 def format_calibration(calibration: Calibration) -> str:
-    """Readable report, values as ``value +- standard error``."""
+    """Format a readable report, with values as ``value +- standard error``."""
     count = len(calibration.trials)
     seconds = sum(trial.duration_s for trial in calibration.trials)
     lines = [
@@ -94,13 +94,13 @@ def _wrapped(sentences: str) -> str:
 
 
 def shown_groups(calibration: Calibration) -> list[Group]:
-    """Those of which at least one deviation of one robot is not held; arm masses only where they are not all alike."""
+    """Return the groups with at least one free deviation; arm masses only if they have no common ratio."""
     hidden = MASSES if alike(calibration) else ()
     return [g for g in GROUPS if calibration.sd[:, AT[g.name]].any() and g.name not in hidden]
 
 
 def alike(calibration: Calibration) -> bool:
-    """Whether all arms' masses are off by one ratio: the prior knows no other."""
+    """Return whether one common ratio scales all arm masses, because the prior allows no other."""
     return calibration.prior.arm_mass_ratio == 0 and bool(calibration.sd[:, AT[MASSES[0]]].any())
 
 
@@ -180,11 +180,11 @@ _HEAD = """\
 
 
 def unit_toml(calibration: Calibration, robot: int) -> str:
-    """A robot's numbers as TOML.
+    """Format a robot's parameters as TOML.
 
     Args:
-        calibration: with it.
-        robot: counted from 1.
+        calibration: calibration that contains the robot.
+        robot: number of the robot, from 1.
     """
     unit = calibration.units
     k = robot - 1

@@ -1,1 +1,1 @@
-"""From motions and wrenches to grasps and inertial parameters."""
+"""Estimate grasps and inertial parameters from motions and wrenches."""

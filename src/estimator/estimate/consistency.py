@@ -1,8 +1,7 @@
-"""Checks that the recordings of one payload fit together, for data that are wrong rather than noisy.
+"""Check that the recordings of one payload are consistent, to detect wrong rather than noisy data.
 
-What cannot be seen: a full exchange of two robots' columns in a *single* recording is only a renumbering of
-the robots; and a payload is known by its wrenches alone, so a wrong torque sign or scale that all samples
-share looks like another payload unless internal forces or the inertia give it away.
+Two errors are undetectable. Exchanging all columns of two robots in a *single* recording only renumbers the robots. A
+wrong torque sign or scale in all samples looks like another payload, unless internal forces or the inertia reveal it.
 """
 
 from collections.abc import Sequence
@@ -27,25 +26,27 @@ from estimator.statistics import rms_length
 
 NOT_RIGID_ERROR = 0.5
 NOT_RIGID_FLAG = 0.1
-"""Residual of a pair's twists over their motion: more is not one rigid body, or deserves a flag."""
+"""Residual of a pair's twists relative to their motion, above which to report an error (not one rigid body) or a flag.
+"""
 ANGLE_TOLERANCE_RAD = np.deg2rad(5.0)
 POSITION_TOLERANCE = 0.05
-"""Disagreement of two recordings' grasps [m, and per m of distance] that no calibration error explains."""
+"""Disagreement of two recordings' grasps [m, and per m of distance] above which calibration errors do not explain it.
+"""
 FORCE_FLAG = 0.05
 MOMENT_FLAG = 0.05
-"""Wrench balance: force residual over weight; moment residual over weight and over the grasps' span."""
+"""Limits of the wrench balance: force residual over weight; moment residual over weight and over the grasps' span."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Processed data of one recording, with what its metadata say.
+    """Processed data of one recording, with information from its metadata.
 
     Attributes:
-        name: how messages call it.
+        name: name in messages.
         kind, payload: ``"random"``, ``"periodic"`` or ``"static"``; label of the payload, or None.
-        steps: rounding of its channels, or None where nobody asks whether the robots contradict each other.
-        team: number of robots that carried the payload, as far as the metadata say.
-        units: the robots as they are, or None for robots as designed.
+        steps: rounding steps of its channels, or None to skip the check for contradictions between robots.
+        team: number of robots that carried the payload, according to the metadata.
+        units: the robots with their deviations, or None for robots as designed.
     """
 
     name: str
@@ -58,7 +59,7 @@ class Trial:
 
 
 def check_same_payload(trials: Sequence[Trial]) -> str | None:
-    """The common payload label, or None when no recording has one.
+    """Return the common payload label, or None if no recording has one.
 
     Raises:
         InputError: there is no recording, or numbers of robots, payload labels or gravity differ.
@@ -85,10 +86,10 @@ def check_same_payload(trials: Sequence[Trial]) -> str | None:
 
 
 def check_rigid(name: str, grasps: GraspEstimate) -> list[str]:
-    """Flags for pairs of robots whose twists do not fit one rigid body.
+    """Return flags for pairs of robots whose twists do not fit one rigid body.
 
     Raises:
-        InputError: a pair's residual is of the size of its motion.
+        InputError: a pair's residual is comparable to its motion.
     """
     flags = []
     for i, j in combinations(range(grasps.robots), 2):
@@ -111,7 +112,7 @@ def check_rigid(name: str, grasps: GraspEstimate) -> list[str]:
 
 
 def check_disagreement_is_noise(name: str, steps: Sequence[StepReport]) -> None:
-    """For grasps that came out undetermined: is it for want of motion?
+    """Check that undetermined grasps are due to a lack of motion.
 
     Raises:
         InputError: the robots disagree by more than any encoder noise, so they are not on one rigid body.
@@ -127,10 +128,10 @@ def check_disagreement_is_noise(name: str, steps: Sequence[StepReport]) -> None:
 
 
 def check_agreement(names: Sequence[str], grasps: Sequence[GraspEstimate]) -> None:
-    """Do the recordings, each on its own, find the same grasps?
+    """Check that the recordings, each on its own, give the same grasps.
 
     Raises:
-        InputError: they do not; names the recording that stands out and, if exchanging two robots' columns
+        InputError: they differ. The message names the recording that stands out and, if exchanging two robots' columns
             would explain it, those robots.
     """
     bad = [
@@ -157,9 +158,9 @@ def check_agreement(names: Sequence[str], grasps: Sequence[GraspEstimate]) -> No
 def wrench_balance(
     data: GraspData, grasps: GraspEstimate, mass: float, p_1c: Array, inertia: InertiaEstimate | None
 ) -> tuple[float, float | None]:
-    """Force residual over weight, and moment residual about the CoM over weight [m]; rms over the trial.
+    """Return force residual over weight, and moment residual about the CoM over weight [m]; rms over the trial.
 
-    Without an inertia there is no telling what the moments should be, and the second result is None.
+    Without an inertia the second result is None.
     """
     motion = fuse(data, grasps)
     lever = np.cross(motion.alpha, p_1c) + np.cross(motion.omega, np.cross(motion.omega, p_1c))
@@ -173,7 +174,7 @@ def wrench_balance(
 
 
 def balance_flags(name: str, force: float, moment_m: float | None, grasps: GraspEstimate) -> list[str]:
-    """Flags for a recording whose wrenches do not add up to the payload's motion."""
+    """Return flags for a recording whose wrenches do not balance the payload's motion."""
     flags = []
     if force > FORCE_FLAG:
         flags.append(
@@ -204,7 +205,7 @@ def _disagreement(a: GraspEstimate, b: GraspEstimate) -> str | None:
 
 
 def _exchanged(grasps: GraspEstimate, i: int, j: int) -> GraspEstimate:
-    """The grasps with robots of index i < j renumbered; covariances only roughly, for the tolerance."""
+    """Renumber robots with index i < j; the covariance stays unchanged and serves only as a rough tolerance."""
     order = np.arange(grasps.robots)
     order[[i, j]] = order[[j, i]]
     R, p = grasps.R_1i[order], grasps.p_1i[order]
@@ -212,18 +213,18 @@ def _exchanged(grasps: GraspEstimate, i: int, j: int) -> GraspEstimate:
 
 
 AT_GIMBAL_M = 5e-3
-"""A lone robot whose payload has its centre of mass so near the gimbal [m] turns it without a moment, which is what a
-payload that others carry, too, looks like. Measured: one of three robots finds it within 1.2 mm."""
+"""Distance of the centre of mass from the gimbal of a single robot [m], below which its moments vanish. A robot of a
+team with missing robots looks the same. Measured: for one of three robots the distance is below 1.2 mm."""
 FORCE_WITHHELD = 0.1
-"""Forces left over, as a share of the weight, beyond which mass and all that follows from it are withheld. Measured:
-poorly calibrated robots leave up to 0.04, random trials with one robot of three missing 0.11 and more."""
+"""Force residual over weight above which mass and all dependent results are withheld. Measured: up to 0.04 for poorly
+calibrated robots, 0.11 and more for random trials with one of three robots missing."""
 
 
 def withheld(estimate: PayloadEstimate, team: int) -> PayloadEstimate:
-    """The estimate without what its balance does not bear out, and with the reason among the flags.
+    """Remove results that the force balance contradicts, and add the reason to the flags.
 
-    Robots that carry a payload in part know the part they carry: they make a mass of it that looks as good as any.
-    ``team`` robots carry the payload, as far as the recordings say.
+    If some robots of a team are missing, the others determine only the part that they carry, and their mass looks
+    plausible. ``team`` is the number of robots that carry the payload, according to the recordings.
     """
     if estimate.mass is None:
         return estimate

@@ -1,7 +1,7 @@
-"""The default estimator: one fit of closed loops and balance of wrenches, the robots held as they are said to be.
+"""Estimate a payload with one fit of closed loops and wrench balance, with the robots held.
 
-``estimate`` makes the fit where the recordings allow, else the paper's stages or ``joint``. ``estimate_on`` holds the
-robots as an earlier calibration found them; ``estimate_calibrated`` takes what a calibration found beside its robots.
+``estimate`` makes this fit if the recordings allow it, otherwise the paper's stages or ``joint``. ``estimate_on``
+holds the robots at an earlier calibration. ``estimate_calibrated`` returns the payload of a calibration.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ from estimator.rigid_team import Shared, fuse, inertia_regressor
 from estimator.statistics import rms
 
 ONE_FIT, CALIBRATED = "fit", "calibrated"
-"""Methods of estimates that come from here."""
+"""Methods of the estimates that this module makes."""
 Asked = Literal["auto", "fit", "staged", "joint"]
-"""What may be asked for: one fit of loops and balance, a method of ``estimate_payload``, or the best there is."""
+"""Methods to request: the fit, a method of ``estimate_payload``, or the best available."""
 WITHOUT_ERRORS = (
     "The recordings carry the calibration of their robots without its errors, so that standard errors lack them; an "
     "estimate with the calibration itself (--calibration) has them."
@@ -57,11 +57,11 @@ WITHOUT_ERRORS = (
 
 
 class _CannotBe(Exception):
-    """Why one fit cannot be made."""
+    """Reason why the one fit is impossible."""
 
 
 class _Read(NamedTuple):
-    """What of one recording goes into the fit; ``why_not`` where it cannot."""
+    """Input of the fit from one recording; ``why_not`` is the reason if it is unusable."""
 
     design: OmnidDesign
     rows: Rows | None
@@ -89,16 +89,16 @@ def estimate(
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
     Args:
-        recordings: one or several trials with the same robots and grasps, taken one after the other.
-        method: ``"fit"``, one least squares of closed loops and balance of wrenches, the robots held; ``"staged"`` and
-            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine the centre of
-            mass and nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit
-            further.
-        cutoff_hz: cut-off of the low-pass filter for what the fit does not do [Hz].
-        say: takes the name of the stage that begins.
+        recordings: one or several trials with the same robots and grasps, consumed one at a time.
+        method: ``"fit"``, one least squares of closed loops and wrench balance with the robots held; ``"staged"`` and
+            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit if the recordings determine the centre of mass
+            and only noise remains. Otherwise ``"auto"`` is that of ``estimate_payload``, because model errors bias the
+            fit more.
+        cutoff_hz: cut-off of the low-pass filter for everything except the fit [Hz].
+        say: callback for the name of each stage.
 
     Raises:
-        InputError: as ``estimate_payload``, or a fit was asked for and cannot be made.
+        InputError: as ``estimate_payload``, or the requested fit is impossible.
     """
     if method not in ("auto", ONE_FIT):
         return _said(estimate_payload(recordings, method, cutoff_hz, say=say))
@@ -110,7 +110,7 @@ def estimate(
             names.append(recording.name)
             trials.append(trial_of(recording, cutoff_hz))
             read.append(_Read.of(recording))
-            del recording  # or the next one would be read before this one is let go
+            del recording  # free its memory before reading the next one
         staged = estimate_from_trials(trials, "auto", say=say, withhold=False)
     team = max(trial.team for trial in trials)
     say("one fit")
@@ -128,12 +128,12 @@ def estimate(
 
 
 def _said(estimate: PayloadEstimate) -> PayloadEstimate:
-    """With what a reader must know of robots that the recordings know."""
+    """Add the caveat on standard errors if the recordings contain calibrated robots."""
     return estimate if estimate.units is None else replace(estimate, open=(*estimate.open, WITHOUT_ERRORS))
 
 
 def _fitted(staged: PayloadEstimate, trials: Sequence[Trial], read: Sequence[_Read]) -> Fit:
-    """The fit, from where the staged estimate is."""
+    """Fit the payload, starting from the staged estimate."""
     if staged.robots < 2:
         raise _CannotBe("one robot closes no loop")
     grasps, mass, c = staged.grasps, staged.mass, staged.p_1c
@@ -144,7 +144,7 @@ def _fitted(staged: PayloadEstimate, trials: Sequence[Trial], read: Sequence[_Re
     if staged.units is None and any(trial.units is not None for trial in trials):
         raise _CannotBe("the recordings say different things of their robots")
     units = staged.units or ArmUnit(read[0].design, np.zeros((staged.robots, COUNT)))
-    if staged.inertia is None:  # the fit leaves it as open as the recordings do
+    if staged.inertia is None:  # start from the joint estimate, however uncertain
         pi = estimate_joint([trial.data for trial in trials], grasps)[0].parameters
     else:
         pi = about_origin(mass.mass, c, staged.inertia.inertia)
@@ -160,7 +160,7 @@ def _fitted(staged: PayloadEstimate, trials: Sequence[Trial], read: Sequence[_Re
 
 
 def _check_noise(found: Fit, names: Sequence[str]) -> None:
-    """Whether noise is all that the fit leaves."""
+    """Raise ``_CannotBe`` if the fit leaves more than noise or did not converge."""
     left = [
         (part.ratio, name, what)
         for name, trial in zip(names, found.point.trials, strict=True)
@@ -183,19 +183,19 @@ def estimate_calibrated(
     cutoff_hz: float = 5.0,
     say: Callable[[str], object] = lambda _: None,
 ) -> PayloadEstimate:
-    """Grasps, mass, centre of mass and inertia as the calibration found them, errors of a held spring scale included.
+    """Return grasps, mass, centre of mass and inertia of a calibration, including errors of a held spring scale.
 
-    What each recording says (holds, robots that contradict each other, wrenches left over) is judged with the
-    calibrated arms. All is in the calibration's frames.
+    Holds, contradictions between robots and remaining wrenches of each recording are evaluated with the calibrated
+    arms. All results are in the calibration's frames.
 
     Args:
-        calibration: made from these recordings, and others perhaps.
-        recordings: of one of its payloads.
-        cutoff_hz: cut-off of the low-pass filter for what each recording says [Hz].
-        say: takes the name of the stage that begins.
+        calibration: made from these recordings, and possibly others.
+        recordings: recordings of one of its payloads.
+        cutoff_hz: cut-off of the low-pass filter for the evaluation of each recording [Hz].
+        say: callback for the name of each stage.
 
     Raises:
-        InputError: the recordings are of several payloads, or of one that the calibration does not have.
+        InputError: the recordings are of several payloads, or of one that the calibration does not contain.
     """
     payload = _payload_of(calibration, recordings)
     trials = [trial_of(calibrated(recording, calibration), cutoff_hz) for recording in recordings]
@@ -215,7 +215,7 @@ def estimate_calibrated(
 def _with_payload(
     staged: PayloadEstimate, trials: Sequence[Trial], payload: CalibratedPayload, scale_sd: float
 ) -> PayloadEstimate:
-    """A staged estimate with its numbers from a fit of loops and balance, and what each recording leaves of them."""
+    """Replace the numbers of a staged estimate by those of a fit, and re-evaluate what each recording leaves over."""
     numbers = carried(payload, scale_sd)
     grasps = _grasps(payload, scale_sd, staged)
     inertia = _inertia(trials, grasps, numbers)
@@ -224,7 +224,7 @@ def _with_payload(
         force, moment = wrench_balance(trial.data, grasps, numbers.mass_kg, numbers.p_1c, inertia)
         records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
     before = inertia_flags(staged.inertia) if staged.inertia else []
-    # What a least squares of twists would not tell apart from noise says nothing of the fit: its errors do.
+    # The staged excitation does not apply to the fit; judge the inertia by the fit's own standard errors.
     steps = [
         inertia.judged(replace(step, weak=())) if step.step == "inertia" else step for step in staged.steps
     ]
@@ -250,15 +250,15 @@ def estimate_on(
     cutoff_hz: float = 5.0,
     say: Callable[[str], object] = lambda _: None,
 ) -> PayloadEstimate:
-    """Estimate a payload on robots held as an earlier calibration found them, whose errors go on to it.
+    """Estimate a payload with robots held at an earlier calibration, and propagate its errors.
 
     Args:
-        calibration: of the same robots.
-        recordings: of one payload.
-        method: ``"auto"``, the calibration's own least squares with the robots held, where the recordings suffice for
-            it, else as in ``estimate_payload``; ``"fit"``, the former in any case; or one of ``estimate_payload``.
+        calibration: calibration of the same robots.
+        recordings: recordings of one payload.
+        method: ``"auto"``, the calibration's own least squares with the robots held if the recordings suffice,
+            otherwise as in ``estimate_payload``; ``"fit"``, always the former; or a method of ``estimate_payload``.
         cutoff_hz: cut-off of the low-pass filter [Hz].
-        say: takes the name of the stage that begins.
+        say: callback for the name of each stage.
 
     Raises:
         InputError: the recordings are of several payloads or other robots, or as in ``estimate_payload``.
@@ -266,7 +266,7 @@ def estimate_on(
     one_payload(recordings)
     known = [calibrated(recording, calibration) for recording in recordings]
     held: Calibration | None = None
-    # What other methods need not, or say in their own words.
+    # Other methods may not need this fit, or report its errors themselves.
     with nullcontext() if method == "fit" else suppress(InputError):
         held = calibrate(known, robots=calibration, say=say)
     if held is not None and method in ("auto", "fit"):
@@ -278,9 +278,10 @@ def estimate_on(
 def _with_errors(
     estimate: PayloadEstimate, calibration: Calibration, held: Calibration | None
 ) -> PayloadEstimate:
-    """An estimate with the errors that a fit with the robots held has, on top of its own.
+    """Add the covariance of a fit with held robots to that of an estimate.
 
-    Those are the robots' and, within, those of a fit that follows noise less: at most 1.4 times too much.
+    The added covariance includes the robots' errors and the noise of that fit, so standard errors are at most 1.4
+    times too large.
     """
     estimate = replace(estimate, open=calibration.open, zero_sd_rad=calibration.zero_sd_rad)
     mass, grasps, inertia = estimate.mass, estimate.grasps, estimate.inertia
@@ -337,7 +338,7 @@ def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> Ca
 
 
 def _grasps(payload: CalibratedPayload, scale_sd: float, staged: PayloadEstimate) -> GraspEstimate:
-    """The calibration's frames; residuals of twists, which it does not use, are those of the staged estimate."""
+    """Return the fit's frames, with the twist residuals of the staged estimate."""
     found, own = staged.grasps or payload.grasps, grasps_of(payload, scale_sd)
     return replace(found, R_1i=own.R_1i, p_1i=own.p_1i, covariance=own.covariance)
 
@@ -356,7 +357,7 @@ def _inertia(trials: Sequence[Trial], grasps: GraspEstimate, numbers: Carried) -
 
 
 def _force_residual(records: Sequence, numbers: Carried, trials: Sequence[Trial]) -> float:
-    """rms of the forces left over [N], over all recordings."""
+    """Return the rms of the remaining forces over all recordings [N]."""
     count = np.array([trial.data.samples for trial in trials])
     share = np.array([record.force_residual for record in records])
     weight = numbers.mass_kg * trials[0].data.gravity_mps2

@@ -1,18 +1,17 @@
-"""Relative grasp frames from twists (paper, section III-B): Wahba, positions, refinement over all pairs.
+"""Estimate relative grasp frames from twists (paper, section III-B): Wahba, positions, refinement over all pairs.
 
-The refinement has the unknowns T_12, ..., T_1N only. Every other T_ij is T_1i^-1 T_1j by construction, so all
-loops close exactly and no constraint is left to weigh against the data. It minimises the weighted squares of
-the residuals of all pairs i < j,
+The refinement has the unknowns T_12, ..., T_1N only. Every other T_ij is T_1i^-1 T_1j by construction, so all loops
+close exactly and need no constraint. It minimises the weighted squares of the residuals of all pairs i < j,
 
-    e_w = R_1i omega_i - R_1j omega_j,    e_v = R_1i v_i - R_1j v_j - [p_1j - p_1i] w,
+    e_w = R_1i omega_i - R_1j omega_j,    e_v = R_1i v_i - R_1j v_j - [p_1j - p_1i] w.
 
-equation (2) rotated into {1}, with one difference: w is the mean of R_1k omega_k over all robots instead of
-R_1j omega_j. Noise in the angular velocity that multiplies p shortens the estimate of p; the mean has 1/N of
-that noise power, treats the two robots of a pair alike, and renumbering the robots changes nothing.
+This is equation (2) rotated into {1}, except that w is the mean of R_1k omega_k over all robots instead of R_1j
+omega_j. Noise in the angular velocity that multiplies p biases p toward zero. The mean has 1/N of that noise power, is
+symmetric in the two robots of a pair, and does not depend on their numbering.
 
-All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, so sums of their products
-depend on the samples only through V V^T: a triangular 6N x 6N factor of all samples replaces them in the fit, and the
-products themselves in sums over windows of samples.
+All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, so sums of their products depend on the
+samples only through V V^T. The fit therefore uses a triangular 6N x 6N factor of all samples, and sums over windows
+use the products V V^T.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ from estimator.statistics import rms
 class PairGrasp:
     """Rotation and origin [m] of frame {j} in {i}, robots counted from 1.
 
-    The covariance (6, 6) is of (error rotation d in {i} [rad], e [m]): the truth is exp(d) R_ij, p_ij + e.
+    The covariance (6, 6) is of (error rotation d in {i} [rad], e [m]): the true values are exp(d) R_ij and p_ij + e.
     """
 
     i: int
@@ -76,7 +75,7 @@ class PairGrasp:
         return norm_se(self.p_ij, self.covariance[3:, 3:])
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "i": self.i,
             "j": self.j,
@@ -98,11 +97,11 @@ class GraspEstimate:
     Attributes:
         R_1i: rotations, shape (N, 3, 3).
         p_1i: origins [m], shape (N, 3).
-        covariance: of (d_2, e_2, d_3, e_3, ...), shape (6(N-1), 6(N-1)): the truth is exp(d_i) R_1i and
-            p_1i + e_i, with d_i [rad] and e_i [m] both in {1}.
+        covariance: of (d_2, e_2, d_3, e_3, ...), shape (6(N-1), 6(N-1)): the true values are exp(d_i) R_1i and p_1i +
+            e_i, with d_i [rad] and e_i [m] both in {1}.
         angular_residual_rms: rms per component of omega_i - R_ij omega_j [rad/s], shape (N, N).
-        linear_residual_rms: rms per component of v_i - R_ij v_j - [p_ij] omega [m/s], omega being the mean
-            of all robots' angular velocities in {i}, shape (N, N), symmetric like the angular one.
+        linear_residual_rms: rms per component of v_i - R_ij v_j - [p_ij] omega [m/s], shape (N, N), symmetric. omega
+            is the mean of all robots' angular velocities in {i}.
         angular_motion_rms: rms per component of omega_i [rad/s], shape (N,).
         linear_motion_rms: rms per component of v_i [m/s], shape (N,).
     """
@@ -129,7 +128,7 @@ class GraspEstimate:
         return T
 
     def pair(self, i: int, j: int) -> PairGrasp:
-        """T_ij with its covariance; robots counted from 1.
+        """Return T_ij with its covariance; robots counted from 1.
 
         Raises:
             ValueError: a robot number is outside 1..N.
@@ -147,7 +146,7 @@ class GraspEstimate:
         return PairGrasp(i, j, T[:3, :3], T[:3, 3], J @ self.covariance @ J.T)
 
     def moved(self, x: Array) -> GraspEstimate:
-        """The same with errors x = (d_2, e_2, ...), shape (6(N-1),), applied as in ``covariance``."""
+        """Add errors x = (d_2, e_2, ...), shape (6(N-1),), as defined in ``covariance``."""
         x = np.asarray(x).reshape(-1, 6)
         R, p = self.R_1i.copy(), self.p_1i.copy()
         if len(x):
@@ -155,13 +154,13 @@ class GraspEstimate:
         return replace(self, R_1i=R, p_1i=p)
 
     def rounded(self, still_rad2: Array) -> GraspEstimate:
-        """The same with errors of every robot's tilt that last, of so much variance about every axis, shape (N,)."""
+        """Add the covariance of constant tilt errors of the robots, with this variance about each axis, shape (N,)."""
         own = np.kron(still_rad2[1:], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
         first = np.reshape([[np.eye(3), -so3.skew(p)] for p in self.p_1i[1:]], (-1, 3))
         return replace(self, covariance=self.covariance + np.diag(own) + still_rad2[0] * first @ first.T)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "pairs": [
                 self.pair(i, j).to_dict()
@@ -180,7 +179,7 @@ class GraspEstimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], robots: int) -> GraspEstimate:
-        """Inverse of ``to_dict``, for a number of robots N."""
+        """Inverse of ``to_dict`` for N robots."""
         R, p, size = np.tile(np.eye(3), (robots, 1, 1)), np.zeros((robots, 3)), 6 * (robots - 1)
         for pair in values["pairs"]:
             if pair["i"] == 1:
@@ -203,7 +202,7 @@ class GraspEstimate:
 
 
 def single_robot() -> GraspEstimate:
-    """The grasp "estimate" of a team of one: {1} in {1}, exactly."""
+    """Return the exact grasp of a single robot: {1} in {1}."""
     nothing = np.zeros((1, 1))
     return GraspEstimate(
         np.eye(3)[None], np.zeros((1, 3)), np.zeros((0, 0)), nothing, nothing, np.zeros(1), np.zeros(1)
@@ -211,20 +210,20 @@ def single_robot() -> GraspEstimate:
 
 
 RATE_FLOOR_RADPS = 1e-10
-"""Angular velocity that cannot be told from rounding error of differenced angles [rad/s]."""
+"""Angular velocity below which it is rounding error of differenced angles [rad/s]."""
 
 
 def pair_rotation(omega_i: Array, omega_j: Array) -> Array:
-    """R_ij that best maps angular velocities omega_j onto omega_i, (Q, 3) (Wahba's problem), equations (3)-(5)."""
-    with warnings.catch_warnings():  # scipy warns when R is not unique; the caller judges that from the noise
+    """Return R_ij that best maps angular velocities omega_j to omega_i, (Q, 3) (Wahba's problem), equations (3)-(5)."""
+    with warnings.catch_warnings():  # scipy warns if R is not unique; the caller checks the excitation
         warnings.simplefilter("ignore", UserWarning)
         return Rotation.align_vectors(omega_i, omega_j)[0].as_matrix()
 
 
 def pair_position(twist_i: Array, twist_j: Array, R_ij: Array) -> Array:
-    """p_ij [m] that best explains the linear velocities of twists (omega, v) in {i} and {j}, shape (Q, 6).
+    """Return p_ij [m] that best explains the linear velocities of twists (omega, v) in {i} and {j}, shape (Q, 6).
 
-    Equations (6)-(8); the shortest if not unique.
+    Equations (6)-(8); the shortest solution if it is not unique.
     """
     A = so3.skew(twist_j[:, :3] @ R_ij.T).reshape(-1, 3)
     b = (twist_j[:, 3:] @ R_ij.T - twist_i[:, 3:]).ravel()
@@ -232,11 +231,11 @@ def pair_position(twist_i: Array, twist_j: Array, R_ij: Array) -> Array:
 
 
 def estimate_grasps(trials: Sequence[GraspData]) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
-    """Grasp frames of all N robots from one or several trials of the same payload; trials count by samples and motion.
+    """Estimate grasp frames of all N robots from one or several trials of a payload, weighted by samples and motion.
 
     Returns:
-        The estimate, or None when some T_1j is not determined, and two reports per robot j > 1 (rotation,
-        position). For N = 1 the estimate is exact and there is nothing to report.
+        The estimate, or None if some T_1j is undetermined, and two reports per robot j > 1 (rotation, position). For N
+        = 1 the estimate is exact and there are no reports.
     """
     N = trials[0].robots
     if N == 1:
@@ -244,7 +243,7 @@ def estimate_grasps(trials: Sequence[GraspData]) -> tuple[GraspEstimate | None, 
     stacked = [trial.twist.reshape(trial.samples, -1) for trial in trials]  # (Q, 6N)
     samples = sum(trial.samples for trial in trials)
     pooled = _triangle(np.concatenate([_triangle(V) for V in stacked]))  # (6N, 6N)
-    V = pooled.reshape(-1, N, 6)  # its rows play the part of samples
+    V = pooled.reshape(-1, N, 6)  # its rows replace the samples
 
     R, p, reports = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3)), []
     for j in range(1, N):
@@ -255,7 +254,7 @@ def estimate_grasps(trials: Sequence[GraspData]) -> tuple[GraspEstimate | None, 
         return None, tuple(reports)
 
     weights = np.ones((2, 1, 1))
-    for _ in range(2):  # the second round frees the weights from the pairs that the start is made of
+    for _ in range(2):  # the second pass removes the dependence of the weights on the initial pairs
         weights = _weights(V, R, p)
         R, p = _refine(V, R, p, weights)
 
@@ -271,13 +270,13 @@ def estimate_grasps(trials: Sequence[GraspData]) -> tuple[GraspEstimate | None, 
 
 
 def _excitation(V_1: Array, V_j: Array, R: Array, p: Array, robot: int, samples: int) -> list[StepReport]:
-    """Does the payload turn about at least two axes, clearly above the disagreement of the two robots?"""
+    """Judge whether the payload turns about at least two axes, clearly above the disagreement of the two robots."""
     information = cross_information(V_1[:, :3]) * len(V_1) / samples
     e_w = V_1[:, :3] - V_j[:, :3] @ R.T
     e_v = V_1[:, 3:] - V_j[:, 3:] @ R.T + np.cross(V_j[:, :3] @ R.T, p)
     noise_w, noise_v = (float(np.sqrt(np.sum(e**2) / (3 * samples))) for e in (e_w, e_v))
-    # Scaled by 1 m: the velocity that a position error of 1 m would cause, against the residual's.
-    # With an open rotation that residual means nothing, and the rates' own noise stands in for it.
+    # Scaled by 1 m: compare the velocity due to a position error of 1 m with the velocity residual.
+    # If the rotation is undetermined, that residual is meaningless; use the noise of the rates instead.
     common: Any = {
         "frame": "{1}", "floor": RATE_FLOOR_RADPS,
         "reason": "the payload does not turn enough about any axis across it",
@@ -292,16 +291,16 @@ def _excitation(V_1: Array, V_j: Array, R: Array, p: Array, robot: int, samples:
 
 
 def _weights(V: Array, R: Array, p: Array) -> Array:
-    """Weights (2, 1, 1) of angular and linear residuals: the inverse of their rms, the first scaled to 1."""
+    """Return weights (2, 1, 1) of angular and linear residuals: inverse of their rms, relative to the angular one."""
     r = _residuals(V, R, p)
     motion = rms(V[..., :3]), rms(V[..., 3:])
-    # The guard keeps exact data from dividing by zero.
+    # Avoid division by zero for exact data.
     left = [max(rms(r[:, k]), 1e-12 * motion[k], 1e-300) for k in (0, 1)]
     return np.array([1.0, left[0] / left[1]])[:, None, None]
 
 
 def _refine(V: Array, R: Array, p: Array, weights: Array) -> tuple[Array, Array]:
-    """Least squares over T_12..T_1N on the manifold, started at (R, p)."""
+    """Minimize over T_12..T_1N on the manifold, starting at (R, p)."""
     N = len(p)
     R_0, p_0 = R.copy(), p.copy()
 
@@ -320,7 +319,7 @@ def _refine(V: Array, R: Array, p: Array, weights: Array) -> tuple[Array, Array]
         return J.reshape(-1, 6 * (N - 1))
 
     start = np.zeros(6 * (N - 1))
-    size = float(np.sqrt(np.sum(jacobian(start) ** 2)))  # brings the cost near one, whatever the units
+    size = float(np.sqrt(np.sum(jacobian(start) ** 2)))  # normalizes the cost, independently of units
     solution = least_squares(
         lambda x: residuals(x) / size,
         start,
@@ -338,7 +337,7 @@ def _pairs(N: int) -> list[tuple[int, int]]:
 
 
 def _residuals(V: Array, R: Array, p: Array) -> Array:
-    """Residuals (e_w, e_v) in {1} of all pairs, shapes (Q, N, 6) -> (pairs, 2, Q, 3)."""
+    """Return residuals (e_w, e_v) in {1} of all pairs, shapes (Q, N, 6) -> (pairs, 2, Q, 3)."""
     w, u = np.einsum("iab,qib->iqa", R, V[..., :3]), np.einsum("iab,qib->iqa", R, V[..., 3:])
     i, j = np.array(_pairs(len(p))).T
     e_v = u[i] - u[j] - np.cross((p[j] - p[i])[:, None], w.mean(axis=0))
@@ -346,7 +345,7 @@ def _residuals(V: Array, R: Array, p: Array) -> Array:
 
 
 def _jacobian(V: Array, R: Array, p: Array) -> Array:
-    """Derivative of ``_residuals`` by (d_2, e_2, ...), R_1i -> exp(d_i) R_1i, p_1i -> p_1i + e_i.
+    """Return the derivative of ``_residuals`` by (d_2, e_2, ...), R_1i -> exp(d_i) R_1i, p_1i -> p_1i + e_i.
 
     Shape (pairs, 2, Q, 3, 6(N-1)).
     """
@@ -365,7 +364,7 @@ def _jacobian(V: Array, R: Array, p: Array) -> Array:
 
 
 def _triangle(V: Array) -> Array:
-    """Square factor R with R^T R = V^T V, shapes (Q, K) -> (K, K)."""
+    """Return a square factor R with R^T R = V^T V, shapes (Q, K) -> (K, K)."""
     R = np.linalg.qr(V, mode="r")
     return np.vstack([R, np.zeros((V.shape[1] - len(R), V.shape[1]))])
 
@@ -373,9 +372,9 @@ def _triangle(V: Array) -> Array:
 def _window_sums(
     trials: Sequence[GraspData], stacked: Sequence[Array], R: Array, p: Array, weights: Array
 ) -> tuple[Array, Array]:
-    """Normal matrices (B, K, K) and scores (B, K) of all windows; K = 6(N-1).
+    """Return normal matrices (B, K, K) and scores (B, K) of all windows; K = 6(N-1).
 
-    Residuals and their derivatives are those of unit twists, so that sums over a window are those of its V V^T.
+    Residuals and derivatives are evaluated for unit twists, so that the sums over a window follow from its V V^T.
     """
     N = len(p)
     K, unit = 6 * (N - 1), np.eye(6 * N).reshape(-1, N, 6)

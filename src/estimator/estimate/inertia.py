@@ -1,7 +1,7 @@
-"""Inertia matrix about the centre of mass from motion (paper, section III-D).
+"""Estimate the inertia matrix about the centre of mass from motion (paper, section III-D).
 
-{b} sits at the estimated centre of mass with the axes of {s} = {1}. Moments are taken about the centre of
-mass, so its acceleration enters nowhere: m_b = I alpha + omega x I omega, equation (18).
+{b} is at the estimated centre of mass with the axes of {s} = {1}. Moments are taken about the centre of mass, so its
+acceleration does not enter: m_b = I alpha + omega x I omega, equation (18).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from estimator.signals import GraspData
 from estimator.statistics import rms
 
 AXES_SE_LIMIT_RAD = np.deg2rad(20)
-"""Principal axes less certain than this are not reported."""
+"""Largest standard error of reported principal axes."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class PrincipalInertia:
     Attributes:
         moments: principal moments, ascending [kg m^2], shape (3,).
         moments_se: their standard errors [kg m^2], shape (3,).
-        R_1c: principal axes as columns in {1} (= axes of {b}), right-handed, shape (3, 3); of the four
-            choices of signs the one of smallest rotation angle, as in Table I. None when undetermined.
+        R_1c: principal axes as columns in {1} (= axes of {b}), right-handed, shape (3, 3). The signs give the smallest
+            rotation angle of the four choices, as in Table I. None if undetermined.
         R_1c_covariance: covariance of the error rotation in {1} [rad^2], shape (3, 3), or None.
     """
 
@@ -72,7 +72,7 @@ class PrincipalInertia:
         return standard_errors(so3.rotvec_covariance(self.R_1c, self.R_1c_covariance))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         axes, axes_se, covariance = self.axis_angle_rad, self.axis_angle_se_rad, self.R_1c_covariance
         return {
             "principal_kgm2": self.moments.tolist(),
@@ -84,7 +84,7 @@ class PrincipalInertia:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> PrincipalInertia:
-        """Inverse of ``to_dict``; other keys are left alone."""
+        """Inverse of ``to_dict``; other keys are ignored."""
         axes, covariance = values["R_1c_axis_angle_deg"], values["R_1c_covariance_rad2"]
         return cls(
             np.array(values["principal_kgm2"]),
@@ -95,13 +95,13 @@ class PrincipalInertia:
 
 
 def about_origin(mass: float, c: Array, inertia: Array) -> Array:
-    """(m, m c, J about the origin), shape (10,), from mass [kg], centre of mass [m], inertia about it [kg m^2]."""
+    """Return (m, m c, J about the origin), shape (10,), from mass [kg], centre of mass c [m], inertia [kg m^2]."""
     about = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
     return np.concatenate([[mass], mass * c, inertia_parameters(about)])
 
 
 def about_com(parameters: Array) -> Array:
-    """Inverse of ``about_origin``: (m, c, inertia about c), shape (10,)."""
+    """Inverse of ``about_origin``: return (m, c, inertia about c), shape (10,)."""
     m = parameters[0]
     c = parameters[1:4] / m
     inertia = inertia_matrix(parameters[4:]) - m * (c @ c * np.eye(3) - np.outer(c, c))
@@ -109,7 +109,7 @@ def about_com(parameters: Array) -> Array:
 
 
 def project_positive(inertia: Array) -> tuple[Array, bool]:
-    """Footnote 1: replace negative eigenvalues by zero; second result tells whether there were any."""
+    """Replace negative eigenvalues by zero (footnote 1); also return whether there were any."""
     values, vectors = np.linalg.eigh(inertia)
     if values[0] >= 0:
         return inertia, False
@@ -117,9 +117,11 @@ def project_positive(inertia: Array) -> tuple[Array, bool]:
 
 
 def principal_inertia(inertia: Array, covariance: Array) -> PrincipalInertia:
-    """Equation (27) with standard errors by first-order perturbation.
+    """Return principal moments and axes, equation (27), with standard errors by first-order perturbation.
 
-    From the matrix in {b}, axes of {1} [kg m^2], and the covariance of its six parameters (20) [kg^2 m^4].
+    Args:
+        inertia: matrix in {b}, axes of {1} [kg m^2], shape (3, 3).
+        covariance: of its six parameters (20) [kg^2 m^4], shape (6, 6).
     """
     moments, axes = np.linalg.eigh(inertia)
     axes = _smallest_rotation(axes)
@@ -144,7 +146,7 @@ def principal_inertia(inertia: Array, covariance: Array) -> PrincipalInertia:
 
 
 def _smallest_rotation(axes: Array) -> Array:
-    """Signs of the columns such that they are right-handed and the rotation angle is smallest."""
+    """Choose the signs of the columns for a right-handed matrix with the smallest rotation angle."""
     choices = [axes * np.array(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]
     choices = [R if np.linalg.det(R) > 0 else -R for R in choices]
     return max(choices, key=np.trace)
@@ -154,7 +156,7 @@ PARAMETERS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 SE_LIMIT = 1 / 3
 """Largest standard error of a determined direction, relative to the payload's typical inertia."""
 UNCERTAIN = "its standard error is as large as a third of the inertia"
-_JACOBIAN_SAMPLES = 1000  # carrying the covariance of grasps and CoM forward needs no more
+_JACOBIAN_SAMPLES = 1000  # sufficient to propagate the covariance of grasps and CoM
 
 
 @dataclass(frozen=True)
@@ -163,9 +165,9 @@ class InertiaEstimate:
 
     Attributes:
         inertia: matrix about the centre of mass in the axes of {1} [kg m^2], shape (3, 3).
-        covariance: of (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) [kg^2 m^4], errors of grasps and CoM included, (6, 6).
+        covariance: of (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) [kg^2 m^4], including errors of grasps and CoM, (6, 6).
         principal: moments and axes.
-        projected: True when a negative eigenvalue was replaced by zero (footnote 1).
+        projected: True if a negative eigenvalue was replaced by zero (footnote 1).
         residual_rms: rms per component of the moment balance about the CoM [N m].
         moment_rms: rms per component of the moment that the inertia explains [N m].
     """
@@ -181,17 +183,17 @@ class InertiaEstimate:
     def of(
         cls, parameters: Array, covariance: Array, residual_rms: float, moment_rms: float
     ) -> InertiaEstimate:
-        """From the six parameters of (20), made positive (footnote 1); the rest as the attributes."""
+        """Make the estimate from the six parameters of (20), projected to positive (footnote 1); see the attributes."""
         inertia, projected = project_positive(inertia_matrix(parameters))
         principal = principal_inertia(inertia, covariance)
         return cls(inertia, covariance, principal, projected, residual_rms, moment_rms)
 
     def judged(self, report: StepReport) -> StepReport:
-        """The report with the directions added that are too uncertain for a body of this size."""
+        """Add the directions to the report whose standard error is too large for the size of the inertia."""
         return refuse_uncertain(report, self.covariance, SE_LIMIT * float(np.trace(self.inertia)) / 3)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "I_b_kgm2": self.inertia.tolist(),
             "I_b_se_kgm2": inertia_matrix(standard_errors(self.covariance)).tolist(),
@@ -221,17 +223,17 @@ def estimate_inertia(
     p_1c: Array,
     upstream: tuple[Array, Array] | None = None,
 ) -> tuple[InertiaEstimate | None, StepReport]:
-    """Inertia by (26) from one or several trials.
+    """Estimate the inertia by (26) from one or several trials.
 
     Args:
         trials: motion of the same payload.
         grasps: the grasp frames.
         p_1c: centre of mass in {1} [m], shape (3,).
-        upstream: covariance of p_1c without the part due to the grasps, shape (3, 3), and derivative of p_1c
-            by the grasp errors, shape (3, 6(N-1)); None takes p_1c as exact.
+        upstream: covariance of p_1c without grasp errors, shape (3, 3), and derivative of p_1c by the grasp errors,
+            shape (3, 6(N-1)); None takes p_1c as exact.
 
     Returns:
-        The estimate, or None when a direction is not determined, and the report.
+        The estimate, or None if a direction is undetermined, and the report.
     """
     parts = [_equations(trial, grasps, p_1c) for trial in trials]
     X, y = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
@@ -258,7 +260,7 @@ def estimate_inertia(
 
 
 def trial_windows(trials: Sequence[GraspData]) -> list[Window]:
-    """Windows over the samples of several trials put one after the other."""
+    """Return windows over the concatenated samples of several trials."""
     out, first = [], 0
     for trial in trials:
         out += windows(trial.samples, trial.rate_hz, first)
@@ -281,7 +283,7 @@ def rotational_excitation(X: Array, alpha_noise: float) -> StepReport:
 
 
 def refuse(report: StepReport, directions: Array, why: str) -> StepReport:
-    """The report with the given directions (K, parameters) added as not determined."""
+    """Add the given directions (K, parameters) to the report as undetermined."""
     weak = []
     for d in directions:
         d = d * np.sign(d[np.argmax(np.abs(d))])
@@ -291,13 +293,13 @@ def refuse(report: StepReport, directions: Array, why: str) -> StepReport:
 
 
 def refuse_uncertain(report: StepReport, covariance: Array, limit: float, why: str = UNCERTAIN) -> StepReport:
-    """The report with the directions added whose standard error is above a limit."""
+    """Add the directions whose standard error exceeds a limit to the report as undetermined."""
     values, vectors = np.linalg.eigh(covariance)
     return refuse(report, vectors[:, np.sqrt(np.maximum(values, 0.0)) > limit].T, why)
 
 
 def _equations(trial: GraspData, grasps: GraspEstimate, p_1c: Array) -> tuple[Array, Array]:
-    """Regressor (Q, 3, 6) and moments about the CoM (Q, 3), equations (19), (21)-(24)."""
+    """Return regressor (Q, 3, 6) and moments about the CoM (Q, 3), equations (19), (21)-(24)."""
     motion = fuse(trial, grasps)
     return inertia_regressor(motion.omega, motion.alpha), motion.moment - np.cross(p_1c, motion.force)
 
@@ -314,7 +316,7 @@ def _upstream_covariance(
     com_covariance: Array,
     com_by_grasp: Array,
 ) -> Array:
-    """Covariance of the inertia due to errors of the CoM and of the grasps, which also move the CoM."""
+    """Return the covariance of the inertia due to errors of the CoM and of the grasps, which also move the CoM."""
     J = by_upstream(thinned(trials), grasps, p_1c, com_by_grasp)
     K = len(grasps.covariance)
     return J[:, :K] @ grasps.covariance @ J[:, :K].T + J[:, K:] @ com_covariance @ J[:, K:].T
@@ -323,13 +325,13 @@ def _upstream_covariance(
 def by_upstream(
     trials: Sequence[GraspData], grasps: GraspEstimate, p_1c: Array, com_by_grasp: Array
 ) -> Array:
-    """Derivative of the parameters (26) by the grasps' errors, which also move the CoM, and by the CoM, (6, K + 3).
+    """Return the derivative of the parameters (26) by grasp errors, which also move the CoM, and by the CoM, (6, K+3).
 
-    Of X x = y with the residual r: X^T X dx = dX^T r + X^T (dy - dX x).
+    Differentiating the normal equations of X x = y with residual r: X^T X dx = dX^T r + X^T (dy - dX x).
 
     Args:
         trials, grasps, p_1c: as for ``estimate_inertia``.
-        com_by_grasp: derivative of p_1c by the grasps' errors, shape (3, K), K = 6(N-1).
+        com_by_grasp: derivative of p_1c by the grasp errors, shape (3, K), K = 6(N-1).
     """
     K = len(grasps.covariance)
     normal, right = np.zeros((6, 6)), np.zeros((6, K + 3))
@@ -355,6 +357,6 @@ def by_upstream(
 
 
 def thinned(trials: Sequence[GraspData]) -> list[GraspData]:
-    """Evenly spaced samples of the trials, about a thousand in all."""
+    """Return evenly spaced samples of the trials, about a thousand in all."""
     stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
     return [trial.every(stride) for trial in trials]

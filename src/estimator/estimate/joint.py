@@ -1,11 +1,11 @@
-"""Mass, centre of mass and inertia in one least squares over the ten standard inertial parameters.
+"""Estimate mass, centre of mass and inertia in one least squares over the ten standard inertial parameters.
 
 With a the acceleration of the origin of {1}, G = a + g up, c = p_1c and J the inertia about that origin,
 
     f = m G + [alpha] m c + [omega]^2 m c,
     M = m c x G + J alpha + omega x J omega,
 
-linear in (m, m c, J). Needs no static hold, and the mass and centre of mass profit from the motion too.
+linear in (m, m c, J). This needs no static hold, and motion also contributes to mass and centre of mass.
 """
 
 from collections.abc import Sequence
@@ -37,9 +37,9 @@ from estimator.signals import GraspData
 from estimator.statistics import rms
 
 COM_SE_LIMIT_M = 0.3
-"""Largest standard error of a centre of mass that is reported [m]. Chosen: a third of what a payload measures."""
+"""Largest standard error of a reported centre of mass [m]. Chosen: a third of the size of a payload."""
 _RANK = 1e-13  # share of the normal matrix below which a direction is rounding error
-_OPEN = 1e12  # variance of what the data do not show, in rms of regressors
+_OPEN = 1e12  # variance of undetermined directions, in rms of regressors
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class JointEstimate:
     """Result of the joint least squares.
 
     Attributes:
-        mass, com, inertia: as the staged scheme gives them; None where not determined.
-        covariance: of (m, p_1c, inertia parameters in {b}), shape (K, K) with K = 1, 4 or 10 determined.
-        parameters: (m, m c, J about {1}), what is not determined among them, shape (10,).
+        mass, com, inertia: as in the staged method; None if undetermined.
+        covariance: of (m, p_1c, inertia parameters in {b}), shape (K, K) with K = 1, 4 or 10 determined parameters.
+        parameters: (m, m c, J about {1}), including undetermined ones, shape (10,).
     """
 
     mass: MassEstimate
@@ -62,13 +62,13 @@ class JointEstimate:
 def estimate_joint(
     trials: Sequence[GraspData], grasps: GraspEstimate
 ) -> tuple[JointEstimate, tuple[StepReport, ...]]:
-    """Ten inertial parameters from any motion of one payload, holds included; fewer where the motion is poor.
+    """Estimate ten inertial parameters from any motion of one payload, including holds; fewer if the motion is poor.
 
     Returns:
-        The estimate and the reports on the centre of mass and the inertia.
+        The estimate, and the reports on the centre of mass and the inertia.
 
     Raises:
-        InputError: the robots do not carry anything (the mass comes out as zero or negative).
+        InputError: the robots do not carry anything (the mass is zero or negative).
     """
     Y, w = _equations(trials, grasps)
     gravity = trials[0].gravity_mps2
@@ -95,7 +95,7 @@ def estimate_joint(
     def moved(x: Array) -> Array:
         return about_com(_solve(*_equations(thin, grasps.moved(x)), weights))
 
-    # All ten stay in the fit, however weak: what is not reported is an uncertainty of what is.
+    # Keep all ten parameters in the fit: unreported ones add to the uncertainty of reported ones.
     thin = thinned(trials)
     J_own = numerical_jacobian(about_com, theta)
     J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
@@ -124,7 +124,7 @@ def estimate_joint(
 
 
 def _open_covariance(normals: Array, scores: Array) -> Array:
-    """``window_covariance`` that gives a great variance to directions that the data do not show at all."""
+    """Return ``window_covariance``, with a large variance for directions without any information."""
     values, axes = np.linalg.eigh(normals.sum(axis=0))
     told, open_ = axes[:, values > _RANK * values[-1]], axes[:, values <= _RANK * values[-1]]
     open_ = np.where(np.abs(open_) > 1e-6, open_, 0.0)
@@ -132,13 +132,13 @@ def _open_covariance(normals: Array, scores: Array) -> Array:
 
 
 def _equations(trials: Sequence[GraspData], grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Regressor (Q, 6, 10) and wrench (Q, 6) as (f, M) over all trials."""
+    """Return regressor (Q, 6, 10) and wrench (f, M) (Q, 6) over all trials."""
     parts = [payload_equations(trial, grasps) for trial in trials]
     return np.concatenate([Y for Y, _ in parts]), np.concatenate([w for _, w in parts])
 
 
 def _solve(Y: Array, w: Array, weights: Array) -> Array:
-    """Least squares with weights (6,) of the rows."""
+    """Solve the least squares with row weights (6,)."""
     A = (weights[:, None] * Y).reshape(-1, Y.shape[-1])
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1.0
@@ -148,9 +148,9 @@ def _solve(Y: Array, w: Array, weights: Array) -> Array:
 
 
 def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
-    """The same with weights from the residuals of forces and of moments; parameters and weights."""
+    """Solve with weights from the residuals of forces and of moments; return parameters and weights."""
     weights = np.ones(6)
-    # Exact data leave rounding error only, which says nothing about weights.
+    # Residuals of exact data are rounding errors, which must not determine weights.
     floor = 1e-9 * np.sqrt(np.mean(w.reshape(-1, 2, 3) ** 2, axis=(0, 2))) + 1e-12
     for _ in range(2):
         residual = (w - Y @ _solve(Y, w, weights)).reshape(-1, 2, 3)
@@ -160,7 +160,7 @@ def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
 
 
 def _tilt_noise(trials: Sequence[GraspData], grasps: GraspEstimate) -> float:
-    """Rms disagreement of the robots' tilts around each robot's constant offset [rad]."""
+    """Return the rms disagreement of the robots' tilts about each robot's constant offset [rad]."""
     if grasps.robots == 1:
         return 0.0
     total = sum(tilt_scatter(trial.R_bi, grasps) for trial in trials)

@@ -1,17 +1,17 @@
-"""What no rigid payload on these robots explains, beside what noise and rounding of the sensors leave.
+"""Compare what no rigid payload on these robots explains with sensor noise and rounding.
 
-Standard errors come from the scatter of the data about the model. Robots that are not as designed (zeros of encoders,
-lengths, springs) contradict each other in a smooth way that follows the motion, which scatter tells little of. So every
-recording is fitted with all that a payload may be, and what is left over is compared with noise:
+Standard errors come from the scatter of the data about the model. Robots that differ from their design (encoder zeros,
+lengths, springs) contradict each other smoothly along the motion, and scatter hardly shows this. So each recording is
+fitted with all parameters of a payload free, and the residual is compared with noise:
 
-- flanges and grasps: R_b1 R_1i R_bi^T and h_1 + R_b1 p_1i - R_b1bi h_i do not change with time; open are the
-  grasp (R_1i, p_1i) and the place and heading of every base;
-- forces and moments: linear in the ten inertial parameters, all of them open.
+- flanges and grasps: R_b1 R_1i R_bi^T and h_1 + R_b1 p_1i - R_b1bi h_i are constant; free are the grasp (R_1i, p_1i)
+and the position and heading of every base;
+- forces and moments: linear in the ten inertial parameters, all free.
 
-Noise is what is left of differences of sixth order over 1 / (2 cut-off): noise below the cut-off has forgotten itself
-after that time, and motion below a fifth of the cut-off leaves 2 % of itself. It is told from the filtered data alone,
-so that resampling, which changes noise above the cut-off, hardly matters. Rounding of a joint that stands still does
-not change from sample to sample and is added from the channels' steps.
+Noise is measured by sixth-order differences at a lag of 1 / (2 cut-off). Noise below the cut-off is uncorrelated after
+that time, and the differences keep 2 % of motion below a fifth of the cut-off. Only the filtered data are used, so
+resampling, which changes noise above the cut-off, hardly matters. The rounding error of a resting joint is constant,
+so it is computed from the channels' steps and added.
 """
 
 from __future__ import annotations
@@ -35,25 +35,25 @@ from estimator.signals import BATCH_S, GraspData, Hold
 from estimator.statistics import rms_length
 
 FINEST_RAD, FINEST_NM = 2 * np.pi / 2**17, 2e-3
-"""Steps below which the model's own errors count (rods and welds that give, integration). Measured: noise-free
-recordings of the simulation leave 5 um, 9 urad and 14 mN."""
+"""Steps below which errors of the simulated mechanics dominate (compliant rods and welds, integration). Measured:
+noise-free recordings of the simulation leave 5 um, 9 urad and 14 mN."""
 UNKNOWN_RAD, UNKNOWN_NM = 2 * np.pi / 2**14, 0.01
-"""Steps of channels that do not show any and are told of none, as wrist positions hide them. Chosen: the coarsest
-that models/omnid/README.md takes for plausible."""
+"""Steps of channels with neither visible nor documented steps, such as wrist positions. Chosen: the coarsest plausible
+ones according to models/omnid/README.md."""
 
 
 @dataclass(frozen=True)
 class Steps:
-    """Steps of the channels, and what turns them into errors of the wrist.
+    """Rounding steps of the channels, and the factors that convert them to errors at the wrist.
 
     Attributes:
-        phi_rad, theta_rad, tau_Nm: of driven angles, gimbal angles and torques, the coarsest of each kind.
+        phi_rad, theta_rad, tau_Nm: steps of driven angles, gimbal angles and torques, the coarsest of each kind.
         arm_m: length of the driven links [m].
-        cutoff_hz: of the filter behind which errors are looked at [Hz].
-        force_N: step of the torques as a component of the force at the wrist, 0 where none shows; where no torque
-            changes, of one that is plausible.
-        read_hz: rate of the torques' readings [Hz].
-        still_rad2: what rounding leaves of gimbal angles that rest on one reading all the time, of every robot, mean
+        cutoff_hz: cut-off of the low-pass filter [Hz].
+        force_N: torque step converted to a force component at the wrist; 0 if no step is visible; a plausible step if
+            no torque changes.
+        read_hz: rate of the torque readings [Hz].
+        still_rad2: variance from rounding of gimbal angles that rest on one reading throughout, for every robot, mean
             of its angles [rad^2], shape (N,).
     """
 
@@ -67,13 +67,13 @@ class Steps:
     still_rad2: Array
 
     def of_hold(self, hold: Hold) -> Hold:
-        """A hold with what rounding leaves of its forces."""
+        """Return a hold with the rounding variance of its forces."""
         noise_N2 = BATCH_S * self.read_hz * np.var(hold.batches[..., 3:], axis=0)
         return replace(hold, rounding_N2=float(rounded(self.force_N, noise_N2).mean()))
 
 
 def steps_of(recording: Recording, cutoff_hz: float) -> Steps:
-    """Steps of a recording that is filtered at ``cutoff_hz``."""
+    """Return the steps of a recording that is filtered at ``cutoff_hz``."""
     told = recording.metadata.sampling or ()
     dh = jacobian(np.median(recording.phi, axis=(0, 1)), recording.metadata.design)
     per_Nm = float(np.sqrt(np.linalg.inv(dh @ dh.T).diagonal().max()))
@@ -94,10 +94,11 @@ def steps_of(recording: Recording, cutoff_hz: float) -> Steps:
 
 
 def rounded(step: float, noise: Array) -> Array:
-    """Variance that rounding leaves of a mean over readings with a variance ``noise``: none where that dithers it.
+    """Return the rounding variance of a mean over readings with variance ``noise``; dithering reduces it to zero.
 
-    By the first term of the Fourier series of the rounding error (B. Widrow, IRE Trans. Circuit Theory 3, 1956). That
-    of a noise x before rounding is x + (1 - exp(-4 pi^2 x)) / 12 after it, in steps; 1 - exp(-y) is y / (1 + y / 2).
+    This is the first term of the Fourier series of the rounding error (B. Widrow, IRE Trans. Circuit Theory 3, 1956).
+    In squared steps, a noise variance x before rounding becomes x + (1 - exp(-4 pi^2 x)) / 12 after it. The
+    approximation 1 - exp(-y) = y / (1 + y / 2) inverts this.
     """
     if not step:
         return np.zeros_like(noise)
@@ -107,7 +108,7 @@ def rounded(step: float, noise: Array) -> Array:
 
 
 def _coarsest(recording: Recording, kind: int) -> float | None:
-    """Coarsest step of phi (0), theta (1) or tau (2) of all robots, as told or as samples show; None where not."""
+    """Return the coarsest step of phi (0), theta (1) or tau (2), as documented or from the samples; None if unknown."""
     told = recording.metadata.sampling
     if told is not None:
         return max(step for sampling in told for step in sampling.steps_of(kind)) or None
@@ -122,13 +123,13 @@ _RANK = 1e-9
 
 @dataclass(frozen=True)
 class Leftover:
-    """One quantity that is zero if all is well.
+    """A quantity that is zero for a rigid payload and ideal robots.
 
     Attributes:
         name: ``"flange_position"``, ``"flange_rotation"``, ``"force"`` or ``"moment"``.
         unit: SI.
-        left: rms length of what the best rigid payload leaves over.
-        noise: what noise and rounding leave of it.
+        left: rms length of the residual of the best rigid payload.
+        noise: rms length that noise and rounding explain.
     """
 
     name: str
@@ -138,18 +139,18 @@ class Leftover:
 
     @property
     def ratio(self) -> float:
-        """How many times the noise."""
+        """Residual over noise."""
         return self.left / self.noise
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; keys as the fields."""
+        """Convert to plain types, with the field names as keys."""
         return asdict(self)
 
 
 def left_over(data: GraspData, grasps: GraspEstimate, steps: Steps) -> tuple[Leftover, ...]:
-    """What the best rigid payload leaves of a recording: gaps at the flanges (none for one robot), forces, moments."""
+    """Return the residuals of the best rigid payload: gaps at the flanges (none for one robot), forces, moments."""
     lag = max(2, round(0.5 * data.rate_hz / steps.cutoff_hz))
-    stride = lag // 2  # the filter leaves nothing that needs more samples
+    stride = lag // 2  # the filtered signals need no higher rate
     data = data.every(stride)
     lag //= stride
     rotation, position = _rounding(grasps, steps)
@@ -176,14 +177,14 @@ def left_over(data: GraspData, grasps: GraspEstimate, steps: Steps) -> tuple[Lef
 
 
 def _rounding(grasps: GraspEstimate, steps: Steps) -> tuple[float, float]:
-    """Rounding of joints at rest in a pair's rotation [rad] and position [m]."""
+    """Return the rounding error of resting joints in a pair's rotation [rad] and position [m]."""
     phi, theta = steps.phi_rad / np.sqrt(12), steps.theta_rad / np.sqrt(12)
     distance = float(np.mean(np.sum(grasps.p_1i[1:] ** 2, axis=1))) if grasps.robots > 1 else 0.0
     return np.sqrt(6) * theta, float(np.sqrt(6 * (phi * steps.arm_m) ** 2 + 2 * distance * theta**2))
 
 
 def _closure(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Rotation [rad] and position [m] of the flanges {2}..{N} off their grasps, in {b1}, shape (N - 1, Q, 3)."""
+    """Return rotation [rad] and position [m] errors of flanges {2}..{N} from their grasps, in {b1}, (N - 1, Q, 3)."""
     R_b1 = data.R_bi[:, 0]
     turned, apart = [], []
     for i in range(1, data.robots):
@@ -201,7 +202,7 @@ def _closure(data: GraspData, grasps: GraspEstimate) -> tuple[Array, Array]:
 
 
 def _rest(A: Array, b: Array) -> Array:
-    """b minus the best A x, shapes (Q, rows, K) and (Q, rows)."""
+    """Return b minus the best A x, shapes (Q, rows, K) and (Q, rows)."""
     flat = A.reshape(-1, A.shape[-1])
     scale = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
     x = np.linalg.lstsq(flat / scale, b.ravel(), rcond=_RANK)[0]
@@ -209,7 +210,7 @@ def _rest(A: Array, b: Array) -> Array:
 
 
 def _noise(left: Array, lag: int) -> float:
-    """rms length of the noise in residuals, shape (..., Q, 3); all of them where Q is too short to tell."""
+    """Return the rms length of the noise in residuals, (..., Q, 3); of the residuals themselves for small Q."""
     count = left.shape[-2] - _ORDER * lag
     if count < 1:
         return rms_length(left.reshape(-1, 3))
@@ -219,24 +220,24 @@ def _noise(left: Array, lag: int) -> float:
 
 
 CONTRADICTS = 3.0
-"""Left over, in what noise and rounding leave, beyond which the robots contradict each other. Measured: docs/method.md,
-'Do the robots contradict each other?'."""
+"""Ratio of residual to noise above which the robots contradict each other. Measured: docs/method.md, 'Do the robots
+contradict each other?'."""
 _WORDS = {
     "flange_position": ("flanges miss their grasps by", 1e3, "mm"),
     "flange_rotation": ("are turned off them by", 1e3, "mrad"),
     "force": ("forces do not add up by", 1.0, "N"),
     "moment": ("moments by", 1.0, "N m"),
 }
-"""What is said of each quantity, and the unit it is said in."""
+"""Description, factor and unit of each quantity in messages."""
 
 
 def beyond_noise(leftovers: Sequence[Leftover]) -> list[Leftover]:
-    """Those that noise does not explain."""
+    """Return the quantities whose residual noise does not explain."""
     return [one for one in leftovers if one.ratio > CONTRADICTS]
 
 
 def contradiction(found: Sequence[tuple[str, Sequence[Leftover]]]) -> str | None:
-    """The sentence, from recordings' names and what each leaves over; None where all is noise."""
+    """Return a sentence on contradictions, from recordings' names and leftovers; None if all is noise."""
     bad = [(name, wrong) for name, leftovers in found if (wrong := beyond_noise(leftovers))]
     if not bad:
         return None

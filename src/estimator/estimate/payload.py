@@ -1,4 +1,4 @@
-"""The pipeline: from recordings of one payload to its estimate."""
+"""Pipeline from recordings of one payload to its estimate."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -39,14 +39,14 @@ from estimator.recording.model import Recording
 from estimator.signals import GraspData, Hold, find_holds, process_recording
 
 MASS_TOLERANCE = 0.05
-"""Recordings whose masses differ by more than this share are not of one payload, if beyond ``MASS_SIGMAS`` as well.
+"""Relative mass difference above which recordings are of different payloads, if it also exceeds ``MASS_SIGMAS``.
 Chosen: no calibration error explains more."""
 MASS_SIGMAS = 6.0
-"""The same in sums of both standard errors. Chosen."""
+"""Limit of the same difference, in sums of both standard errors. Chosen."""
 
 
 def mass_alone(data: GraspData, holds: Sequence[Hold], grasps: GraspEstimate | None) -> MassEstimate | None:
-    """The mass by one recording alone, with its holds and grasps; None where it does not tell."""
+    """Estimate the mass from one recording with its holds and grasps; None if undetermined."""
     try:
         mass, com, _ = estimate_from_holds(holds, grasps, data.gravity_mps2)
         if com is None and grasps is not None:
@@ -57,10 +57,10 @@ def mass_alone(data: GraspData, holds: Sequence[Hold], grasps: GraspEstimate | N
 
 
 def check_one_payload(masses: Iterable[tuple[str, MassEstimate | None]]) -> None:
-    """Compare what recordings say of the mass, each by its name.
+    """Compare the masses of recordings, given with their names.
 
     Raises:
-        InputError: two of them differ by more than their errors and any calibration explain.
+        InputError: two masses differ by more than their errors and any calibration error.
     """
     found = [(mass.mass, mass.se, name) for name, mass in masses if mass is not None]
     if not found:
@@ -75,9 +75,9 @@ def check_one_payload(masses: Iterable[tuple[str, MassEstimate | None]]) -> None
 Method = Literal["auto", "staged", "joint"]
 
 TRIM_S = 2.0
-"""Dropped at both ends of each recording [s]."""
+"""Time dropped at both ends of each recording [s]."""
 RESTING = 0.5
-"""A recording that rests for more than this share of its time does not serve the inertia, if another does."""
+"""Share of rest above which a recording does not contribute to the inertia, if another one can."""
 
 
 def estimate_payload(
@@ -92,19 +92,19 @@ def estimate_payload(
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
     Args:
-        recordings: one or several trials with the same robots and grasps; taken one after the other, so that an
-            iterator need not hold more than one.
-        method: ``"staged"``, the paper's sequence (grasps from motion; mass and centre of mass from static
-            holds; inertia from motion); ``"joint"``, one least squares for mass, centre of mass and inertia;
-            ``"auto"``, staged when the holds determine the centre of mass, else joint.
+        recordings: one or several trials with the same robots and grasps. They are consumed one at a time, so an
+            iterator saves memory.
+        method: ``"staged"``, the paper's sequence (grasps from motion; mass and centre of mass from static holds;
+            inertia from motion); ``"joint"``, one least squares for mass, centre of mass and inertia; ``"auto"``,
+            staged if the holds determine the centre of mass, else joint.
         cutoff_hz: cut-off of the low-pass filter [Hz].
-        say: takes the name of the stage that begins.
-        compare_masses: also refuse recordings that, each alone, say different masses (see ``check_one_payload``).
-        withhold: leave out what the balance of forces does not bear out (see ``withheld``).
+        say: callback for the name of each stage.
+        compare_masses: also refuse recordings with different individual masses (see ``check_one_payload``).
+        withhold: omit results that the force balance contradicts (see ``withheld``).
 
     Raises:
-        InputError: the recordings do not belong together or contradict each other, the method needs what
-            they lack, nothing can be estimated from them, or their numbers are beyond arithmetic.
+        InputError: the recordings do not belong together or contradict each other, lack what the method needs,
+            determine nothing, or lead to numerical overflow.
     """
     trials: list[Trial] = []
     names: list[str] = []
@@ -112,16 +112,16 @@ def estimate_payload(
         for recording in recordings:
             names.append(recording.name)
             trials.append(trial_of(recording, cutoff_hz))
-            del recording  # or the next one would be read before this one is let go
+            del recording  # free its memory before reading the next one
         return estimate_from_trials(trials, method, say, compare_masses=compare_masses, withhold=withhold)
 
 
 @contextmanager
 def within_arithmetic(names: Sequence[str]) -> Iterator[None]:
-    """Where numbers beyond arithmetic are the recordings' fault, whose names are known by the time it happens.
+    """Convert numerical errors inside the block to an ``InputError``; ``names`` may be filled inside the block.
 
     Raises:
-        InputError: there are some.
+        InputError: an overflow, a division by zero, or a singular matrix occurs.
     """
     try:
         with np.errstate(over="raise", divide="raise"):
@@ -133,7 +133,7 @@ def within_arithmetic(names: Sequence[str]) -> Iterator[None]:
 
 
 def trial_of(recording: Recording, cutoff_hz: float = 5.0) -> Trial:
-    """A recording processed for ``estimate_from_trials``; arguments and errors as for ``estimate_payload``."""
+    """Process a recording for ``estimate_from_trials``; arguments and errors as for ``estimate_payload``."""
     check_carries(recording, "estimated")
     labels, steps = recording.metadata, steps_of(recording, cutoff_hz)
     recording, held, doubt = without_held(recording)
@@ -152,7 +152,7 @@ def estimate_from_trials(
     compare_masses: bool = False,
     withhold: bool = True,
 ) -> PayloadEstimate:
-    """The same from processed data; see ``estimate_payload``."""
+    """Estimate the payload from processed data; see ``estimate_payload``."""
     if method not in ("auto", "staged", "joint"):
         raise InputError(f"method is {method!r}; it must be 'auto', 'staged' or 'joint'")
     payload = check_same_payload(trials)
@@ -240,13 +240,13 @@ def estimate_from_trials(
 
 
 def _holds(trial: Trial) -> list[Hold]:
-    """Static holds, with what rounding leaves of their forces."""
+    """Return static holds, with the rounding variance of their forces."""
     holds = find_holds(trial.data)
     return holds if trial.steps is None else [trial.steps.of_hold(hold) for hold in holds]
 
 
 def _units(trials: Sequence[Trial]) -> ArmUnit | None:
-    """The robots as they are, if all recordings say the same of them."""
+    """Return the robots with their deviations, if all recordings agree on them."""
     first = trials[0].units
     same = first is not None and all(
         trial.units is not None and np.array_equal(trial.units.x, first.x) for trial in trials
@@ -257,7 +257,7 @@ def _units(trials: Sequence[Trial]) -> ArmUnit | None:
 def _grasps(
     trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str]
 ) -> tuple[GraspEstimate | None, list[StepReport]]:
-    """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
+    """Estimate grasps from each recording alone (into ``records``), compare them, and estimate pooled grasps."""
     for k, trial in enumerate(trials):
         alone, steps = _grasps_of([trial])
         records[k] = replace(records[k], grasps=alone)
@@ -272,7 +272,7 @@ def _grasps(
 
 
 def _grasps_of(trials: Sequence[Trial]) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
-    """Grasps, with what rounding leaves of joints that rest."""
+    """Estimate grasps, and add the rounding errors of resting joints."""
     grasps, reports = estimate_grasps([trial.data for trial in trials])
     told = [trial.steps.still_rad2 / len(trials) ** 2 for trial in trials if trial.steps is not None]
     return (grasps.rounded(np.sum(told, axis=0)) if grasps and told else grasps), reports
@@ -293,7 +293,7 @@ def _alone(trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str) -
 
 
 def inertia_flags(inertia: InertiaEstimate) -> list[str]:
-    """What a reader must know of an inertia before trusting it, one sentence each."""
+    """Return caveats on an inertia, one sentence each."""
     flags = []
     if inertia.projected:
         flags.append("The least-squares inertia had a negative eigenvalue, which was replaced by zero.")
@@ -320,7 +320,7 @@ def _why(steps: Sequence[StepReport]) -> str:
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
-    """Names with a running number where two recordings share one."""
+    """Append a running number to repeated names."""
     seen: dict[str, int] = {}
     out = []
     for name in names:

@@ -1,11 +1,10 @@
-"""The estimate of a payload: what ``estimate_payload`` returns.
+"""Result of ``estimate_payload``: the estimate of a payload, its JSON and its text report.
 
-``PayloadEstimate.to_dict`` makes strict JSON: plain types, no NaN, units in the keys; null is what the data do not
-determine.
+``PayloadEstimate.to_dict`` makes strict JSON: plain types, no NaN, units in the keys; null is undetermined.
 
 format, version            "mocobot-estimate", 1
 payload, robots, method    label or null; N; "fit" (one fit of loops and balance), "staged", "joint" or "calibrated"
-                           (found with the robots' calibration)
+                           (from the robots' calibration)
 grasps                     null, or
     pairs                  list over i < j of {i, j, R_axis_angle_deg [3], R_se_deg [3], p_m [3], p_se_m [3],
                            distance_m, distance_se_m, angular_residual_radps, linear_residual_mps}
@@ -19,23 +18,23 @@ inertia                    null, or
     I_b_se_kgm2            3 x 3 standard errors
     covariance_kg2m4       6 x 6 in the order xx, xy, xz, yy, yz, zz
     principal_kgm2, principal_se_kgm2             3, ascending
-    R_1c_axis_angle_deg, R_1c_se_deg              3 or null when moments are too alike
+    R_1c_axis_angle_deg, R_1c_se_deg              3 or null if two moments are too similar
     R_1c_covariance_rad2   3 x 3 or null
     projected              true if a negative eigenvalue was set to zero
-    residual_Nm, moment_Nm rms moment left and explained
+    residual_Nm, moment_Nm rms of the moment residual and of the explained moment
 steps                      list of {step, parameters, unit, singular_values, noise, rank, condition,
                            weak: [{direction, vector, reason}]}; condition null if infinite
 undetermined               list of {step, direction, vector, reason}: all weak directions again
 recordings                 list of {name, trial, duration_s, holds, grasps, inertia, force_residual,
-                           moment_residual_m, leftovers: list of {name, unit, left, noise}: rms of what no rigid payload
-                           explains ("flange_position", "flange_rotation", "force", "moment"), and what noise leaves}
-contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
+                           moment_residual_m, leftovers: list of {name, unit, left, noise}: rms residual of the best
+                           rigid payload ("flange_position", "flange_rotation", "force", "moment"), and rms noise}
+contradicts                true if some leftovers exceed noise, so that standard errors are too small; null if unknown
 flags                      list of sentences
-open                       only where there are any: sentences on what the robots' calibration does not decide
-frames                     only where the encoders define the frames {i}, turned about x against a drawing's by the
-                           zeros of theta_x: {defined_by: "encoders", theta_x_zero_sd_deg}; no standard error has it in
-why_not_fit                only where one fit was wanted and could not be made: a sentence on why
-calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
+open                       only if there are any: sentences on what the robots' calibration does not determine
+frames                     only if the encoders define the frames {i}, which the zeros of theta_x turn about x relative
+                           to the drawing: {defined_by: "encoders", theta_x_zero_sd_deg}; standard errors exclude this
+why_not_fit                only if one fit was requested and impossible: a sentence on the reason
+calibrated                 only if robots were not taken as designed: {design, units}, as in a recording's metadata
 
 ``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.results``).
 Readers ignore it and any other key.
@@ -68,17 +67,17 @@ FORMAT, VERSION = "mocobot-estimate", 1
 
 @dataclass(frozen=True)
 class RecordingEstimate:
-    """What one recording alone says, given the pooled grasps and (staged) the pooled centre of mass.
+    """Estimates from one recording, given the pooled grasps and (staged) the pooled centre of mass.
 
     Attributes:
         trial: ``"random"``, ``"periodic"`` or ``"static"``.
         duration_s: evaluated length [s].
-        holds: number of static holds found.
-        grasps, inertia: from this recording alone, or None where it does not determine them.
+        holds: number of static holds.
+        grasps, inertia: from this recording alone, or None if it does not determine them.
         force_residual: rms of f - m (a_c + g up) over m g, or None without a mass and a centre of mass.
-        moment_residual_m: rms moment about the centre of mass that the inertia leaves, over m g [m]: the
-            error of the centre of mass that would explain it; None where it cannot be told.
-        leftovers: what no rigid payload explains, beside noise; empty where the grasps are not known.
+        moment_residual_m: rms residual moment about the centre of mass over m g [m]: the error of the centre of mass
+            that would explain it; None if unknown.
+        leftovers: residuals of the best rigid payload, with noise; empty without grasps.
     """
 
     name: str
@@ -92,7 +91,7 @@ class RecordingEstimate:
     leftovers: tuple[Leftover, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; keys as the fields."""
+        """Convert to plain types, with the field names as keys."""
         return {
             **vars(self),
             "grasps": self.grasps and self.grasps.to_dict(),
@@ -102,11 +101,11 @@ class RecordingEstimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], robots: int) -> RecordingEstimate:
-        """Inverse of ``to_dict``, for a number of robots N."""
+        """Inverse of ``to_dict`` for N robots."""
         parts = {
             "grasps": _if_given(values["grasps"], lambda grasps: GraspEstimate.from_dict(grasps, robots)),
             "inertia": _if_given(values["inertia"], InertiaEstimate.from_dict),
-            # Earlier versions did not write them.
+            # Files of earlier versions lack this key.
             "leftovers": tuple(Leftover(**one) for one in values.get("leftovers", ())),
         }
         return cls(**(values | parts))
@@ -114,22 +113,22 @@ class RecordingEstimate:
 
 @dataclass(frozen=True)
 class PayloadEstimate:
-    """Grasps, mass, centre of mass and inertia of one payload; None marks what the data do not determine.
+    """Grasps, mass, centre of mass and inertia of one payload; None marks undetermined values.
 
     Attributes:
         method: ``"fit"`` (one fit of loops and balance), ``"staged"`` (the paper's), ``"joint"``, or ``"calibrated"``
-            (found with the robots' calibration).
+            (from the robots' calibration).
         grasps: grasp frames pooled over the recordings.
         p_1c, p_1c_covariance: centre of mass in {1} [m], shape (3,), and its covariance [m^2], shape (3, 3).
         inertia: in {b}, with its principal axes, pooled over the recordings with motion.
         steps: excitation of every step.
-        flags: what a reader should know before trusting the numbers, one sentence each.
-        units: the robots as they were taken to be, or None for robots as designed.
-        open: what the robots' calibration does not decide, one sentence each; standard errors have no more of it in
-            them than the springs' common scale.
-        why_not_fit: why it is another method, where one fit was wanted and could not be made; else empty.
-        zero_sd_rad: standard deviation of the zeros of theta_x, which turn the drawing's frames {i} about x against
-            those of the encoders, in which all numbers are then [rad]; 0 where numbers are in the drawing's frames.
+        flags: caveats on the numbers, one sentence each.
+        units: the robots with their deviations, or None for robots as designed.
+        open: what the robots' calibration does not determine, one sentence each; standard errors include only the
+            springs' common scale.
+        why_not_fit: reason why one fit was impossible, if it was requested; else empty.
+        zero_sd_rad: standard deviation of the theta_x zeros [rad], if all numbers are in the encoders' frames. These
+            zeros turn the encoders' frames {i} about x relative to the drawing's. 0 in the drawing's frames.
     """
 
     payload: str | None
@@ -162,17 +161,17 @@ class PayloadEstimate:
 
     @property
     def contradicts(self) -> bool | None:
-        """Whether the robots contradict each other beyond noise, which no standard error covers; None if unknown."""
+        """Whether the robots contradict each other beyond noise, so standard errors are too small; None if unknown."""
         found = [one for recording in self.recordings for one in recording.leftovers]
         return bool(beyond_noise(found)) if found else None
 
     @property
     def undetermined(self) -> tuple[WeakDirection, ...]:
-        """Every direction of every step that the data do not determine."""
+        """All directions of all steps that the data do not determine."""
         return tuple(weak for step in self.steps for weak in step.weak)
 
     def to_dict(self) -> dict[str, Any]:
-        """The estimate as documented at the head of this module."""
+        """Convert the estimate to the format documented in this module."""
         com, mass = None, self.mass
         if self.p_1c is not None and self.p_1c_covariance is not None:
             com = {
@@ -212,7 +211,7 @@ class PayloadEstimate:
         """Inverse of ``to_dict``.
 
         Raises:
-            InputError: the mapping is not such an estimate, or of another version.
+            InputError: the mapping is not an estimate, or has another version.
         """
         if not isinstance(values, dict) or values.get("format") != FORMAT or values.get("version") != VERSION:
             raise InputError(f"not an estimate: it must have format {FORMAT!r} and version {VERSION}")
@@ -255,11 +254,11 @@ def _if_given(value: Any, make: Callable[[Any], Given]) -> Given | None:
 
 _ZERO_SIGMAS = 2.0
 HOW = {"calibrated": "self-calibrated", "fit": "one-fit"}
-"""Methods that are called otherwise."""
+"""Display names of methods."""
 
 
 def format_estimate(estimate: PayloadEstimate) -> str:
-    """Readable report, values as ``value +- standard error (percent)``."""
+    """Format a readable report, with values as ``value +- standard error (percent)``."""
     label = "" if estimate.payload is None else f" ({estimate.payload})"
     lines = [
         f"[[Payload{label}]]  {estimate.robots} {'calibrated ' * (estimate.units is not None)}"
@@ -341,13 +340,13 @@ def _inertia(estimate: PayloadEstimate) -> list[str]:
 
 
 def _vector(name: str, values: np.ndarray, errors: np.ndarray, unit: str) -> list[str]:
-    """Components, without percentages: a component may be zero where the vector is not."""
+    """Format components without percentages: a component may be zero although the vector is not."""
     each = zip("xyz", values, errors, strict=True)
     return [_line(f"{name} {axis}", value, se, unit, percent=False) for axis, value, se in each]
 
 
 def _line(name: str, value: float, se: float, unit: str, *, percent: bool = True) -> str:
-    # A value that is zero within its error has no share.
+    # No percentage for values that are zero within their error.
     share = f" ({100 * se / abs(value):.2g} %)" if percent and abs(value) > _ZERO_SIGMAS * se else ""
     shown, error = measured(value, se) if 0 < se < np.inf else (f"{value:.6f}", f"{se:.6f}")
     return f"    {name + ':':<14}{shown:>14} +- {error} {unit}{share}"

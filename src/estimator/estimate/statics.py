@@ -1,14 +1,15 @@
-"""Mass and centre of mass from static holds (paper, section III-C).
+"""Estimate mass and centre of mass from static holds (paper, section III-C).
 
-Mass, (9), (11)-(13): the bases are level, so the vertical force sum needs each robot's own gimbal only and no
-grasp frame. Centre of mass, (10), (14)-(17): M = m g p_1c x up, with M the moment sum about {1}; only its
-components across gravity are seen, hence two or more tilts.
+Mass, (9), (11)-(13): the bases are level, so the vertical force sum needs only each robot's own gimbal and no grasp
+frame. Centre of mass, (10), (14)-(17): M = m g p_1c x up, with M the moment sum about {1}. It has components across
+gravity only, so at least two tilts are needed.
 
-Errors of a hold: the noise of its mean, from batch means, and errors that differ from hold to hold but not
-within one (torque rounding, friction, geometry), a variance estimated from the residuals between holds and
-added to every hold: a random-effects model, scaled once for forces and once for moments. Its shape is that of
-equal, independent errors in every robot's force, so moments take it through the grasps' levers. It is no less than what
-rounding of the torques leaves of a mean (``Hold.rounding_N2``), which does not average out where noise is below a step.
+A hold has two kinds of errors. The first is the noise of its mean, estimated from batch means. The second differs
+between holds but is constant within one (torque rounding, friction, geometry). Its variance is estimated from the
+residuals between holds and added to every hold. This is a random-effects model with one scale for forces and one for
+moments. It assumes equal, independent errors in every robot's force, and moments follow through the grasps' levers.
+The variance is at least the rounding variance of a mean torque (``Hold.rounding_N2``), which does not average out if
+noise is below a step.
 """
 
 from collections.abc import Sequence
@@ -29,7 +30,7 @@ from estimator.statistics import rms
 
 CONTRADICTION = "the wrenches contradict each other"
 CONTRADICTION_M = 0.02
-"""Moment left over, per weight [m], that is more than noise and poor calibration leave."""
+"""Residual moment over weight [m] above which noise and poor calibration do not explain it."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,11 @@ class MassEstimate:
 
 @dataclass(frozen=True)
 class ComEstimate:
-    """Mass [kg] and centre of mass in {1} [m] from the holds, with their common covariance.
+    """Mass [kg] and centre of mass in {1} [m] from the holds, with their joint covariance.
 
     Attributes:
-        covariance: of (m [kg], p_1c [m]), grasp errors included, shape (4, 4).
-        own_covariance: the same without the part due to the grasps.
+        covariance: of (m [kg], p_1c [m]), including grasp errors, shape (4, 4).
+        own_covariance: the same without grasp errors.
         grasp_jacobian: derivative of p_1c by the grasp errors of ``GraspEstimate``, shape (3, 6(N-1)).
         residual_rms: rms per component of the moment balance about {1} over the holds [N m].
     """
@@ -61,10 +62,10 @@ class ComEstimate:
 
 
 def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
-    """Mass by (13), from one or more holds of any N >= 1 robots.
+    """Estimate the mass by (13), from one or more holds of any N >= 1 robots.
 
     Raises:
-        InputError: the robots do not carry anything (the mass comes out as zero or negative).
+        InputError: the robots do not carry anything (the mass is zero or negative).
     """
     vertical = np.array([vertical_force(hold.R_bi, hold.wrench[None])[0] for hold in holds])  # (H,)
     mass = float(vertical.mean() / gravity_mps2)
@@ -77,7 +78,7 @@ def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
 
 
 def rounding_kg(holds: Sequence[Hold], gravity_mps2: float) -> float:
-    """Standard error of the mass that rounding leaves of holds, 0 of none [kg]."""
+    """Return the standard error of the mass due to rounding in the holds, 0 without holds [kg]."""
     variances = [hold.robots * hold.rounding_N2 for hold in holds]
     return float(np.sqrt(sum(variances))) / max(1, len(holds)) / gravity_mps2
 
@@ -85,14 +86,14 @@ def rounding_kg(holds: Sequence[Hold], gravity_mps2: float) -> float:
 def estimate_com(
     holds: Sequence[Hold], mass: MassEstimate, grasps: GraspEstimate, gravity_mps2: float
 ) -> tuple[ComEstimate | None, StepReport]:
-    """Centre of mass by (17); None when the tilts of the holds do not differ enough."""
+    """Estimate the centre of mass by (17); None if the tilts of the holds do not differ enough."""
     up, moment = _loads(holds, grasps)
     p_1c, A = _solve(up, moment, mass.mass, gravity_mps2)
     residual = moment - (A @ p_1c).reshape(-1, 3)
     dof = 3 * len(holds) - 3
     rss = float(residual.ravel() @ residual.ravel())
     within = [_mean_covariance(_signals(hold, grasps)) for hold in holds]  # (4, 4): vertical, moment
-    # Few holds leave few residuals; the noise within them is a second opinion.
+    # Few holds give few residuals, so also use the noise within them.
     within_rms = float(np.sqrt(np.mean([np.trace(S[1:, 1:]) / 3 for S in within])))
     noise = max(float(np.sqrt(rss / dof)) if dof else 0.0, within_rms)
     weight = mass.mass * gravity_mps2
@@ -141,7 +142,7 @@ def estimate_com(
 def estimate_from_holds(
     holds: Sequence[Hold], grasps: GraspEstimate | None, gravity_mps2: float
 ) -> tuple[MassEstimate | None, ComEstimate | None, StepReport | None]:
-    """Mass and centre of mass as far as there are holds and grasps for them.
+    """Estimate mass and centre of mass, as far as holds and grasps allow.
 
     Raises:
         InputError: the robots do not carry anything.
@@ -155,10 +156,10 @@ def estimate_from_holds(
 
 
 def check_lifted(mass: float) -> None:
-    """Refuse an estimated mass [kg] that nobody can lift.
+    """Refuse a zero or negative mass [kg].
 
     Raises:
-        InputError: it is zero or negative.
+        InputError: the mass is zero or negative.
     """
     if mass <= 0:
         raise InputError(
@@ -170,13 +171,14 @@ def check_lifted(mass: float) -> None:
 def judge_com(
     information: Array, moment_rms: float, weight: float, tilt_noise: float, reason: str
 ) -> StepReport:
-    """Judge the centre of mass by angles: what a moment residual looks like at 1 m from it, and the tilt's noise.
+    """Judge the excitation of the centre of mass by angles: moment residual over weight at 1 m, and tilt noise.
 
     Args:
-        information: of the directions against gravity, as ``cross_information`` gives it, shape (3, 3).
-        moment_rms: moments left over [N m], of a payload of some weight [N].
-        tilt_noise: how well the tilt is known [rad].
-        reason: why a direction is open, unless the moments make no sense.
+        information: of the directions against gravity, from ``cross_information``, shape (3, 3).
+        moment_rms: rms residual moment [N m].
+        weight: weight of the payload [N].
+        tilt_noise: uncertainty of the tilt [rad].
+        reason: reason for an undetermined direction, unless the moments contradict each other.
     """
     if moment_rms >= CONTRADICTION_M * weight:
         reason = (
@@ -191,12 +193,12 @@ def judge_com(
 
 
 def vertical_force(R_bi: Array, wrench: Array) -> Array:
-    """Sum over robots of the vertical force [N], from R_bi (N, 3, 3) and wrenches (Q, N, 6), shape (Q,)."""
+    """Return the sum over robots of the vertical force [N], from R_bi (N, 3, 3) and wrenches (Q, N, 6), shape (Q,)."""
     return np.einsum("ib,qib->q", R_bi[:, 2], wrench[..., 3:])
 
 
 def _loads(holds: Sequence[Hold], grasps: GraspEstimate) -> tuple[Array, Array]:
-    """Direction against gravity and moment sum about {1}, both in {1}, shape (H, 3)."""
+    """Return the direction against gravity and the moment sum about {1}, both in {1}, shape (H, 3)."""
     up = fused_up(np.array([hold.R_bi for hold in holds]), grasps)
     return up, total_wrench(np.array([hold.wrench for hold in holds]), grasps)[1]
 
@@ -207,12 +209,12 @@ def _solve(up: Array, moment: Array, mass: float, gravity: float) -> tuple[Array
 
 
 def _signals(hold: Hold, grasps: GraspEstimate) -> Array:
-    """Vertical force and moment about {1} of every batch of a hold, shape (batches, 4)."""
+    """Return vertical force and moment about {1} of every batch of a hold, shape (batches, 4)."""
     return np.column_stack([vertical_force(hold.R_bi, hold.batches), total_wrench(hold.batches, grasps)[1]])
 
 
 def _force_error_shape(up: Array, grasps: GraspEstimate) -> Array:
-    """Covariance of (vertical force, moment about {1}) for unit force errors of all robots, shape (4, 4)."""
+    """Return the covariance of (vertical force, moment about {1}) for unit force errors of all robots, shape (4, 4)."""
     L = [np.vstack([up, so3.skew(p)]) for p in grasps.p_1i]
     shape = np.sum([L_i @ L_i.T for L_i in L], axis=0)
     if np.trace(shape[1:, 1:]) < 1e-6:  # all grasps at {1}: only errors of the moments themselves are left
@@ -221,14 +223,16 @@ def _force_error_shape(up: Array, grasps: GraspEstimate) -> Array:
 
 
 def _excess_variance(residual: Array, A: Array, known: Array, shape: Array) -> float:
-    """Factor v >= 0 such that the covariance ``known + v * shape`` explains the residual (Mandel and Paule).
+    """Return v >= 0 such that the covariance ``known + v * shape`` explains the residual (Mandel and Paule).
 
-    v solves z^T (known + v shape)^-1 z = dof, with z the part of the residual across the columns of A. Errors
-    of the grasps are in ``known``: what they leave must not count again as scatter between holds.
+    v solves z^T (known + v shape)^-1 z = dof, with z the part of the residual orthogonal to the columns of A.
+    ``known`` includes grasp errors, so that their effect does not count again as scatter between holds.
     """
     U = null_space(A.T)
     z, V_0, V_1 = U.T @ residual, U.T @ known @ U, U.T @ shape @ U
-    V_1 = V_1 + 1e-6 * np.trace(V_1) / len(V_1) * np.eye(len(V_1))  # two grasps leave a direction of no error
+    V_1 = V_1 + 1e-6 * np.trace(V_1) / len(V_1) * np.eye(
+        len(V_1)
+    )  # with two grasps, one direction has no error
 
     eigenvalues, axes = eigh(V_0, V_1)
     eigenvalues, squares = np.maximum(eigenvalues, 0.0), (axes.T @ z) ** 2
@@ -236,7 +240,7 @@ def _excess_variance(residual: Array, A: Array, known: Array, shape: Array) -> f
     def excess(v: float) -> float:
         return float(np.sum(squares / (eigenvalues + v))) - len(z)
 
-    most = float(np.sum(squares)) / len(z)  # the solution if nothing else were known
+    most = float(np.sum(squares)) / len(z)  # the solution if ``known`` were zero
     least = 1e-9 * most
     if most <= 0 or excess(least) <= 0:
         return 0.0
@@ -246,7 +250,7 @@ def _excess_variance(residual: Array, A: Array, known: Array, shape: Array) -> f
 
 
 def _mean_covariance(batches: Array) -> Array:
-    """Covariance of the mean of independent batches (B, K), shape (K, K)."""
+    """Return the covariance of the mean of independent batches (B, K), shape (K, K)."""
     centred = batches - batches.mean(axis=0)
     return centred.T @ centred / (len(batches) * (len(batches) - 1))
 
@@ -256,7 +260,7 @@ def _between(rss: float, dof: int, within: float) -> float:
 
 
 def _tilt_noise(holds: Sequence[Hold], grasps: GraspEstimate) -> float:
-    """How much the robots' tilts disagree from hold to hold [rad]; a constant offset is no noise."""
+    """Return the disagreement of the robots' tilts between holds [rad]; a constant offset is not noise."""
     if grasps.robots == 1 or len(holds) < 2:
         return 0.0
     dof = (len(holds) - 1) * (grasps.robots - 1) * 2  # a direction has two components

@@ -1,11 +1,11 @@
-"""Standard errors: covariance of least squares under coloured noise, and propagation from step to step.
+"""Standard errors: covariance of least squares under coloured noise, and excitation of parameters.
 
-Residuals of 5 Hz signals sampled at 100 Hz are strongly correlated in time, so counting samples as
-independent would claim errors several times too small. What matters for the estimate is the noise in the
-scores J^T r at zero frequency. It is measured by summing the scores under smooth windows and taking the
-scatter of these sums, whatever the noise's colour and its correlation across the residuals' components. The
-windows are smooth (Hann, overlapping by three quarters) because differentiated encoder noise is blue: the
-sharp edges of plain blocks let its strong high frequencies leak in, which claimed 1.6 times too much here.
+Residuals of 5 Hz signals sampled at 100 Hz are strongly correlated in time. Counting samples as independent would give
+standard errors several times too small. The estimate depends on the noise of the scores J^T r at zero frequency. It is
+measured by the scatter of scores summed under smooth windows. This is valid for any noise colour and any correlation
+between components. The windows are smooth (Hann, overlapping by three quarters) because differentiated encoder noise
+is blue. The sharp edges of rectangular blocks leak high frequencies and overestimate standard errors by a factor of
+1.6.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ import numpy as np
 from estimator.arrays import Array
 
 WINDOW_S = 4.0
-"""Length of a window [s]: resolves 0.25 Hz, long against the correlation time of 5 Hz noise (0.1 s)."""
+"""Length of a window [s]: resolves 0.25 Hz, and is long compared with the correlation time of 5 Hz noise (0.1 s)."""
 MIN_WINDOWS = 6
-"""A recording shorter than this many windows gets shorter ones."""
-_MAX_LEVERAGE = 0.9  # beyond, the data cannot tell their own noise
+"""Least number of windows; a short recording gets shorter windows."""
+_MAX_LEVERAGE = 0.9  # above it, the residuals do not determine the noise
 WEIGHT = 2.0
 """Sum of all windows' weights at any sample."""
-_SQUARES = 1.5  # the same for the squares of the weights
+_SQUARES = 1.5  # sum of the squared weights at any sample
 
 
 class Window(NamedTuple):
-    """Some consecutive samples and their weights, shape (samples of the slice,)."""
+    """Consecutive samples and their weights, shape (samples of the slice,)."""
 
     part: slice
     weights: Array
 
 
 def windows(samples: int, rate_hz: float, first: int = 0) -> list[Window]:
-    """Hann windows at a quarter of their length, cut off at both ends; every sample is weighted alike.
+    """Return overlapping Hann windows, truncated at both ends, so that the total weight of every sample is equal.
 
-    ``first`` is the index of the first of the samples.
+    ``first`` is the index of the first sample.
     """
     hop = max(1, round(min(WINDOW_S * rate_hz, samples / MIN_WINDOWS) / 4))
     hann = np.sin(np.pi * (np.arange(4 * hop) + 0.5) / (4 * hop)) ** 2
@@ -50,7 +50,7 @@ def windows(samples: int, rate_hz: float, first: int = 0) -> list[Window]:
 
 
 def window_normals(J: Array, r: Array, parts: Sequence[Window]) -> tuple[Array, Array]:
-    """Weighted normal matrices J^T W J, shape (B, K, K), and scores J^T W r, shape (B, K), per window.
+    """Return weighted normal matrices J^T W J, shape (B, K, K), and scores J^T W r, shape (B, K), per window.
 
     J has shape (Q, rows, K) and r shape (Q, rows); the windows run over the first axis.
     """
@@ -64,11 +64,11 @@ def window_normals(J: Array, r: Array, parts: Sequence[Window]) -> tuple[Array, 
 
 
 def window_covariance(normals: Array, scores: Array) -> Array:
-    """Covariance of a least-squares solution from sums over ``windows``, shape (K, K).
+    """Return the covariance of a least-squares solution from sums over ``windows``, shape (K, K).
 
-    A^-1 S A^-1 with A = J^T J and S the scatter of the windows' scores. The fit takes part of the noise with
-    it, more so with few windows: S shrinks, for white noise from A to A - sum_b A_b A^-1 A_b, and is scaled
-    back accordingly.
+    The covariance is A^-1 S A^-1 with A = J^T J and S the scatter of the windows' scores. The fit absorbs part of the
+    noise, and more so with few windows. For white noise, S shrinks from A to A - sum_b A_b A^-1 A_b, and it is
+    rescaled accordingly.
 
     Args:
         normals: A_b per window, shape (B, K, K); their sum must be positive definite.
@@ -83,9 +83,9 @@ def window_covariance(normals: Array, scores: Array) -> Array:
 
 
 def numerical_jacobian(function: Callable[[Array], Array], x: Array, step: float = 1e-5) -> Array:
-    """Jacobian of ``function`` at x by central differences, shape (outputs, len(x)).
+    """Return the Jacobian of ``function`` at x by central differences, shape (outputs, len(x)).
 
-    Used to carry the covariance of one step into the next, where a percent of accuracy is plenty.
+    It propagates the covariance of one step to the next, where 1 % accuracy suffices.
     """
     columns = [
         (np.ravel(function(x + d)) - np.ravel(function(x - d))) / (2 * step) for d in step * np.eye(len(x))
@@ -94,24 +94,25 @@ def numerical_jacobian(function: Callable[[Array], Array], x: Array, step: float
 
 
 def norm_se(vector: Array, covariance: Array) -> float:
-    """Standard error of the length of ``vector`` (3,) from its covariance (3, 3)."""
+    """Return the standard error of the length of ``vector`` (3,) from its covariance (3, 3)."""
     length = float(np.linalg.norm(vector))
     if length == 0:
         return float(np.sqrt(np.trace(covariance)))
     u = vector / length
-    return float(np.sqrt(max(u @ covariance @ u, 0.0)))  # rounding may leave less than nothing
+    return float(np.sqrt(max(u @ covariance @ u, 0.0)))  # rounding may give a negative value
 
 
 def standard_errors(covariance: Array) -> Array:
-    """Square roots of the diagonal, shape (K,)."""
+    """Return the square roots of the diagonal, shape (K,)."""
     return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
 FACTOR = 3.0
-"""Signal over noise (rms over rms) below which a direction of parameter space is not determined.
+"""Signal-to-noise ratio (rms over rms) below which a direction of parameter space is undetermined.
 
-Sample counts do not enter: averaging cannot repair a regressor that is mostly noise (it biases the estimate toward
-zero), while tiny motions measured without noise are fine."""
+The number of samples does not enter. Averaging cannot repair a regressor that is mostly noise, because noise biases
+the estimate toward zero. Small motions without noise are sufficient.
+"""
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,8 @@ class WeakDirection:
 
     Attributes:
         step: such as ``"position p_12"``.
-        direction: such as ``"along x of {1}"``; ``vector`` is the same over the step's parameters, of unit length.
+        direction: such as ``"along x of {1}"``.
+        vector: the same direction over the step's parameters, of unit length.
         reason: a sentence without a full stop.
     """
 
@@ -133,7 +135,7 @@ class WeakDirection:
         return f"{self.step}, {self.direction}: {self.reason}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {"direction": self.direction, "vector": list(self.vector), "reason": self.reason}
 
 
@@ -145,7 +147,7 @@ class StepReport:
         parameters: their names, in the order of ``vector`` of the weak directions.
         singular_values: rms signal per direction, descending; ``unit`` is theirs and that of the noise.
         noise: rms noise of that signal.
-        weak: the directions that are not determined; empty when the step is.
+        weak: undetermined directions; empty if the step is determined.
     """
 
     step: str
@@ -157,7 +159,7 @@ class StepReport:
 
     @property
     def determined(self) -> bool:
-        """True when no direction is weak."""
+        """True if no direction is weak."""
         return not self.weak
 
     @property
@@ -172,7 +174,7 @@ class StepReport:
         return self.singular_values[0] / smallest if smallest > 0 else float("inf")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain types; see ``estimator.estimate.result``."""
+        """Convert to plain types; see ``estimator.estimate.result``."""
         return {
             "step": self.step,
             "parameters": list(self.parameters),
@@ -212,17 +214,17 @@ def judge(
     frame: str = "",
     floor: float = 0.0,
 ) -> StepReport:
-    """Compare the singular values of a regressor to its noise.
+    """Compare the singular values of a regressor with its noise.
 
     Args:
-        step: its name.
+        step: name of the step.
         parameters: K names.
         information: mean normal matrix X^T X / Q of the scaled regressor, shape (K, K).
         noise: rms noise in the unit of the singular values (the square roots of the eigenvalues).
-        unit: that unit.
-        reason: what to say of a weak direction.
-        words, frame: what introduces a direction of space (K = 3), and its frame, such as ``"along"`` and ``"{1}"``.
-        floor: smallest singular value that is not rounding error, same unit.
+        unit: unit of the singular values.
+        reason: reason to report for a weak direction.
+        words, frame: preposition for a direction in space (K = 3), and its frame, such as ``"along"`` and ``"{1}"``.
+        floor: smallest singular value above rounding error, same unit.
     """
     values, vectors = np.linalg.eigh(information)
     values, vectors = np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1]
@@ -242,17 +244,17 @@ def judge(
 
 
 def cross_information(vectors: Array) -> Array:
-    """Mean of [a]^T [a] = |a|^2 I - a a^T over the vectors a, shapes (Q, 3) -> (3, 3).
+    """Return the mean of [a]^T [a] = |a|^2 I - a a^T over the vectors a, shapes (Q, 3) -> (3, 3).
 
-    The normal matrix of x in a x x = b, and of a small rotation of the vectors: what only the components of
-    ``a`` across a direction can tell about that direction.
+    This is the normal matrix of x in a x x = b, and of a small rotation of the vectors. The information on a direction
+    comes from the components of ``a`` across it.
     """
     moment = vectors.T @ vectors / len(vectors)
     return np.trace(moment) * np.eye(3) - moment
 
 
 def axis(vector: Array) -> str:
-    """A direction of space in words: an axis, or its components."""
+    """Describe a direction in space: name of an axis, or components."""
     k = int(np.argmax(np.abs(vector)))
     if abs(vector[k]) > np.cos(np.deg2rad(10)):
         return "xyz"[k]
@@ -260,6 +262,6 @@ def axis(vector: Array) -> str:
 
 
 def combination(vector: Array, parameters: Sequence[str]) -> str:
-    """The large entries of a unit vector in words, such as ``0.90 Ixx -0.44 Iyy``."""
+    """Describe a unit vector by its large entries, such as ``0.90 Ixx -0.44 Iyy``."""
     large = [k for k in np.argsort(-np.abs(vector)) if abs(vector[k]) > 0.3]
     return " ".join(f"{vector[k]:+.2f} {parameters[k]}" for k in large).removeprefix("+")

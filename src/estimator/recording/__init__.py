@@ -1,1 +1,1 @@
-"""Recordings: model, metadata, checks, files."""
+"""Recordings: data model, metadata, checks, files."""

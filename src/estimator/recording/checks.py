@@ -1,4 +1,4 @@
-"""Is a recording plausible? Checked before anything is computed from it; one sentence per fault."""
+"""Check that a recording is plausible before any computation; one sentence per fault."""
 
 from collections.abc import Mapping
 
@@ -13,13 +13,13 @@ from estimator.quantisation import Repeats
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 
-SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
-TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike
-RATE_TOLERANCE = 1e-3  # of rate_hz: enters accelerations, and so inertia, twice
+SPACING_TOLERANCE = 0.5  # largest jitter of a time stamp, in sample periods
+TORQUE_FACTOR = 2.0  # times torque_limit_Nm: larger torques are a spike or have another unit
+RATE_TOLERANCE = 1e-3  # of rate_hz: its error enters accelerations, and so inertia, squared
 
 MOST_REPEATED = 8
-"""Rows that may repeat the one before: so few change no estimate."""
-_MOST = 0.9  # of the rows: the few that a filter drew through a jump by a full turn lie anywhere
+"""Number of rows that may repeat the one before without affecting an estimate."""
+_MOST = 0.9  # share of the rows: a filter spreads the few rows at a jump by a full turn
 
 
 def check_recording(recording: Recording) -> None:
@@ -43,7 +43,7 @@ def check_recording(recording: Recording) -> None:
 
 
 def check_carries(recording: Recording, done: str) -> None:
-    """Check that the robots carried something; ``done`` is what is done with a payload, such as ``"estimated"``.
+    """Check that the robots carried something; ``done`` is the operation in messages, such as ``"estimated"``.
 
     Raises:
         InputError: it is a free trial.
@@ -56,10 +56,10 @@ def check_carries(recording: Recording, done: str) -> None:
 
 
 def check_duration(recording: Recording, trim_s: float) -> None:
-    """Check that samples are left once ``trim_s`` seconds are dropped at each end.
+    """Check that samples remain after dropping ``trim_s`` seconds at each end.
 
     Raises:
-        InputError: nothing would be left, or trim_s is not a non-negative number.
+        InputError: no sample would remain, or trim_s is not a non-negative number.
     """
     try:
         trim_slice(len(recording.time), recording.metadata.rate_hz, trim_s)
@@ -68,7 +68,7 @@ def check_duration(recording: Recording, trim_s: float) -> None:
 
 
 def check_finite(name: str, columns: Mapping[str, Array]) -> None:
-    """Check that columns hold finite numbers only.
+    """Check that columns contain finite numbers only.
 
     Raises:
         InputError: names the recording, the column and the row (counted from 0).
@@ -93,7 +93,7 @@ def _check_time(recording: Recording) -> None:
             f"{name}: time {what} in row {row} (from {time[row - 1]:.9g} s to {time[row]:.9g} s); "
             "it must increase"
         )
-    # The median is blind to gaps, the mean to jitter; a gap must not be reported as a wrong rate.
+    # The median ignores gaps, so a gap is not reported as a wrong rate; the mean ignores jitter.
     if abs(np.median(spacing) * rate_hz - 1.0) > SPACING_TOLERANCE / 2:
         raise InputError(
             f"{name}: samples are {np.median(spacing):.6g} s apart, but rate_hz is {rate_hz:g}, "
@@ -110,7 +110,7 @@ def _check_time(recording: Recording) -> None:
             f"samples must be {low:.4g} to {high:.4g} s apart at {rate_hz:g} Hz"
         )
     intervals, duration = len(spacing), time[-1] - time[0]
-    # Counted in samples; the first and the last stamp may jitter too.
+    # In samples; the first and the last stamp may also jitter.
     drift = duration * rate_hz - intervals
     if abs(drift) > RATE_TOLERANCE * intervals + 2 * SPACING_TOLERANCE:
         raise InputError(
@@ -120,7 +120,7 @@ def _check_time(recording: Recording) -> None:
 
 
 def _check_repeats(recording: Recording) -> None:
-    """Rows that repeat the one before are one reading, and would count as many."""
+    """Refuse rows that repeat the one before: they are one reading, but would count as many."""
     for robot in range(recording.metadata.robots):
         read = (recording.phi, recording.theta, recording.tau)
         repeats = Repeats(range(6, 9)).of(np.concatenate([field[:, robot] for field in read], axis=1))
@@ -132,10 +132,10 @@ def _check_repeats(recording: Recording) -> None:
 
 
 def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, high: float) -> None:
-    """Joint limits of one kind of joint; the bound itself is allowed."""
+    """Check the limits of one kind of joint; the bound itself is allowed."""
     columns = {name: x for name, x in recording.columns().items() if name.rpartition(".")[2] in suffixes}
     least, largest = min(x.min() for x in columns.values()), max(x.max() for x in columns.values())
-    # Far outside as radians, all inside as degrees; a single jump or a slight excess is neither.
+    # Degrees are far outside the range as radians, and all inside after conversion.
     in_degrees = (
         max(-least, largest) > 2.0 * max(-low, high)
         and np.deg2rad(least) >= low
@@ -153,7 +153,7 @@ def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, hi
 
 
 def _looks_like(values: Array, low: float, high: float, *, in_degrees: bool) -> str:
-    """What angles [rad] beyond their range seem to be, for the end of a sentence."""
+    """Guess the cause of angles [rad] beyond their range, for the end of a sentence."""
     middle, half = (low + high) / 2, (high - low) / 2
     turns = np.rint((values - middle) / (2 * np.pi))
     inside = np.abs(values - 2 * np.pi * turns - middle) <= half
@@ -163,7 +163,7 @@ def _looks_like(values: Array, low: float, high: float, *, in_degrees: bool) -> 
 
 
 def _called(recording: Recording, name: str) -> str:
-    """A column in words that fit the file: at wrist level it holds neither driven angles nor torques."""
+    """Name a column according to the file: at wrist level it has neither driven angles nor torques."""
     robot, _, channel = name.partition(".")
     if recording.metadata.level == "joint" or channel.startswith("theta"):
         return f"column {name!r}"
@@ -194,7 +194,7 @@ def _check_legs(recording: Recording) -> None:
             "are zeros, signs and order of the joints right?"
         )
 
-    # One robot at a time: the geometry takes ten times the memory of its angles.
+    # One robot at a time: the geometry takes ten times the memory of the angles.
     arms = [(recording.joints(robot)[0], recording.arm(robot)) for robot in robots]
     found = [stretches(phi, arm) for phi, arm in arms]
     if (first := _first([np.flatnonzero(~meet) for meet, _ in found])) is not None:
@@ -206,6 +206,6 @@ def _check_legs(recording: Recording) -> None:
 
 
 def _first(rows: list[NDArray[np.intp]]) -> tuple[int, int] | None:
-    """The first row that any robot has, and that robot, from the rows of each."""
+    """Return the first row of any robot, and that robot, from the rows of each."""
     found = [(int(of_robot[0]), robot) for robot, of_robot in enumerate(rows) if len(of_robot)]
     return min(found) if found else None

@@ -1,4 +1,4 @@
-"""The JSON metadata of a recording: strict both ways, every error names the key and what is allowed."""
+"""JSON metadata of a recording: strict in reading and writing, with errors that name the key and the allowed values."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from estimator.errors import InputError
 from estimator.strict import Fields, Rules, is_number, parse_json
 
 SENSORS = 9
-"""Channels of one robot before its commands."""
+"""Number of sensor channels of one robot, without its commands."""
 Method = Literal["untouched", "filtered", "interpolated", "fitted"]
-"""Samples as they came; low-passed and thinned; interpolated, or polynomials fitted, then low-passed and thinned."""
+"""Processing of samples: none; low-passed and thinned; interpolated, or fitted with polynomials, then low-passed and
+thinned."""
 METHODS: tuple[Method, ...] = ("untouched", "filtered", "interpolated", "fitted")
 Level = Literal["joint", "wrist"]
 LEVELS: tuple[Level, ...] = ("joint", "wrist")
@@ -37,19 +38,19 @@ _SAMPLING: Rules = {
 
 @dataclass(frozen=True)
 class Sampling:
-    """How one robot's sensors were read before its samples were brought onto the recording's grid.
+    """How one robot's sensors were read before resampling to the recording's grid.
 
-    A recording that was interpolated, filtered or thinned shows neither the step of an encoder nor the noise of a
-    single reading any more; errors that repeat while a joint rests are still in it. This tells them.
+    An interpolated, filtered or thinned recording no longer shows the step of an encoder or the noise of a single
+    reading. It still contains errors that are constant while a joint rests. This class documents steps and noise.
 
     Attributes:
         native_hz: rate of the samples [Hz], by the recording's clock.
-        first_s: when the first was taken, in the recording's time [s].
-        jitter_s: standard deviation of the instants from evenly spaced ones [s].
+        first_s: time of the first sample, in the recording's time [s].
+        jitter_s: standard deviation of the sample times from an even grid [s].
         missing: share of samples that the log lacked.
-        aligned: whether its clock was set by the motion, so that the motion tells nothing of it any more.
-        method: what was done to them before the robots were brought together.
-        level: channels of the log, and so of ``steps``: "joint" or "wrist".
+        aligned: whether the clock was aligned by the motion, so that the motion has no more information on it.
+        method: processing before the robots were merged.
+        level: channels of the log and of ``steps``: "joint" or "wrist".
         steps: rounding step of every channel of the log [rad, rad, N m] or [m, rad, N], 0 for none.
     """
 
@@ -63,17 +64,17 @@ class Sampling:
     steps: tuple[float, ...]
 
     def steps_of(self, kind: int) -> Sequence[float]:
-        """Steps of phi (0), theta (1) or tau (2), three joints; 0 where the log had other channels."""
+        """Return the steps of phi (0), theta (1) or tau (2), three joints; 0 if the log had other channels."""
         if self.level == "wrist" and kind != 1:
             return (0.0, 0.0, 0.0)
         return self.steps[3 * kind : 3 * kind + 3]
 
     def later(self, start_s: float) -> Sampling:
-        """The same for a part of the recording that begins at ``start_s`` [s]."""
+        """Shift to a part of the recording that begins at ``start_s`` [s]."""
         return replace(self, first_s=self.first_s - start_s)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values by name."""
+        """Convert to plain values by name."""
         return asdict(self) | {"steps": list(self.steps)}
 
     @classmethod
@@ -90,33 +91,33 @@ class Sampling:
 
 FORMAT = "mocobot-recording"
 VERSIONS = (1, 2, 3, 4, 5)
-"""Version 2 has the key ``level``, version 3 ``sampling`` besides, version 4 free trials, with or without ``sampling``,
-version 5 ``units``, of any trial; each is written only where it is needed."""
+"""Version 2 adds the key ``level``, version 3 ``sampling``, version 4 free trials, with or without ``sampling``,
+version 5 ``units``, for any trial. Files use the lowest sufficient version."""
 FREE = "free"
-"""Kind of trial in which the robots hold nothing."""
+"""Kind of trial with unloaded robots."""
 TRIALS = ("random", "periodic", "static", FREE)
 _REQUIRED = ("format", "version", "robots", "rate_hz", "trial", "source", "payload", "seed", "design")
 _NEWER = (), ("level",), ("level", "sampling"), ("level",), ("level", "units")
-"""Keys that each version requires besides."""
+"""Additional required keys of each version."""
 
 
 @dataclass(frozen=True)
 class RecordingMetadata:
-    """What a recording says about itself.
+    """Metadata of a recording.
 
     Attributes:
         robots: number of robots N, at least 1.
         rate_hz: sampling rate [Hz].
-        trial: "random", "periodic" or "static"; "free" where the robots hold nothing.
+        trial: "random", "periodic" or "static"; "free" for unloaded robots.
         source: what produced the samples, free text.
-        payload: name of the payload, or None where unknown, and where there is none.
+        payload: name of the payload, or None if unknown or absent.
         seed: seed of a simulated trial, or None.
-        design: numbers of the robots (all alike).
+        design: design parameters of the robots (all alike).
         control: gains, feed-forward and inner loop as plain JSON values, or None.
-        level: how the file tells the samples: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
-        sampling: how each robot's sensors were read, N entries, where the samples are not as they were read.
-        units: the robots as they are, ``x`` of shape (N, ``COUNT``), where a calibration says; the samples stay as
-            they were read.
+        level: columns of the file: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
+        sampling: how each robot's sensors were read, N entries, if the samples were resampled.
+        units: the robots with calibrated deviations, ``x`` of shape (N, ``COUNT``), or None; the samples are raw
+            readings in any case.
     """
 
     robots: int
@@ -133,17 +134,17 @@ class RecordingMetadata:
 
     @property
     def arms(self) -> Arms:
-        """The robots as they are, or as designed where nothing is known."""
+        """The robots with their deviations, or as designed if these are unknown."""
         return self.design if self.units is None else self.units
 
     @property
     def team(self) -> int:
-        """Robots that carried the payload: more than ``robots`` where ``control`` tells of forces of more."""
+        """Number of robots that carried the payload: more than ``robots`` if ``control`` lists forces of more."""
         forces = (self.control or {}).get("feed_forward_N")
         return max(self.robots, len(forces)) if isinstance(forces, list) else self.robots
 
     def to_json(self) -> str:
-        """The metadata as JSON text.
+        """Convert the metadata to JSON text.
 
         Raises:
             InputError: a value is not allowed, ``units`` are of other robots, or ``control`` is not plain finite JSON.
@@ -167,7 +168,7 @@ class RecordingMetadata:
             text = json.dumps(values, allow_nan=False)
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"recording metadata cannot be written as JSON: {error}") from error
-        # One set of rules: what cannot be read back must not be written.
+        # Apply the reader's rules: never write what cannot be read back.
         self.from_json(text, "recording metadata")
         return text
 
@@ -179,13 +180,13 @@ class RecordingMetadata:
 
     @classmethod
     def from_json(cls, text: str | bytes, where: str = "metadata") -> RecordingMetadata:
-        """Parse and check JSON metadata, which messages call ``where``.
+        """Parse and check JSON metadata; ``where`` is its name in messages.
 
         Raises:
             InputError: not JSON, a key unknown, missing or repeated, or a value of the wrong type or range.
         """
         values = parse_json(text, where)
-        # Before anything else: another version may well have other keys.
+        # Check the version first: another version may have other keys.
         if values.get("format", FORMAT) != FORMAT:
             raise InputError(f"{where}: format is {values['format']!r}; it must be {FORMAT!r}")
         version = values.get("version", VERSIONS[0])
@@ -205,10 +206,10 @@ class RecordingMetadata:
 
 
 def check_of_robots(units: ArmUnit, metadata: RecordingMetadata, what: str) -> None:
-    """Whether units, which messages call ``what``, are of as many robots as a recording, and of the same design.
+    """Check that units have as many robots as a recording, and the same design; ``what`` is their name in messages.
 
     Raises:
-        InputError: they are not.
+        InputError: they do not.
     """
     if units.x.shape != (metadata.robots, COUNT):
         count = len(units.x) if units.x.ndim == 2 else 1
@@ -218,11 +219,11 @@ def check_of_robots(units: ArmUnit, metadata: RecordingMetadata, what: str) -> N
 
 
 def _rules(values: dict[str, Any]) -> Rules:
-    """What is allowed in metadata of the version that they name."""
+    """Return the allowed values for metadata of their stated version."""
     version, trial, robots = (values.get(key) for key in ("version", "trial", "robots"))
     trials = TRIALS if (version or 0) >= 4 else TRIALS[:-1]
     newer = f" in version {version} (4 has free trials)" if trial == FREE and FREE not in trials else ""
-    # It is printed; control characters and half surrogates are not for terminals.
+    # The label is printed, so exclude control characters and lone surrogates.
     label = "text or null, all of it printable"
     if trial == FREE and isinstance(values.get("payload"), str) and values["payload"].isprintable():
         label = "null in a free trial, whose robots hold nothing"
@@ -235,7 +236,7 @@ def _rules(values: dict[str, Any]) -> Rules:
 
     return {
         "robots": ("a whole number, at least 1", lambda x: type(x) is int and x >= 1),
-        # A bound instead of isfinite, which overflows on whole numbers beyond the range of a float.
+        # Use a bound: isfinite overflows on integers beyond the range of a float.
         "rate_hz": (_HERTZ, lambda x: type(x) in (int, float) and 0 < x < 1e9),
         "trial": (f"one of {', '.join(trials)}{newer}", lambda x: x in trials),
         "source": ("text", lambda x: isinstance(x, str)),

@@ -1,4 +1,4 @@
-"""Recordings: joint angles and spring torques of one trial; their columns are those of docs/recording.md."""
+"""Recordings: joint angles and spring torques of one trial, with the columns of docs/recording.md."""
 
 from dataclasses import dataclass
 
@@ -27,8 +27,7 @@ CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
 class Recording:
     """Samples of one trial with N robots, all taken at the same instants.
 
-    Samples are what the sensors read. What follows from them goes by ``arm`` and ``joints``, which know the robots as
-    they are where the metadata say.
+    Samples are raw sensor readings. ``arm`` and ``joints`` apply the robots' deviations if the metadata contain them.
 
     Attributes:
         time: sample times [s], shape (Q,).
@@ -36,8 +35,8 @@ class Recording:
         theta: gimbal angles in the order (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
         tau: spring torques on the proximal links, positive raising them [N m], shape (Q, N, 3).
         ref: commanded wrist positions in each robot's {b} [m], shape (Q, N, 3), or None.
-        metadata: what the recording says about itself.
-        name: the file's name, or what else to call the recording in messages.
+        metadata: metadata of the recording.
+        name: name in messages, such as the file's name.
 
     Raises:
         InputError: the arrays' shapes do not agree with each other or with ``metadata.robots``.
@@ -52,7 +51,7 @@ class Recording:
     name: str = "recording"
 
     def __post_init__(self) -> None:
-        """Bring the arrays to float64 and check their shapes."""
+        """Convert the arrays to float64 and check their shapes."""
         shape = (np.size(self.time), self.metadata.robots, 3)
         for field in ("time", *CHANNELS["joint"]):
             value = getattr(self, field)
@@ -65,22 +64,22 @@ class Recording:
             object.__setattr__(self, field, array)
 
     def arm(self, robot: int) -> Arms:
-        """The arm of one robot (from 0), as it is or as designed."""
+        """Return the arm of one robot (from 0), with its deviations if known."""
         return arm_of(self.metadata.arms, robot)
 
     def joints(self, robot: int) -> tuple[Array, Array, Array]:
-        """True phi [rad], theta [rad] and tau [N m] of one robot (from 0), shape (Q, 3) each."""
+        """Return true phi [rad], theta [rad] and tau [N m] of one robot (from 0), shape (Q, 3) each."""
         return true_joints(self.arm(robot), self.phi[:, robot], self.theta[:, robot], self.tau[:, robot])
 
     def columns(self) -> dict[str, Array]:
-        """Driven angles, gimbal angles, torques and commands by their column's name, each of shape (Q,)."""
+        """Return driven angles, gimbal angles, torques and commands by column name, each of shape (Q,)."""
         return self._named("joint", {"phi": self.phi, "theta": self.theta, "tau": self.tau, "ref": self.ref})
 
     def file_columns(self) -> dict[str, Array]:
-        """Every column of the file by its name, in file order, each of shape (Q,).
+        """Return every column of the file by name, in file order, each of shape (Q,).
 
-        Wrist positions and forces are those of the design, as a robot's own controller tells them: ``units`` say how
-        readings differ from the truth, at both levels alike.
+        Wrist positions and forces are computed with the design, as a robot's own controller does. ``units`` apply to
+        both levels in the same way.
 
         Raises:
             InputError: the level is "wrist" and some driven angles have no wrist position (see ``wrist_of``).

@@ -1,4 +1,4 @@
-"""The Parquet file of a recording (docs/recording.md)."""
+"""Read and write the Parquet file of a recording (docs/recording.md)."""
 
 import contextlib
 import difflib
@@ -23,11 +23,11 @@ METADATA_KEY = b"mocobot"
 
 
 def write_recording(recording: Recording, path: Path | str) -> None:
-    """Write a recording as Parquet; an existing file is replaced only once the new one is complete.
+    """Write a recording as Parquet; an existing file is replaced only when the new one is complete.
 
     Raises:
-        InputError: the target cannot be written, the metadata is not valid, or the level is "wrist" and some
-            driven angles have no wrist position.
+        InputError: the target cannot be written, the metadata are invalid, or the level is "wrist" and some driven
+            angles have no wrist position.
     """
     path = Path(path)
     metadata = {METADATA_KEY: recording.metadata.to_json().encode()}
@@ -35,14 +35,14 @@ def write_recording(recording: Recording, path: Path | str) -> None:
         {name: np.ascontiguousarray(values) for name, values in recording.file_columns().items()}
     )
     with whole_file(path) as temporary:
-        # Measured samples hardly repeat, so dictionaries only cost space; checksums catch damaged pages.
+        # Measured samples rarely repeat, so dictionaries waste space; checksums detect damaged pages.
         pq.write_table(
             table.replace_schema_metadata(metadata), temporary, use_dictionary=False, write_page_checksum=True
         )
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Read and check a recording (see ``check_recording`` for what is checked in the samples).
+    """Read and check a recording (see ``check_recording`` for the checks of the samples).
 
     Raises:
         InputError: the file cannot be read, is not a recording, or its content is not plausible.
@@ -82,7 +82,7 @@ def read_recording(path: Path | str) -> Recording:
 
 
 def _read_columns(file: pq.ParquetFile, metadata: RecordingMetadata) -> tuple[Array, dict[str, Array]]:
-    """Time (Q,) and the fields, each (Q, N, 3); one column after the other, so that nothing is in memory twice."""
+    """Read time (Q,) and the fields, each (Q, N, 3), one column at a time to save memory."""
     rows, names = file.metadata.num_rows, set(file.schema_arrow.names)
 
     def column(name: str) -> Array:
@@ -101,7 +101,7 @@ def _read_columns(file: pq.ParquetFile, metadata: RecordingMetadata) -> tuple[Ar
 
 
 def _joints(h: Array, force: Array, metadata: RecordingMetadata, path: Path) -> tuple[Array, Array]:
-    """Driven angles and torques in the place of wrist positions and forces, robot by robot for the sake of memory."""
+    """Replace wrist positions and forces by driven angles and torques, robot by robot to save memory."""
     for robot in range(metadata.robots):
         fault = wrist_fault(h[:, robot], metadata.design)
         if fault is not None:
@@ -119,7 +119,7 @@ def _joints(h: Array, force: Array, metadata: RecordingMetadata, path: Path) -> 
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
-    """The file; whatever goes wrong with it inside the block becomes one sentence."""
+    """Open the file; convert errors inside the block to one sentence."""
     try:
         exists, is_file = path.exists(), path.is_file()
     except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
@@ -130,15 +130,14 @@ def _opened(path: Path) -> Iterator[pq.ParquetFile]:
         what = "a directory" if path.is_dir() else "not a regular file"
         raise InputError(f"{path}: is {what}; it must be a recording file")
     try:
-        # ParquetFile, not read_table: the latter turns folder names such as a=1 into extra columns. Not pre-buffered:
-        # that keeps whole row groups.
+        # read_table would turn folder names such as a=1 into extra columns. Pre-buffering would keep whole row groups.
         with pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
             yield file
     except InputError:
         raise
     except PermissionError as error:
         raise InputError(f"{path}: cannot be read (permission denied)") from error
-    except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
+    except Exception as error:  # pyarrow raises many types for damaged bytes, not only its own
         detail = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({detail})") from error
 
@@ -147,7 +146,7 @@ def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Pat
     robots, channels = metadata.robots, CHANNELS[metadata.level]
 
     def of_robots(*fields: str) -> list[str]:
-        # No need to spell out an absurd number of robots: each has more columns than one.
+        # Each robot has several columns, so len(names) limits an absurd number of robots.
         spelled = range(1, min(robots, len(names)) + 1)
         return [f"omnid{i}.{s}" for i in spelled for field in fields for s in channels[field]]
 
@@ -178,24 +177,24 @@ def _check_type(field: pa.Field, path: Path) -> None:
 
 
 _TAIL_BYTES, _HEADER_BYTES = 8, 16 << 10
-"""Footer's length and magic number; the longest header of a page, which holds two values of the column at most."""
+"""Length of the footer's size and magic number; longest page header, which holds at most two values of the column."""
 _GROUPS, _COLUMNS, _METADATA = 4, 1, 3
 _VALUES, _UNPACKED, _PACKED, _DATA, _DICTIONARY = 5, 6, 7, 9, 11  # of a column in a group
 _PAGE_UNPACKED, _PAGE_PACKED = 2, 3
 
 
 def claimed_bytes(path: Path, columns: Sequence[str], names: Collection[str]) -> int:
-    """The most that columns, and lists in them, unpack to by pages, by footer, or by values of eight bytes.
+    """Return the largest unpacked size of columns, including lists in them, by page headers, footer, or value count.
 
-    A reader takes memory for a whole page as its header says, 33 kB for half a gigabyte, and for values as the footer
-    says, and either may lie. Both are structures of Thrift's compact protocol, by fields with numbers
-    (https://github.com/apache/parquet-format, ``parquet.thrift``). pyarrow tells neither pages nor, without ending the
-    process, columns of a damaged footer.
+    A reader allocates a whole page as its header says (33 kB may claim half a gigabyte) and values as the footer says.
+    Either may be wrong. Both are structures of Thrift's compact protocol with numbered fields
+    (https://github.com/apache/parquet-format, ``parquet.thrift``). pyarrow does not report page sizes, and it may end
+    the process when it reads columns of a damaged footer.
 
     Args:
         path: the file.
         columns: paths of its columns, in the order of its schema.
-        names: of columns and lists that are read.
+        names: columns and lists to read.
 
     Raises:
         Exception: of any type, on damaged bytes.
@@ -214,7 +213,7 @@ def claimed_bytes(path: Path, columns: Sequence[str], names: Collection[str]) ->
 
 def _in_pages(file: BinaryIO, column: dict[int, Any]) -> int:
     total, at = 0, min(column[_DATA], column.get(_DICTIONARY) or column[_DATA])
-    end = at + column[_PACKED] if column[_VALUES] else 0  # without values pages are not read
+    end = at + column[_PACKED] if column[_VALUES] else 0  # readers skip pages of an empty column
     while at < end:
         file.seek(at)
         header, length = _structure(file.read(_HEADER_BYTES), 0)
@@ -224,7 +223,7 @@ def _in_pages(file: BinaryIO, column: dict[int, Any]) -> int:
 
 
 def _structure(data: bytes, at: int) -> tuple[dict[int, Any], int]:
-    """Values of a structure by their field, and where it ends."""
+    """Return the values of a structure by field number, and its end."""
     found, field = {}, 0
     while head := data[at]:
         if not head >> 4:
@@ -237,14 +236,14 @@ def _structure(data: bytes, at: int) -> tuple[dict[int, Any], int]:
 def _value(data: bytes, at: int, kind: int) -> tuple[Any, int]:
     value = None
     match kind:
-        case 1 | 2 | 3:  # in a list, true or false; a byte
+        case 1 | 2 | 3:  # a boolean in a list, or a byte
             at += 1
         case 4 | 5 | 6:
             number, at = _unsigned(data, at)
             value = (number >> 1) ^ -(number & 1)
         case 7:
             at += 8
-        case 8:  # bytes, after their number
+        case 8:  # bytes after their length
             number, at = _unsigned(data, at)
             at += number
         case 9 | 10:
