@@ -60,17 +60,17 @@ _FOLLOWED = 0.9  # least correlation of a motion with its command for a finding
 _NEVER, _NEAR = (
     1e-3,
     0.02,
-)  # of the largest value: an unsigned torque falls below zero by less than _NEVER and comes within _NEAR of it
+)  # of the largest value: bounds of the minimum of a torque that has lost its sign
 _UNEXPLAINED = 0.5  # share of a torque, beyond noise, above which the model hardly explains it
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something wrong.
+    """A problem of a log.
 
     Attributes:
-        topic: what it concerns.
-        sentence: what it is, with the numbers that say so.
+        topic: the subject.
+        sentence: the problem, with the numbers that show it.
     """
 
     topic: Topic

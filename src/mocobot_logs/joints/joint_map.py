@@ -102,13 +102,13 @@ def units_of(kind: Kind, *, slides: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """How the robot is commanded, as far as it is known; unknown numbers are NaN.
+    """How the robot is commanded; unknown numbers are NaN.
 
     Attributes:
-        command: what the log's commands are.
+        command: quantity of the log's commands.
         position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,).
-        gain_of: what gains make of an error.
-        limit: most that the loop gives, in ``gain_of``, shape (J,).
+        gain_of: quantity that the gains produce from an error.
+        limit: largest output of the loop, in the quantity of ``gain_of``, shape (J,).
         supply_V: nominal supply voltage, or None.
     """
 
@@ -125,20 +125,20 @@ Channels = dict[tuple[str, str], ChannelMap]
 
 @dataclass(frozen=True, eq=False)
 class JointMap:
-    """A map: strict, complete, joints in the model's order.
+    """A complete, checked map with joints in the model's order.
 
     Attributes:
-        name: what messages call it.
+        name: name of the map in messages.
         joints: names of the J joints in the model.
-        time: where time is.
+        time: location of the time.
         rate_hz: rate of the grid [Hz], or None for the log's own.
-        csv: how a text table is written.
-        channels: by quantity and joint; the joint is "" for what the robot has one of.
-        turns: motor positions from joint positions, gears and coupled drives, shape (J, J).
-        zero: added to positions behind the gear [rad or m], shape (J,).
-        torque_constant: [N m/A], NaN where it is free, shape (J,).
+        csv: form of a text table.
+        channels: by quantity and joint; the joint is "" for a quantity of the whole robot.
+        turns: matrix from joint to motor positions, with gears and coupled drives, shape (J, J).
+        zero: added to positions on the joint's side of the gear [rad or m], shape (J,).
+        torque_constant: torque constants [N m/A], NaN where free, shape (J,).
         control: how the robot is commanded.
-        overrides: patterns of file names, and the entries of ``control`` that differ there; later ones override.
+        overrides: file name patterns with the entries of ``control`` that they change; later ones override.
     """
 
     name: str
@@ -413,12 +413,12 @@ _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
 
 @dataclass(frozen=True)
 class _PerJoint:
-    """Reads numbers of the joints.
+    """Reads the numbers of the joints.
 
     Attributes:
-        where: what messages call the map.
-        named: the joints in the map's order.
-        model: the joints in the model's order.
+        where: name of the map in messages.
+        named: joints in the map's order.
+        model: joints in the model's order.
         own: tables of single joints.
     """
 

@@ -45,7 +45,7 @@ _BLOCK, _SLOW_SHARE, _SLOW = (
     64,
     0.9,
     (1.1, 1.75),
-)  # intervals per block; quantile of the block means; range of slower rates, relative to the median
+)  # intervals per block; quantile; range of slower rates over the median
 _GAP = 1.75  # periods: jitter alone makes no longer intervals
 _INSIDE = 0.1  # share of a period: an instant this close to a sample does not count as inside a gap
 
@@ -231,9 +231,12 @@ def _between_samples(at_ns: Array, time_ns: Stamps, period_ns: float) -> NDArray
 
 
 def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int64], float] | None:
-    """Return the grid of even stamps, or None: spacing [ns], index of each sample, rounding step of the stamps, 0 if none [ns].
+    """Fit a grid to even stamps; None if they are uneven.
 
     Stamps rounded to milliseconds or clock ticks count as even if each is off by no more than the rounding.
+
+    Returns:
+        Spacing [ns], index of each sample, and rounding step of the stamps [ns], 0 if they are not rounded.
     """
     interval = np.diff(time_ns)
     step_ns = float(np.gcd.reduce(interval))
@@ -352,8 +355,8 @@ ringing of the switched bus, which a reading samples at random (Measured, XL330:
 def mean_supply(reading: Array, rate_hz: float) -> Array:
     """Low-pass a supply's reading of at least 16 uniform samples [V], shape (Q,).
 
-    A drive's switching makes the bus ring, and readings fall at random phases of its period. An XL330 at a steady duty of
-    0.7 reads 6.2, 7.3 and 8.2 V in turn; their mean is near its idle supply. The winding sees this mean.
+    A drive's switching makes the bus ring, and readings fall at random phases of its period. An XL330 at a steady duty
+    of 0.7 reads 6.2, 7.3 and 8.2 V in turn; their mean is near its idle supply. The winding sees this mean.
     """
     # The filter passes through the first and last value of its input: padding with means removes their noise.
     end = round(rate_hz / SUPPLY_HZ)
