@@ -235,7 +235,7 @@ def noise_level(values: Array) -> float:
 
 
 def wild(values: Array) -> NDArray[np.bool_]:
-    """Return samples that no sensor reads: infinite, absurd, or a thousand times farther from the median than the others.
+    """Return which samples no sensor reads: infinite, absurd, or a thousand times farther off than the others.
 
     Args:
         values: samples, shape (q,) or (q, C); NaN is not wild.
@@ -260,8 +260,8 @@ Run = tuple[int, int, int, bool]
 def stuck(values: Array, rate_hz: float) -> Iterator[Run]:
     """Yield runs in which a channel of a robot is stuck.
 
-    A channel is not stuck if nothing moves, or if it merely rests while others move. A stuck channel jumps at either end,
-    stops abruptly before the log ends, or repeats a value more often than its noise allows.
+    A channel is not stuck if nothing moves, or if it merely rests while others move. A stuck channel jumps at either
+    end, stops abruptly before the log ends, or repeats a value more often than its noise allows.
 
     Args:
         values: finite samples of the robot's channels, shape (q, C).

@@ -1,6 +1,8 @@
-"""Find exchanged joints and wrong signs: undo each mistake alone and report those that let the model explain the torques.
+"""Find exchanged joints and wrong signs in a joint log.
 
-The fit of a joint's torque is the model's torque times a gain, rotor inertia, Coulomb and viscous friction, and an
+Each mistake is undone alone. A mistake is reported if the model then explains the torques.
+
+A joint's torque is fitted by the model's torque times a gain, rotor inertia, Coulomb and viscous friction, and an
 offset. Gain, inertia and friction are non-negative. The unexplained share of the variance is the joint's misfit. With
 correct signs and joints it is small even if masses are wrong; otherwise it is near 1. Rows in which a joint rests are
 left out, since Coulomb friction is undetermined there. A payload missing in the model, made of point masses, competes
@@ -28,9 +30,10 @@ Kind = Literal[
 ]  # fmt: skip
 """Kinds of mistakes; if several fit equally well, the first in this order is reported."""
 SUSPICIOUS = 0.2
-"""Misfit above which a joint is suspected. Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, but 0.11 and
-0.27 at two with coupled drives. Up to 0.08 on 24 simulated seven-joint arms with masses and centres off by 10 or 50 %;
-no mistake was reported there.
+"""Misfit above which a joint is suspected.
+
+Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, but 0.11 and 0.27 at two with coupled drives. On 24
+simulated seven-joint arms with masses and centres off by 10 or 50 % it is up to 0.08; no mistake was reported there.
 """
 DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
 """Factors by which undoing a mistake must lower the misfit of its joints: if one of them is suspected, and if none is.
@@ -51,9 +54,7 @@ _CHANGED = 1.5  # a mistake concerns a joint if it changes the joint's misfit by
 _RESTS = 0.05  # of the rms speed; below it the sign of the speed is unreliable
 _LEAST_TORQUE = 1e-9
 _LEAST_ROWS = 20
-_POINTS = np.array(
-    list(product((-0.3, -0.15, 0.0, 0.15, 0.3), repeat=3))
-).T  # positions of a payload's point masses [m]
+_POINTS = np.array(list(product((-0.3, -0.15, 0.0, 0.15, 0.3), repeat=3))).T  # point masses of a payload [m]
 _TURN = 2.0 * np.pi  # joints rarely move farther in radians, and logs rarely cover less in degrees
 _STEPS, _SHARPENED = 10, 3  # delays tried on either side, and number of refinements
 

@@ -55,8 +55,10 @@ TOLERANCES = {
     "angular speed": 0.01,
     "lift": 0.03,
 }
-"""Disagreement of robots with encoder zeros off by 1 deg, springs by 2 % and lengths by 1 mm (tilt in rad, else relative).
-Measured: the largest of four payloads in random, periodic and static trials, rounded up.
+"""Disagreement of robots with encoder zeros off by 1 deg, springs by 2 % and lengths by 1 mm.
+
+Tilt is in rad, the others are relative to the signal. Measured: the largest of four payloads in random, periodic and
+static trials, rounded up.
 """
 SUSPICIOUS = 2.0
 """Misfit above which something is wrong; poorly calibrated robots stay below 1."""

@@ -100,10 +100,10 @@ def side(missing: int) -> int:
 def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[Array, Array]:
     """Insert missing samples, evenly spaced in each gap.
 
-    They lie on a polynomial of degree 7 through ``side`` samples before and after the gap, fitted by least squares if these
-    are more than eight. A spline would amplify noise in wide gaps; this fit has 0.8 to 1.9 times the noise of one sample.
-    Relative error for a sine sampled at 100 Hz: at 1 Hz 4e-12 with one sample missing and 9e-9 with five; at 5 Hz 1.3e-6
-    and 3e-3.
+    They lie on a polynomial of degree 7 through ``side`` samples before and after the gap, fitted by least squares if
+    these are more than eight. A spline would amplify noise in wide gaps; this fit has 0.8 to 1.9 times the noise of
+    one sample. Relative error for a sine sampled at 100 Hz: at 1 Hz 4e-12 with one sample missing and 9e-9 with five;
+    at 5 Hz 1.3e-6 and 3e-3.
 
     Args:
         time: times of the samples, strictly increasing, shape (q,); q at least 2.

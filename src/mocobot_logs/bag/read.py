@@ -48,10 +48,10 @@ _CROWDED = 0.25  # of a period: differences between closer samples are only nois
 class RowAligner:
     """Brings several topics of one robot onto the stamps of the fastest topic.
 
-    Messages of other topics with the same stamp are copied bit for bit. At other stamps, a topic is interpolated by the
-    cubic through two samples on either side. For a sine sampled at 100 Hz its relative error is 4e-7 at 1 Hz and 2.3e-4 at
-    5 Hz (3/128 of the fourth power of the phase per sample). Nothing is decimated, so nothing aliases. There are no rows
-    before a topic's first sample, after its last, or in its gaps.
+    Messages of other topics with the same stamp are copied bit for bit. At other stamps, a topic is interpolated by
+    the cubic through two samples on either side. For a sine sampled at 100 Hz its relative error is 4e-7 at 1 Hz and
+    2.3e-4 at 5 Hz (3/128 of the fourth power of the phase per sample). Nothing is decimated, so nothing aliases.
+    There are no rows before a topic's first sample, after its last, or in its gaps.
     """
 
     def __init__(

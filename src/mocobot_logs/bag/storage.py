@@ -422,9 +422,7 @@ class SqliteBag:
         if not head.startswith(SQLITE):
             raise InputError(f"{self.name}: not an SQLite file, it begins with other bytes")
         page = int.from_bytes(head[16:18], "big")
-        pages = (
-            int.from_bytes(head[28:32], "big") if head[24:28] == head[92:96] else 0
-        )  # else the header is out of date
+        pages = int.from_bytes(head[28:32], "big") if head[24:28] == head[92:96] else 0  # else outdated
         whole = max(pages * (65536 if page == 1 else page), 100)
         if self.size < whole:
             raise InputError(f"{self.name}: cut off, the SQLite file has {self.size} of {whole} bytes")

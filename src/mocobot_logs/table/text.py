@@ -135,8 +135,8 @@ def is_date(text: str) -> bool:
 class TextClock:
     """Reads a text column of time in blocks: either numbers or dates.
 
-    All dates of a column must have a zone, or none may, since their offset would be unknown. Dates without a zone count as
-    UTC; digits beyond nanoseconds are cut off.
+    All dates of a column must have a zone, or none may, since their offset would be unknown. Dates without a zone
+    count as UTC; digits beyond nanoseconds are cut off.
     """
 
     def __init__(self, unit_ns: int | None, where: str) -> None:
@@ -346,8 +346,8 @@ class CsvTable(Table):
     def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
         """Parse some columns of whole lines.
 
-        Each block is parsed as a separate file. The streaming reader of pyarrow 26 reads ahead in a thread; it hangs or aborts
-        the process if the caller stops early.
+        Each block is parsed as a separate file. The streaming reader of pyarrow 26 reads ahead in a thread; it hangs
+        or aborts the process if the caller stops early.
         """
         table = pcsv.read_csv(
             pa.BufferReader(lines),
