@@ -47,8 +47,8 @@ class Motion:
     Attributes:
         log: the log.
         q, dq, ddq: positions and their derivatives, shape (Q, J).
-        torque: torques, shape (Q, J), NaN where a joint has none. A joint without a torque has its duty here, which is a
-            torque up to a gain and a term proportional to the speed.
+        torque: torques, shape (Q, J), NaN where a joint has none. A joint without a torque has its duty here, which is
+            a torque up to a gain and a term proportional to the speed.
         torque_noise: noise of the torques after the low-pass, shape (J,).
         at: indices of the samples in the log, shape (Q,).
     """

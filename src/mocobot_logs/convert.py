@@ -124,7 +124,8 @@ def convert_parts(
         source, labels, standard, choice, rate_hz, max_gap_s, correct, advance: as in ``convert``.
 
     Returns:
-        At least one recording; and the omissions with their reasons: unchosen parts, gaps, and parts that are too short or unusable.
+        At least one recording; and the omissions with their reasons: unchosen parts, gaps, and parts that are too
+        short or unusable.
 
     Raises:
         InputError: the log is damaged, lacks what is chosen, or no part of it can be used.
@@ -196,13 +197,13 @@ def write_converted(
     *,
     replace_bag: bool = False,
 ) -> None:
-    """Write a recording at the level of its metadata, as what the target's name says.
+    """Write a recording at the level of its metadata, in the format that the target's name states.
 
     Args:
-        recording: what to write.
+        recording: the recording.
         path: target, see ``output_kind``.
-        advance: takes the number of samples written since the last call.
-        replace_bag: whether the folder of a bag that was written here may be replaced.
+        advance: called with the number of samples written since the last call.
+        replace_bag: whether to replace the folder of a bag that this program wrote.
 
     Raises:
         InputError: it cannot be written.
@@ -264,9 +265,7 @@ def write_npz(recording: Recording, path: Path, level: Level = "joint") -> None:
         arrays = {"time": recording.time, "h": h, "theta": recording.theta, "force": force}
     if recording.ref is not None:
         arrays["ref"] = recording.ref
-    rows = {
-        name: np.ascontiguousarray(array) for name, array in arrays.items()
-    }  # contiguous, since readers stream rows
+    rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}  # readers stream rows
     rows[METADATA_NAME] = np.array(replace(recording.metadata, level=level).to_json())
     with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, allow_pickle=False, **rows)

@@ -197,9 +197,7 @@ class _Stream:
         held = [self._held] * len(self._held.stamp_ns)
         samples = joined([*held, rows_of(samples, slice(rows))], self._channels)
         again = np.concatenate([np.zeros(len(held), dtype=bool), again])
-        again[1:] &= (
-            np.diff(samples.stamp_ns) != 0
-        )  # rows with equal stamps are duplicates, which are counted elsewhere
+        again[1:] &= np.diff(samples.stamp_ns) != 0  # equal stamps mean duplicates, not repeats
         kept = np.flatnonzero(~again)
         readings = rows_of(samples, kept)
         readings.repeats[:] += np.diff(kept, append=len(again)) - 1

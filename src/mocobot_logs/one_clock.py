@@ -69,7 +69,8 @@ def to_recording(
         payload: name of the payload.
         source: origin of the samples; by default the log's name.
         correct: whether to remove each clock's offset and drift against robot 1. Otherwise stamps are trusted.
-        cut: whether the log was cut out of another one by stamps. Robots whose stamps end together then do not count as broken off, whatever their clocks.
+        cut: whether the log was cut out of another one by stamps. Robots whose stamps end together then do not count
+            as broken off, whatever their clocks.
 
     Returns:
         The recording, in memory at joint level whatever the log's level, and the clock report.

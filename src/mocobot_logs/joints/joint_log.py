@@ -21,16 +21,16 @@ class Drive:
         gear: motor turns per joint turn, with sign, shape (J,); 1 for joint-side logs.
         coupling: joint positions from motor positions, q = coupling @ motor + constant, gears included, shape (J, J).
             Joint torques are inv(coupling).T @ motor torques, since the power is equal on both sides.
-        torque_constant: torque constant of each motor [N m/A], shape (J,), NaN if free; 1 if the log has torques. A free
-            constant leaves ``JointLog.torque`` in amperes times gear.
-        link_side: whether a sensor behind the drive measures the torque, shape (J,); such torques do not include friction
-            of motor and gear.
+        torque_constant: torque constant of each motor [N m/A], shape (J,), NaN if free; 1 if the log has torques. A
+            free constant leaves ``JointLog.torque`` in amperes times gear.
+        link_side: whether a sensor behind the drive measures the torque, shape (J,); such torques do not include
+            friction of motor and gear.
         command: commanded quantity.
         position_gain: gain of the position loop, in torque, velocity or duty (see ``gain_of``) per rad or m of error,
             shape (J,).
         velocity_gain: gain of the velocity loop or the damping, per rad/s or m/s, shape (J,).
-        gain_of: quantity that the gains produce from an error: torque [N m], velocity [rad/s] or duty (1 is full scale).
-            Gains of a firmware have its own unit, proportional to one of these by an unknown factor.
+        gain_of: quantity that the gains produce from an error: torque [N m], velocity [rad/s] or duty (1 is full
+            scale). Gains of a firmware have its own unit, proportional to one of these by an unknown factor.
         limit: largest output of the loop, in the quantity of ``gain_of`` (a duty for firmware gains), shape (J,).
         supply_V: mean supply voltage of the motors [V], shape (Q,), or None.
         duty: share of the supply voltage applied to each motor, -1 to 1, shape (Q, J), or None.
@@ -61,8 +61,8 @@ class JointLog:
         torque: joint torques, after gear, coupling and torque constant [N m or N], shape (Q, J), NaN where a joint has
             none; None if no joint has one.
         dq: measured velocities [rad/s or m/s], shape (Q, J), NaN where a joint has none; None if no joint has one.
-        command: commanded positions, velocities or torques (see ``drive.command``) at the joints, shape (Q, J), NaN where
-            a joint has none; None if no joint has one (a commanded duty is ``drive.duty``).
+        command: commanded positions, velocities or torques (see ``drive.command``) at the joints, shape (Q, J), NaN
+            where a joint has none; None if no joint has one (a commanded duty is ``drive.duty``).
         joints: names of the J joints in the model.
         drive: transmission and control between motors and joints.
         position_step: resolution of each position reading [rad or m], 0 if none is found, shape (J,).
@@ -72,8 +72,8 @@ class JointLog:
             ``rate_hz`` and leaves nothing above half of it.
         start_s: time of ``time`` 0 after the first stamp of the file [s].
         enabled: whether the drives are switched on, shape (Q,); None if the log does not say.
-        motor: motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log has
-            positions on both sides of some drive.
+        motor: motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log
+            has positions on both sides of some drive.
         notes: sentences on irregularities and how they were handled.
     """
 
