@@ -29,9 +29,8 @@ _LAG_GAIN = 70.0  # variance of a fourth difference over that of white noise: 1 
 _MAD = 0.6744897501960817  # median of |x| of a standard normal distribution
 
 STUCK_S = 0.2
-"""Shortest constant stretch of a stuck channel. Measured on trials of 25 s: 0.1 s moves an estimate by up to 3 of its
-standard errors, 0.2 s by up to 16 (inertia 2 %, grasps 4 mm), 2 s spoils it (mass 1 %, grasps 10 cm).
-"""
+"""Shortest constant stretch of a stuck channel [s]. Measured on trials of 25 s: 0.1 s moves an estimate by up to 3 of
+its standard errors. 0.2 s moves it by up to 16 (inertia 2 %, grasps 4 mm). 2 s spoils it (mass 1 %, grasps 10 cm)."""
 CLIPPED_SAMPLES = 5
 """Shortest run at an extreme that counts as clipped."""
 _MOVES = 0.05  # share of its range by which another channel must move

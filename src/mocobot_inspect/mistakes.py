@@ -107,7 +107,7 @@ UNITS: dict[Level, dict[Kind, tuple[tuple[str, float], ...]]] = {
 }
 """Units in words, and factors from the logged number to SI."""
 COUNTS_FROM_RAD = 50.0
-"""Smallest largest angle [rad] at which encoder counts are tried as the unit."""
+"""Angle above which encoder counts are tried as the unit [rad]."""
 COUNT_BITS = tuple(range(8, 25))
 
 
@@ -254,8 +254,10 @@ def exchanged_groups(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]
 
 
 def _taken(signals: Signals, robots: Sequence[int], of: Sequence[int], kinds: tuple[Kind, Kind]) -> Signals:
-    """Return signals in which two groups of ``robots`` hold each other's columns of robots ``of``; the kinds may be
-    equal."""
+    """Return signals in which ``robots`` take each of two groups from the other group of robots ``of``.
+
+    The two kinds may be equal; then one group moves between robots.
+    """
     first, second = (signals.group(kind) for kind in kinds)
     return signals.having(
         **{kinds[0]: first.taken(robots, second, of), kinds[1]: second.taken(robots, first, of)}
@@ -297,7 +299,7 @@ def _other_origin(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
 def _shifted(
     level: Level, robots: tuple[int, ...], who: str, kind: Kind, joint: int, offset_rad: float
 ) -> Mistake:
-    """Return the mistake of one encoder whose angle lacks an offset."""
+    """Return the mistake of one encoder, to whose angle an offset must be added."""
     channel, amount = _channels(level, kind)[joint], np.rad2deg(abs(offset_rad))
     why = ""
     if len(robots) > 1:

@@ -69,7 +69,7 @@ _LEAST_SPAN_M = 0.3
 _RANK = 1e-12
 
 DECISIVE = 4.0
-"""Factor by which the best mistakes must lower a suspicious misfit."""
+"""Factor by which undoing mistakes must lower a suspicious misfit."""
 WORTH_TRYING = 0.3
 """Misfit below which no mistake is searched."""
 OVERWHELMING = 15.0

@@ -27,7 +27,8 @@ from mocobot_logs.table.arrays import METADATA_NAME
 UNKNOWN_TRIAL = "random"
 """Kind of trial if unknown; it only labels reports."""
 PERIOD_DOUBT = 0.05
-"""Relative error of the median of jittering intervals, in units of their scatter: 1.25 / sqrt(1024), rounded up."""
+"""Largest error of the median of jittering intervals, as a share of the period. Derived: 1.25 / sqrt(1024) of their
+scatter, rounded up."""
 _CSV_ROWS = 10_000
 
 

@@ -17,7 +17,7 @@ from mocobot_logs.resample import is_hole
 
 SHORTEST_NS = 9_500_000_000
 """Shortest part that becomes a trial [ns]. Derived: ``estimate`` and ``diagnose`` drop 2 s at either end for their
-filters, resampling may drop 0.1 s at either end, and a diagnosis needs 5 s of the rest."""
+filters. Resampling may drop 0.1 s at either end. A diagnosis needs 5 s of the rest."""
 UNEVEN_NS = 100_000_000
 """Smallest difference between the robots' beginnings or ends that is reported [ns]."""
 _S = r"(\d{1,12}(?:\.\d*)?|\.\d+)"

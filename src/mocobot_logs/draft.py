@@ -404,7 +404,10 @@ def _joint_columns(
 
 
 def _joint_templates(name: str, joints: Sequence[str]) -> Iterator[tuple[str, int]]:
-    """Yield a name with a placeholder for a joint's name or number, and the index of that joint."""
+    """Yield a name with a placeholder for a joint's name or number, and that joint's index.
+
+    If the name holds no joint's name, the name itself comes last, with index 0.
+    """
     for j, joint in sorted(enumerate(joints), key=lambda each: -len(each[1])):
         at = re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
         if at is not None:

@@ -69,16 +69,16 @@ def to_recording(
         payload: name of the payload.
         source: origin of the samples; by default the log's name.
         correct: whether to remove each clock's offset and drift against robot 1. Otherwise stamps are trusted.
-        cut: whether the log was cut out of another one by stamps. Robots whose stamps end together then do not count
-            as broken off, whatever their clocks.
+        cut: whether the log was cut out of another one by stamps. Robots whose stamps end together then do not count as
+            broken off, whatever their clocks.
 
     Returns:
         The recording, in memory at joint level whatever the log's level, and the clock report.
 
     Raises:
-        InputError: the motion does not determine the clocks that are to be corrected, one robot's log ends more than a
-            second before another's, they share fewer than 16 samples, a wrist position cannot be reached, design or
-            trial is missing, or a payload is named although the robots hold nothing.
+        InputError: the motion does not determine the clocks to correct, one robot's log ends more than a second before
+            another's, or they share fewer than 16 samples. Or a wrist position cannot be reached, design or trial is
+            missing, or a payload is named although the robots hold nothing.
     """
     metadata = _metadata(resampled, design, trial, payload, source)
     if metadata.trial == FREE:

@@ -50,7 +50,7 @@ SLOWEST, FASTEST_HZ = 0.25, 20e3
 PLAUSIBLE_HZ = 5.0
 """Slowest native rate [Hz] at which an error blames the requested rate. Below it, the error blames the unit of time."""
 MANY, UNEVEN = 2.0, 0.15
-"""Thresholds for fitting polynomials: native samples per output sample, and rms jitter over the mean interval."""
+"""Thresholds for fitting polynomials: native samples per output sample, and rms jitter over the usual interval."""
 STEP_ROWS, STEP_BLOCKS = 4096, 16
 """Rows per block and largest number of blocks in which rounding steps are searched: a minute at 1 kHz."""
 _STAMP_S = 1e-6  # resolution of gap lengths
@@ -75,8 +75,8 @@ class StreamReport:
         blank: rows dropped because a channel is NaN; they count as missing samples.
         blank_channels: number of NaN rows by channel.
         duplicates: rows dropped because they equal the previous row in stamp and values.
-        repeats: rows dropped because they equal the previous row in all but the stamp. They hold the same reading, so
-            they count as missing samples if they set the rate.
+        repeats: rows dropped because they hold the previous reading again under a later stamp. They count as missing
+            samples if the native rate is that of the rows.
         merged: rows closer than a quarter of a period to the previous row; averaged with it.
         method: resampling method, see the module.
         steps: rounding step of each sensor channel, 0 for none [SI].
@@ -156,9 +156,9 @@ def resample(
         advance: called with the progress, in the source's units.
 
     Raises:
-        InputError: the log cannot be read; a robot has fewer than 16 samples, a rate that is too low or too high,
-            values that are not finite, decreasing stamps, one stamp with two values, a gap that is too long, or more
-            than 10 % of its samples missing or too close together; or two robots share no time.
+        InputError: the log cannot be read, or two robots share no time. Or a robot has fewer than 16 samples, an
+            unsuitable rate, values that are not finite, or decreasing stamps. Or one of its stamps has two values, a gap
+            is too long, or more than 10 % of its samples are missing or too close together.
     """
     streams: dict[int, RobotStream] = {}
     done: dict[int, tuple[int, Array, StreamReport]] = {}

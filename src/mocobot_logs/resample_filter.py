@@ -4,17 +4,19 @@ Let r be the output rate. A stream whose stamps lie on the grid of k r (k an int
 other stream is interpolated by a quintic spline onto k r. k r is at least three times the native rate, or just above
 the native rate if that is 5 r or more.
 
-A spline is no perfect interpolator. A tone of frequency f leaves images at n native +- f, attenuated by the sixth power
-of sinc(frequency / native). An image near a multiple of k r aliases to a low frequency. With these k, all aliases below
-0.2 r are attenuated by 88 dB or more, for evenly spaced samples and native rates from 0.5 r. For slower streams this
-does not hold, since their images begin below 0.2 r. The spline's own relative error is 3e-8 for a tone of 5 Hz sampled
-at 100 Hz, 2e-6 at 50 Hz and 3e-4 at 25 Hz; 2e-4 for 19 Hz at 100 Hz.
+A spline is no perfect interpolator. A tone of frequency f leaves images at n native +- f, attenuated by the sixth
+power of sinc(frequency / native). An image near a multiple of k r aliases to a low frequency. With these k, all
+aliases below 0.2 r are attenuated by 88 dB or more, for evenly spaced samples and native rates from 0.5 r. For slower
+streams this does not hold, since their images begin below 0.2 r.
 
-Uneven samples resolve fast signals less well. With stamps off by 10 % of a period at a native rate of 1 kHz, a tone at
-0.3 of the rate leaves 4e-4 of its amplitude below 0.18 r; one at 0.49 leaves 3 %.
+The spline's own relative error for a tone of 5 Hz is 3e-8 at a sample rate of 100 Hz, 2e-6 at 50 Hz and 3e-4 at 25
+Hz. For 19 Hz at 100 Hz it is 2e-4.
 
-For k > 1, a linear-phase FIR filter with its delay removed follows, then every k-th sample is kept. The filter is flat
-to 5e-6 below 0.2 r and below -108 dB from 0.5 r, so nothing above half the output rate aliases.
+Uneven samples resolve fast signals less well. Example: a native rate of 1 kHz, with stamps off by 10 % of a period. A
+tone at 0.3 of the native rate leaves 4e-4 of its amplitude below 0.18 r; one at 0.49 leaves 3 %.
+
+For k > 1, a linear-phase FIR filter with its delay removed follows, then every k-th sample is kept. The filter is
+flat to 5e-6 below 0.2 r and below -108 dB from 0.5 r, so nothing above half the output rate aliases.
 
 Before interpolation, rows that are too close are averaged (``Merger``) and missing samples are filled (``fill_gaps``).
 """
@@ -100,10 +102,10 @@ def side(missing: int) -> int:
 def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[Array, Array]:
     """Insert missing samples, evenly spaced in each gap.
 
-    They lie on a polynomial of degree 7 through ``side`` samples before and after the gap, fitted by least squares if
-    these are more than eight. A spline would amplify noise in wide gaps; this fit has 0.8 to 1.9 times the noise of
-    one sample. Relative error for a sine sampled at 100 Hz: at 1 Hz 4e-12 with one sample missing and 9e-9 with five;
-    at 5 Hz 1.3e-6 and 3e-3.
+    They lie on a polynomial of degree 7 through ``side`` samples before and after the gap. If these are more than
+    eight, the polynomial is fitted by least squares. A spline would amplify noise in wide gaps; this fit has 0.8 to
+    1.9 times the noise of one sample. Relative errors for a sine sampled at 100 Hz: at 1 Hz 4e-12 with one sample
+    missing and 9e-9 with five. At 5 Hz they are 1.3e-6 and 3e-3.
 
     Args:
         time: times of the samples, strictly increasing, shape (q,); q at least 2.

@@ -47,7 +47,7 @@ _REFUSED = {
 }  # numbers of RTPS and of older XTypes
 _TRAILING = 3  # most padding bytes, to a multiple of four
 _NEW_LAYOUTS = 4
-"""Number of new layouts per message size that are matched against all messages of a block; further ones match one
+"""Number of unstored layouts of one size that are matched against all messages of a group; later ones match one
 message."""
 _KEPT_LAYOUTS = 64
 _GROUP = 8192

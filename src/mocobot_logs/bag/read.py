@@ -49,8 +49,8 @@ class RowAligner:
     """Brings several topics of one robot onto the stamps of the fastest topic.
 
     Messages of other topics with the same stamp are copied bit for bit. At other stamps, a topic is interpolated by
-    the cubic through two samples on either side. For a sine sampled at 100 Hz its relative error is 4e-7 at 1 Hz and
-    2.3e-4 at 5 Hz (3/128 of the fourth power of the phase per sample). Nothing is decimated, so nothing aliases.
+    the cubic through two samples on either side. Its relative error for a sine is 3/128 of the fourth power of the
+    phase per sample. At 100 Hz this is 4e-7 for 1 Hz and 2.3e-4 for 5 Hz. Nothing is decimated, so nothing aliases.
     There are no rows before a topic's first sample, after its last, or in its gaps.
     """
 

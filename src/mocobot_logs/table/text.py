@@ -63,7 +63,7 @@ def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0)
 def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
     """Convert decimal text to stamps as ``from_numbers`` does; null means no stamp.
 
-    The result is exact; floats would resolve only 0.24 us.
+    Stamps are exact to the nanosecond, where floats would resolve only 0.24 us.
     """
     digits = _DIGITS[_unit(unit_ns, where)]
     exact = pa.decimal128(38, digits)
