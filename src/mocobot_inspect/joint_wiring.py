@@ -32,8 +32,9 @@ Kind = Literal[
 SUSPICIOUS = 0.2
 """Misfit above which a joint is suspected.
 
-Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, but 0.11 and 0.27 at two with coupled drives. On 24
-simulated seven-joint arms with masses and centres off by 10 or 50 % it is up to 0.08, so that no joint was suspected.
+Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, but 0.11 and 0.27 at two with coupled drives. It is
+up to 0.08 on 24 simulated seven-joint arms with masses and centres off by 10 or 50 %. No joint of these was
+suspected.
 """
 DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
 """Factors by which undoing a mistake must lower the misfit of its joints: if one of them is suspected, and if none is.

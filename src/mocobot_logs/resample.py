@@ -157,7 +157,8 @@ def resample(
 
     Raises:
         InputError: the log cannot be read, or two robots share no time. Or a robot has fewer than 16 samples, an
-            unsuitable rate, values that are not finite, or decreasing stamps. Or one of its stamps has two values, a gap
+            unsuitable rate, values that are not finite, or decreasing stamps. Or one of its stamps has two values, a
+            gap
             is too long, or more than 10 % of its samples are missing or too close together.
     """
     streams: dict[int, RobotStream] = {}
