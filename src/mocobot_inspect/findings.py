@@ -57,10 +57,7 @@ _TURN = 2 * np.pi
 _ONE_TURN = 0.01  # a range within this share of a full turn means an encoder that wraps around
 _TIME_UNITS = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 _FOLLOWED = 0.9  # least correlation of a motion with its command for a finding
-_NEVER, _NEAR = (
-    1e-3,
-    0.02,
-)  # of the largest value: bounds of the minimum of a torque that has lost its sign
+_NEVER, _NEAR = 1e-3, 0.02  # of the maximum: bounds of the minimum of a torque that lost its sign
 _UNEXPLAINED = 0.5  # share of a torque, beyond noise, above which the model hardly explains it
 
 

@@ -1,7 +1,7 @@
 """Smooth motion of a joint log, and gain and delay of its other channels against it, with standard errors.
 
-Measured velocities and positions are compared with the motion and the commands. A delay common to all joints is
-estimated from all together.
+Measured velocities are compared with differentiated positions, and positions with their commands. A delay common to
+all joints is estimated from all together.
 """
 
 from __future__ import annotations

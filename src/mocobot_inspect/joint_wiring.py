@@ -365,8 +365,7 @@ def _odd(gains: Array) -> NDArray[np.bool_]:
 
 
 def _columns(asked: Array, dq: Array, ddq: Array) -> Array:
-    """Return the regressor of a joint's torque: model, rotor inertia, Coulomb and viscous friction, two offsets, (Q,
-    6)."""
+    """Return the regressor (Q, 6) of a joint's torque: model, rotor inertia, Coulomb and viscous friction, offsets."""
     speed = float(np.sqrt(np.mean(dq**2)))
     direction = np.clip(dq / max(_RESTS * speed, 1e-12), -1.0, 1.0)
     return np.column_stack([asked, ddq, direction, dq, np.ones_like(dq), -np.ones_like(dq)])

@@ -173,8 +173,7 @@ class LogMap:
         return f"{name} of robot {robot}" if name in (*CHANNELS[self.level], *REF) else name
 
     def channels(self, robot: int) -> dict[str, ChannelMap]:
-        """Return every mapped channel of one robot, counted from 1, with placeholders replaced, in the order of
-        ``names``."""
+        """Return the mapped channels of one robot (from 1) in the order of ``names``, placeholders replaced."""
         found = {**self.common, **self.own.get(robot, {})}
         return {
             name: channel.filled(lambda text, name=name: self._fill(text, robot, name))

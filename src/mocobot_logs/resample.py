@@ -158,8 +158,7 @@ def resample(
     Raises:
         InputError: the log cannot be read, or two robots share no time. Or a robot has fewer than 16 samples, an
             unsuitable rate, values that are not finite, or decreasing stamps. Or one of its stamps has two values, a
-            gap
-            is too long, or more than 10 % of its samples are missing or too close together.
+            gap is too long, or more than 10 % of its samples are missing or too close together.
     """
     streams: dict[int, RobotStream] = {}
     done: dict[int, tuple[int, Array, StreamReport]] = {}
@@ -301,9 +300,7 @@ class RobotStream:
 
     def _flush(self) -> None:
         waiting = self._waiting
-        if (
-            len({part.log_ns is None for part in waiting}) == 1
-        ):  # otherwise only some parts have the recorder's time
+        if len({part.log_ns is None for part in waiting}) == 1:  # else only some parts have log_ns
             waiting = [joined(waiting, len(self._channels))]
         for samples in waiting:
             rows = self.screen.keep(samples)
@@ -320,9 +317,7 @@ class RobotStream:
         """Determine the native rate from the first rows and set up the processing."""
         time_ns, values = (np.concatenate(parts) for parts in zip(*self._head, strict=True))
         self._head = []
-        grid, k = self._plan(
-            time_ns[:_LOOK]
-        )  # a fixed number of rows: the result does not depend on the chunks
+        grid, k = self._plan(time_ns[:_LOOK])  # a fixed number of rows, independent of the chunks
         self._pipe = _Pipe(grid, k, _Tally(self._where, grid, self._max_gap_s), self._max_gap_s)
         self._pipe.push(time_ns, values)
         return self._pipe
@@ -356,9 +351,7 @@ class RobotStream:
         jitter_ns = interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns
         rms_ns = float(np.sqrt(np.mean(jitter_ns**2)))
         uneven = native_hz >= MANY * self._rate_hz and rms_ns > UNEVEN * period_ns
-        if (
-            uneven or again
-        ):  # most intervals are shorter than the mean one, and none can be identified as a gap
+        if uneven or again:  # most intervals are shorter than the mean, and no gap can be identified
             period_ns = float(np.mean(interval[short]))
         native_hz = 1.0 / (period_ns * NS)
         k = fineness(native_hz, self._rate_hz, fitted=uneven)

@@ -9,8 +9,8 @@ power of sinc(frequency / native). An image near a multiple of k r aliases to a 
 aliases below 0.2 r are attenuated by 88 dB or more, for evenly spaced samples and native rates from 0.5 r. For slower
 streams this does not hold, since their images begin below 0.2 r.
 
-The spline's own relative error for a tone of 5 Hz is 3e-8 at a sample rate of 100 Hz, 2e-6 at 50 Hz and 3e-4 at 25
-Hz. For 19 Hz at 100 Hz it is 2e-4.
+The spline's own relative error for a tone of 5 Hz is 3e-8 at a rate of 100 Hz, 2e-6 at 50 Hz and 3e-4 at 25 Hz. For
+19 Hz at 100 Hz it is 2e-4.
 
 Uneven samples resolve fast signals less well. Example: a native rate of 1 kHz, with stamps off by 10 % of a period. A
 tone at 0.3 of the native rate leaves 4e-4 of its amplitude below 0.18 r; one at 0.49 leaves 3 %.

@@ -448,8 +448,7 @@ class CdrReader:
         self.count = 0
 
     def read(self, messages: Messages) -> tuple[Stamps, Array]:
-        """Return stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where a message lacks one, shape (q,
-        S)."""
+        """Return stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where lacking, shape (q, S)."""
         stamps = np.zeros(len(messages), np.int64)
         values = np.empty((len(messages), len(self._selectors)))
         memory = np.frombuffer(messages.block, np.uint8)

@@ -226,9 +226,7 @@ class McapBag:
     def _parse(self, kind: Any, content: bytes, offset: int) -> Any:
         try:
             return kind.read(ReadDataStream(BytesIO(content)))
-        except (
-            Exception
-        ) as error:  # struct.error, UnicodeDecodeError, McapError and others, depending on the damage
+        except Exception as error:  # struct.error, UnicodeDecodeError, McapError and others
             raise self._damaged(offset, f"its {kind.__name__} record is not readable") from error
 
     def _messages(self, block: bytes, starts: list[int], topic: str) -> Messages:

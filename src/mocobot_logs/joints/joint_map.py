@@ -453,8 +453,7 @@ class _PerJoint:
 
 
 def _gears(values: Mapping[str, Any], joints: _PerJoint) -> tuple[Array, Array, Array]:
-    """Return the matrix from joint to motor positions (J, J), zeros [rad or m] (J,) and torque constants [N m/A]
-    (J,)."""
+    """Return motor from joint positions (J, J), zeros [rad or m] (J,) and torque constants [N m/A] (J,)."""
     inside = f"{joints.where}: drive"
     drive = table_of(values, "drive", joints.where)
     check_known(drive, (*_DRIVE, "coupling"), inside)

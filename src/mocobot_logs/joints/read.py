@@ -41,11 +41,7 @@ MAX_GAP_S = 0.05
 SHORTEST_S, LEAST_ROWS = 1.0, 32
 """Shortest part between gaps [s] and its least number of rows; shorter parts are left out."""
 LEAST_HZ, MOST_HZ = 20.0, 20e3
-_BLOCK, _SLOW_SHARE, _SLOW = (
-    64,
-    0.9,
-    (1.1, 1.75),
-)  # intervals per block; quantile; range of slower rates over the median
+_BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; quantile; slower intervals over the median
 _GAP = 1.75  # periods: jitter alone makes no longer intervals
 _INSIDE = 0.1  # share of a period: an instant this close to a sample does not count as inside a gap
 
