@@ -42,7 +42,7 @@ _CLEAR = 1.5  # quantisation steps; a slow channel approaches its extreme one st
 _SPEED_S, _AT_SPEED = 0.1, 0.5  # interval over which speed is taken; share of the usual high speed
 
 ABOVE_HZ = 10.0
-"""Frequency above the motion of any Omnid."""
+"""Lowest frequency of an oscillation [Hz]; no motion of an Omnid is that fast."""
 NOISES = 10.0
 """Least amplitude of an oscillation over the channel's noise; spectral lines of sensors are weaker."""
 STEPS = 10.0
@@ -50,7 +50,7 @@ STEPS = 10.0
 SHARE = 0.7
 """Least share of one spectral line in all fast power; a bump has no such line."""
 WINDOW_S, WINDOW_ROWS = 2.5, 10_000
-"""Length of a window and its largest number of rows."""
+"""Length of a spectrogram's window [s] and its largest number of rows."""
 _WIDTH = 3  # frequency bins on either side of a line that belong to it, in a Hann window
 
 

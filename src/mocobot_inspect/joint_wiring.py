@@ -32,13 +32,14 @@ Kind = Literal[
 SUSPICIOUS = 0.2
 """Misfit above which a joint is suspected.
 
-Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, but 0.11 and 0.27 at two with coupled drives. It is
-up to 0.08 on 24 simulated seven-joint arms with masses and centres off by 10 or 50 %. No joint of these was
-suspected.
+Measured on healthy logs of a real arm: 0.003 to 0.01, but 0.11 and 0.27 at two joints with coupled drives. Measured
+on 24 simulated seven-joint arms with masses and centres off by 10 or 50 %: up to 0.08, so no joint was suspected.
 """
 DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
 """Factors by which undoing a mistake must lower the misfit of its joints: if one of them is suspected, and if none is.
-Friction hides exchanges of whole joints. Measured: they lower the misfit 7 to 12 times on a real arm.
+
+Friction can hide an exchange of whole joints, so that none is suspected. Measured on a real arm: undoing it lowers
+the misfit 7 to 12 times.
 """
 SAME = 2.0
 """Ratio of the products of all joints' misfits below which two mistakes cannot be distinguished."""

@@ -37,7 +37,7 @@ class Timing:
         missing: number of missing samples.
         longest_gap_s, longest_gap_at_s: longest such interval, and its start after the first stamp [s].
         duplicates: stamps equal to the previous one.
-        repeats: rows that equal the previous row in all but the stamp; they do not count as samples.
+        repeats: rows that hold the previous reading again under a later stamp; they do not count as samples.
         backwards: stamps earlier than the previous one.
         farthest_back_s, farthest_back_at_s: largest backward step, and its start after the first stamp [s].
         recorder_s: smallest and largest lead of the recorder's time over the stamps [s], or None.

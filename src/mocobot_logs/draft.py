@@ -234,7 +234,6 @@ def team_draft(path: Path, found: Found, settings: Sequence[str]) -> Draft:
 
 
 def _team_line(channel: str, candidates: Sequence[Candidate], templates: Templates, robots: Robots) -> str:
-    """Return the line of one channel."""
     if not candidates:
         return f"# {DOUBTFUL}nothing is called like {channel}\n# {channel} = {{ ... }}"
     name, mine, doubts = _choose(candidates, templates, robots)
@@ -430,7 +429,6 @@ def _quantity(name: str) -> str | None:
 
 
 def _joint_line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]) -> str:
-    """Return the line of one channel."""
     kind, motor, doubts = QUANTITIES[name].kind, QUANTITIES[name].motor, []
     slide = all(slides) and not motor
     if any(slides) and not all(slides) and kind in ("position", "velocity", "effort"):

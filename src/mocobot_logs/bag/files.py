@@ -63,7 +63,7 @@ class BagFiles:
         self._scratch: Path | None = None
         stored = sum(file.stat().st_size for file in paths if file.is_file())
         self._unpacked = Unpacked(str(path), stored)  # per pass over all files
-        self._on_disk = 0  # share of it for unpacked copies on disk
+        self._on_disk = 0  # part of it: unpacked copies on disk
         self._storages = [self._opened(file, number) for number, file in enumerate(paths)]
         self.topics = merged((t for storage in self._storages for t in storage.topics.values()), str(path))
         self.size = sum(storage.size for storage in self._storages)
