@@ -364,7 +364,7 @@ class Screen:
 
     Attributes:
         rows: number of rows seen.
-        repeats: rows among them that hold the previous reading again under a later stamp; they count as missing samples.
+        repeats: rows that hold the previous reading again under a later stamp; they count as missing samples.
         duplicates: rows dropped because they equal the previous row in stamp and values.
         blank: rows dropped because a channel is NaN; they count as missing samples.
         blank_channels: number of NaN rows by channel.
