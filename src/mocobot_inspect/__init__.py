@@ -1,1 +1,1 @@
-"""A preflight look at a log: what is in it, what is wrong with it, and what it is good for."""
+"""Inspect a log before use: its contents, its faults, and what it is ready for."""

@@ -1,4 +1,4 @@
-"""Channels of a log: range, values that are no readings, resolution, noise, and where they stand or oscillate."""
+"""Check channels of a log: range, invalid values, resolution, noise, stuck and clipped stretches, oscillation."""
 
 from __future__ import annotations
 
@@ -17,41 +17,41 @@ from estimator.recording.metadata import SENSORS
 from mocobot_logs.log import NS, Stamps
 
 UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}
-"""Units of a team's channels, by the first letters of their names."""
+"""Units of a team's channels, by the first three letters of their names."""
 LISTED = 100
-"""Stuck and clipped stretches of a channel that are kept; all are counted."""
+"""Number of stuck and clipped stretches per channel that are kept; all are counted."""
 
 ABSURD = 1e9
-"""No angle, length, torque or force in any unit is as large [SI]."""
-_FAR = 1000.0  # times what the other samples span, and no less in SI units
-_FEW = 0.02  # share of the samples on either side that may be far away
+"""Smallest absolute value that no sensor reads, in any unit [SI]."""
+_FAR = 1000.0  # times the span of the other samples, which counts as at least 1 SI unit
+_FEW = 0.02  # share of the samples on either side that may be outliers
 _LAG_GAIN = 70.0  # variance of a fourth difference over that of white noise: 1 + 16 + 36 + 16 + 1
 _MAD = 0.6744897501960817  # median of |x| of a standard normal distribution
 
 STUCK_S = 0.2
-"""Shortest time for which a channel must stand to be stuck. Measured on trials of 25 s: 0.1 s moves an estimate by up
-to 3 of its standard errors, 0.2 s by up to 16 (inertia 2 %, grasps 4 mm), 2 s spoils it (mass 1 %, grasps 10 cm)."""
+"""Shortest constant stretch of a stuck channel [s]. Measured on trials of 25 s: 0.1 s moves an estimate by up to 3 of
+its standard errors. 0.2 s moves it by up to 16 (inertia 2 %, grasps 4 mm). 2 s spoils it (mass 1 %, grasps 10 cm)."""
 CLIPPED_SAMPLES = 5
-"""Shortest run at an extreme to be clipped."""
-_MOVES = 0.05  # others move: by this share of their range
-_JUMP = 4.0  # times the usual large step from sample to sample
-_CORNER = 0.3  # of the same
+"""Shortest run at an extreme that counts as clipped."""
+_MOVES = 0.05  # share of its range by which another channel must move
+_JUMP = 4.0  # times the usual large step between samples
+_CORNER = 0.3  # of the usual large step
 _NOISY = 0.5  # of the quantisation step; rounding alone looks like 0.3
-_CHANCE = 1e-3  # a run that noise makes by chance in so many logs is no sign
-_CLEAR = 1.5  # steps of the resolution; what approaches an end one by one may just be slow
-_SPEED_S, _AT_SPEED = 0.1, 0.5  # time over which speed is taken; share of the usual high speed
+_CHANCE = 1e-3  # probability per log that noise alone makes such a run
+_CLEAR = 1.5  # quantisation steps; a slow channel approaches its extreme one step at a time
+_SPEED_S, _AT_SPEED = 0.1, 0.5  # interval over which speed is taken; share of the usual high speed
 
 ABOVE_HZ = 10.0
-"""No motion of an Omnid is that fast."""
+"""Lowest frequency of an oscillation [Hz]; no motion of an Omnid is that fast."""
 NOISES = 10.0
-"""Least amplitude of an oscillation over the channel's noise; a sensor's own line is below."""
+"""Least amplitude of an oscillation over the channel's noise; spectral lines of sensors are weaker."""
 STEPS = 10.0
-"""Least amplitude of an oscillation over the quantisation step: a slow joint climbs stairs of one."""
+"""Least amplitude of an oscillation over the quantisation step; a slow joint moves in stairs of one step."""
 SHARE = 0.7
-"""Least share of one line in all that is fast: a bump has none."""
+"""Least share of one spectral line in all fast power; a bump has no such line."""
 WINDOW_S, WINDOW_ROWS = 2.5, 10_000
-"""Length of a window, and its largest number of rows: half of what is looked at together."""
-_WIDTH = 3  # frequencies on either side of a line that are its own, in a Hann window
+"""Length of a spectrogram's window [s] and its largest number of rows."""
+_WIDTH = 3  # frequency bins on either side of a line that belong to it, in a Hann window
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,10 @@ class Stretch:
     """A stuck or clipped stretch.
 
     Attributes:
-        start_s: when it begins after the robot's first stamp [s].
-        duration_s: how long it lasts [s].
-        value: where the channel stands [SI].
-        jumps: whether it jumps there or from there.
+        start_s: start after the robot's first stamp [s].
+        duration_s: duration [s].
+        value: constant value of the channel [SI].
+        jumps: whether the channel jumps at the start or the end.
     """
 
     start_s: float
@@ -76,9 +76,9 @@ class Oscillation:
     """A line in a channel's spectrum.
 
     Attributes:
-        frequency_hz: where it is largest [Hz]; folded if it is above half the rate.
-        amplitude: its largest [SI].
-        duration_s: for how long it is there, in whole windows [s].
+        frequency_hz: frequency at its largest amplitude [Hz]; aliased if above half the rate.
+        amplitude: largest amplitude [SI].
+        duration_s: total duration, in whole windows [s].
     """
 
     frequency_hz: float
@@ -91,15 +91,15 @@ class Channel:
     """One channel of one robot; SI units.
 
     Attributes:
-        name: of the channel.
+        name: name of the channel.
         lowest, highest: extremes of its finite samples, None without any.
-        nans, infinities: samples that are not finite.
-        wild: finite samples that no sensor reads (``wild``).
-        step: quantisation step, or None where there is none.
-        noise: white noise of a sample; 0 where it is below the step.
-        stuck, clipped: stretches in which it stands while others move, the first ``LISTED``.
-        stuck_count, clipped_count: how many there are.
-        oscillation: the line that stands out of its noise, or None.
+        nans, infinities: number of samples that are not finite.
+        wild: number of finite samples that no sensor reads, see ``wild``.
+        step: quantisation step, or None.
+        noise: standard deviation of white noise; 0 if below the step.
+        stuck, clipped: stretches in which it is constant while others move, the first ``LISTED``.
+        stuck_count, clipped_count: total number of such stretches.
+        oscillation: spectral line above its noise, or None.
     """
 
     name: str
@@ -118,19 +118,19 @@ class Channel:
 
     @property
     def white_noise(self) -> float:
-        """Noise of a sample, that of rounding included."""
+        """Standard deviation of a sample's noise, at least that of rounding."""
         return max(self.noise, 0.0 if self.step is None else self.step / np.sqrt(12.0))
 
 
 class ChannelTally:
-    """Channels of one robot, looked at block by block."""
+    """Collects statistics of one robot's channels block by block."""
 
     def __init__(self, names: Sequence[str], sensors: int = SENSORS) -> None:
         """Start without samples.
 
         Args:
-            names: of the channels.
-            sensors: only so many, the first ones, are looked at for standing: commands stand when they please.
+            names: names of the channels.
+            sensors: number of first channels that are checked for stuck stretches; commands may be constant.
         """
         self._names, self._sensors = names, sensors
         self._parts: list[list[Channel]] = [[] for _ in names]
@@ -138,7 +138,7 @@ class ChannelTally:
         self._clipped: list[list[Stretch]] = [[] for _ in names]
 
     def add(self, time_s: Array, values: Array) -> None:
-        """Look at consecutive samples.
+        """Add consecutive samples.
 
         Args:
             time_s: times after the robot's first stamp [s], shape (q,).
@@ -147,7 +147,7 @@ class ChannelTally:
         forward = np.diff(time_s)
         forward = forward[forward > 0]
         rate_hz = 1.0 / float(np.median(forward)) if len(forward) else None
-        with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
+        with np.errstate(all="ignore"):  # absurd values overflow; their range is reported
             good = np.isfinite(values) & ~wild(values)
             for k, name in enumerate(self._names):
                 line = rate_hz if k < self._sensors else None
@@ -162,7 +162,7 @@ class ChannelTally:
     def _keep(
         all_of: list[list[Stretch]], found: Iterator[Run], time_s: Array, values: Array, rate_hz: float
     ) -> None:
-        """Add runs to the stretches; one that goes on from the last, perhaps of the block before, is one with it."""
+        """Add runs to the stretches; a run that continues the last stretch, even across blocks, extends it."""
         for k, start, stop, jumps in found:
             start_s, value = float(time_s[start]), float(values[start, k])
             duration_s = float(time_s[stop - 1]) - start_s + 1.0 / rate_hz
@@ -177,7 +177,7 @@ class ChannelTally:
             all_of[k].append(Stretch(start_s, duration_s, value, jumps))
 
     def finish(self) -> tuple[Channel, ...]:
-        """What was found, channel by channel."""
+        """Return the statistics of each channel."""
         channels = []
         for name, parts, stuck_all, clipped_all in zip(
             self._names, self._parts, self._stuck, self._clipped, strict=True
@@ -204,7 +204,7 @@ class ChannelTally:
 
 
 def _part(name: str, x: Array, good: NDArray[np.bool_], rate_hz: float | None) -> Channel:
-    """One block of a channel, without what stands; oscillations are looked for where a rate is given."""
+    """Return statistics of one block without stuck stretches; oscillations are searched if a rate is given."""
     finite, readings = x[np.isfinite(x)], x[good]
     return Channel(
         name=name,
@@ -220,12 +220,12 @@ def _part(name: str, x: Array, good: NDArray[np.bool_], rate_hz: float | None) -
 
 
 def noise_level(values: Array) -> float:
-    """Standard deviation of white noise on a smooth signal: fourth differences, by their median.
+    """Estimate the standard deviation of white noise on a smooth signal from the median of fourth differences.
 
-    Noise well below the quantisation step shows as 0.
+    Noise well below the quantisation step gives 0.
 
     Args:
-        values: samples in order, finite, shape (q,).
+        values: consecutive finite samples, shape (q,).
     """
     if len(values) < 5:
         return 0.0
@@ -234,7 +234,7 @@ def noise_level(values: Array) -> float:
 
 
 def wild(values: Array) -> NDArray[np.bool_]:
-    """Samples that no sensor of a robot reads: infinite, absurd, or a thousand times farther away than the others.
+    """Return which samples no sensor reads: infinite, absurd, or a thousand times farther off than the others.
 
     Args:
         values: samples, shape (q,) or (q, C); NaN is not wild.
@@ -253,19 +253,18 @@ def wild(values: Array) -> NDArray[np.bool_]:
 
 
 Run = tuple[int, int, int, bool]
-"""Channel, first row, row after the last, and whether the channel jumps there or from there."""
+"""Channel, first row, row after the last, and whether the channel jumps at either end."""
 
 
 def stuck(values: Array, rate_hz: float) -> Iterator[Run]:
-    """Runs in which a channel of a robot is stuck.
+    """Yield runs in which a channel of a robot is stuck.
 
-    A channel that stands because nothing moves is not stuck; nor is one that rests while others move. A stuck one jumps
-    when it comes back, stops dead before the log ends, or repeats itself although it has no steps or more noise than
-    steps.
+    A channel is not stuck if nothing moves, or if it merely rests while others move. A stuck channel jumps at either
+    end, stops abruptly before the log ends, or repeats a value more often than its noise allows.
 
     Args:
-        values: samples of the robot's channels, finite, shape (q, C).
-        rate_hz: their rate [Hz].
+        values: finite samples of the robot's channels, shape (q, C).
+        rate_hz: sample rate [Hz].
     """
     least = _least_travel(values)
     for channel, x in enumerate(values.T):
@@ -288,14 +287,14 @@ def stuck(values: Array, rate_hz: float) -> Iterator[Run]:
 
 
 def clipped(values: Array) -> Iterator[Run]:
-    """Runs in which a channel is cut off at one of its extremes, at least twice; ``values`` as of ``stuck``."""
+    """Yield runs in which a channel is cut off at an extreme, at least twice; ``values`` as in ``stuck``."""
     for channel, x in enumerate(values.T):
         steps = np.abs(np.diff(x))
         if not steps.any():
             continue
         least = max(_CORNER * _usual(steps), _CLEAR * (quantisation_step(x, levels=2) or 0.0))
         for extreme in (x.min(), x.max()):
-            # A peak is round; a clipped one has corners: speed up to the limit, and none from there on.
+            # A peak is round. A clipped one has corners: full speed up to the limit, then none.
             corners = [
                 (a, b)
                 for a, b in _runs(x)
@@ -308,12 +307,12 @@ def clipped(values: Array) -> Iterator[Run]:
 
 
 def _usual(steps: Array) -> float:
-    """A large step from one sample to the next, as is usual."""
+    """Return a typical large step between samples."""
     return float(np.quantile(steps[steps > 0], 0.95))
 
 
 def _longest_by_chance(x: Array) -> float:
-    """Samples for which noise alone repeats a rounded value at rest; infinite where rounding covers the noise."""
+    """Return how many times noise alone may repeat a rounded value at rest; infinite if rounding hides the noise."""
     resolution, noise = quantisation_step(x), noise_level(x)
     if resolution is None:
         return 1.0
@@ -324,7 +323,7 @@ def _longest_by_chance(x: Array) -> float:
 
 
 def _stops_dead(x: Array, steps: Array, start: int, stop: int, rate_hz: float) -> bool:
-    """Whether a stretch that begins or ends with the log is left or entered at speed."""
+    """Return whether a stretch at the start or end of the log is left or entered at speed."""
     window = max(2, round(_SPEED_S * rate_hz))
     if len(x) <= 2 * window or (start > 0) == (stop < len(x)):
         return False
@@ -335,14 +334,14 @@ def _stops_dead(x: Array, steps: Array, start: int, stop: int, rate_hz: float) -
 
 
 def _runs(x: Array) -> list[tuple[int, int]]:
-    """Runs of equal values (start, stop)."""
+    """Return runs of equal values (start, stop)."""
     edges = np.flatnonzero(np.diff(x) != 0) + 1
     bounds = [0, *edges.tolist(), len(x)]
     return list(pairwise(bounds))
 
 
 def _others_move(values: Array, least: Array, channel: int, start: int, stop: int, rate_hz: float) -> bool:
-    """Whether at least two other channels move in both halves of a stretch."""
+    """Return whether at least two other channels move in both halves of a stretch."""
     middle = (start + stop + 1) // 2
     halves = [_travel(part, rate_hz) for part in (values[start:middle], values[middle - 1 : stop])]
     moved = np.minimum(*halves) > least
@@ -351,7 +350,8 @@ def _others_move(values: Array, least: Array, channel: int, start: int, stop: in
 
 
 def _least_travel(values: Array) -> Array:
-    """Half of what a channel must travel to move: a share of its range, and more than from one sample to the next."""
+    """Return the least travel of a moving channel per half stretch: a share of its range, and more than its usual
+    steps."""
     if len(values) < 2:
         return np.zeros(values.shape[1])
     return np.maximum(
@@ -360,18 +360,18 @@ def _least_travel(values: Array) -> Array:
 
 
 def _travel(values: Array, rate_hz: float) -> Array:
-    """Range of means over a tenth of a second: a torque's noise is no motion."""
+    """Return the range of means over a tenth of a second, which excludes noise."""
     length = max(1, min(round(_SPEED_S * rate_hz), len(values) // 4))
     starts = np.arange(0, len(values) - length + 1, length)
     return np.ptp(np.add.reduceat(values[: starts[-1] + length], starts, axis=0) / length, axis=0)
 
 
 def oscillation(x: Array, rate_hz: float) -> Oscillation | None:
-    """The line that stands out of a channel's noise, or None.
+    """Return the spectral line above a channel's noise, or None.
 
     Args:
-        x: consecutive samples, finite, shape (q,).
-        rate_hz: their rate [Hz].
+        x: consecutive finite samples, shape (q,).
+        rate_hz: sample rate [Hz].
     """
     size = min(round(WINDOW_S * rate_hz), WINDOW_ROWS)
     if len(x) < size or rate_hz < 4.0 * ABOVE_HZ:
@@ -382,7 +382,7 @@ def oscillation(x: Array, rate_hz: float) -> Oscillation | None:
     total, peak = power.sum(axis=0), power.argmax(axis=0)
     near = np.abs(np.arange(len(power))[:, None] - peak) <= _WIDTH
     line = np.where(near, power, 0.0).sum(axis=0)
-    # Powers of white noise are exponentially distributed: ln 2 of their mean is the median.
+    # The power of white noise is exponentially distributed: its median is ln 2 times its mean.
     noise = np.sqrt(np.median(power, axis=0) / np.log(2.0) * len(power))
     amplitude = np.sqrt(2.0 * line)
     least = np.maximum(NOISES * noise, STEPS * (quantisation_step(x) or 0.0))
@@ -396,7 +396,7 @@ def oscillation(x: Array, rate_hz: float) -> Oscillation | None:
 
 
 def joined(found: list[Oscillation]) -> Oscillation | None:
-    """Those of successive parts of a channel in one, or None without any."""
+    """Merge oscillations of successive parts of a channel; None if there are none."""
     if not found:
         return None
     largest = max(found, key=lambda one: one.amplitude)
@@ -404,5 +404,5 @@ def joined(found: list[Oscillation]) -> Oscillation | None:
 
 
 def seconds(stamp_ns: Stamps, origin_ns: int) -> Array:
-    """Stamps as seconds after an origin."""
+    """Return stamps as seconds after an origin."""
     return np.asarray((stamp_ns - origin_ns) * NS, dtype=np.float64)

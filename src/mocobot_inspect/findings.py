@@ -1,4 +1,4 @@
-"""What is wrong with a log of a team or of joints, one sentence each with its evidence."""
+"""Problems of a log of a team or of joints: one sentence each, with its evidence."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from mocobot_logs.log import NS, repeated
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]
 
 JITTERY = 0.2
-"""Jitter over the period (rms) from which on it is worth a word."""
+"""Smallest rms jitter, relative to the period, that is reported."""
 SAME_RATE = 1e-3
 EARLY_S = 1.0
-"""Ends that are farther apart than this are worth a word."""
+"""Smallest difference [s] between the robots' first or last stamps that is reported."""
 RECORDER_S = 1.0
-"""Spread of the recorder's lead over the stamps from which on two clocks are mixed."""
+"""Smallest spread [s] of the recorder's lead over the stamps that is reported: it means mixed clocks."""
 MARGIN = 0.02
-"""Share of its range, plus as much in rad or m, by which a joint may leave it: zeros are calibrated."""
+"""A joint may leave its range by this share of it plus this many rad or m, since calibration shifts zeros."""
 COARSE = 0.005
-"""Steps that are a larger share of what a joint moves are coarse."""
+"""Largest position step, as a share of a joint's motion, that is not reported as coarse."""
 SATURATED = 0.98
-"""Share of the drive's limit from which on a torque is at it."""
+"""Share of the drive's limit above which a torque counts as saturated."""
 LATE = 1.1
-"""A delay is reported if the torques' unexplained share without it is so many times that with it."""
+"""Smallest ratio of the torques' unexplained shares, without and with the delay, at which a delay is reported."""
 FACTORS = {
     180.0 / np.pi: "degrees, taken for radians",
     np.pi / 180.0: "radians, taken for degrees",
@@ -49,25 +49,25 @@ FACTORS = {
     1.0 / (2.0 * np.pi): "turns, taken for radians",
     2.0 * np.pi: "radians, taken for turns",
 }
-"""Gains that a wrong unit makes."""
+"""Gains that wrong units cause."""
 CLOSE = 0.05
-"""Relative distance within which a gain equals a factor, or 1."""
-_NAMED = 4  # channels of a sentence
+"""Relative distance within which a gain counts as equal to a factor, or to 1."""
+_NAMED = 4  # most channels that a sentence names
 _TURN = 2 * np.pi
-_ONE_TURN = 0.01  # angles that cover a full turn to this share of it are an encoder's that starts again there
+_ONE_TURN = 0.01  # a range within this share of a full turn means an encoder that wraps around
 _TIME_UNITS = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
-_FOLLOWED = 0.9  # correlation of a motion with its command
-_NEVER, _NEAR = 1e-3, 0.02  # of its largest value: one without sign is hardly negative, and comes near zero
-_UNEXPLAINED = 0.5  # share of a torque, noise aside, above which the model hardly says anything of it
+_FOLLOWED = 0.9  # least correlation of a motion with its command for a finding
+_NEVER, _NEAR = 1e-3, 0.02  # of the maximum: bounds of the minimum of a torque that lost its sign
+_UNEXPLAINED = 0.5  # share of a torque, beyond noise, above which the model hardly explains it
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something wrong.
+    """A problem of a log.
 
     Attributes:
-        topic: what it concerns.
-        sentence: what it is, with the numbers that say so.
+        topic: the subject.
+        sentence: the problem, with the numbers that show it.
     """
 
     topic: Topic
@@ -75,7 +75,7 @@ class Finding:
 
 
 def findings(found: Inspection | JointInspection) -> list[Finding]:
-    """All that is wrong, in the order in which it should be mended."""
+    """Return all problems, in the order in which to correct them."""
     if isinstance(found, JointInspection):
         return [Finding(topic, sentence) for topic, source in _OF_JOINTS for sentence in source(found)]
     return [Finding(topic, sentence) for topic, source in _OF_TEAM for sentence in source(found)]
@@ -85,7 +85,7 @@ def findings(found: Inspection | JointInspection) -> list[Finding]:
 
 
 def _stamps(t: Timing) -> Iterator[str]:
-    """What is wrong with the stamps of one stream."""
+    """Yield the problems of one stream's stamps."""
     if t.repeats:
         yield repeated(t.repeats)
     if t.rate_hz is None:
@@ -133,7 +133,7 @@ def _time_unit(rate_hz: float) -> str:
 
 
 def _readings(who: str, c: Channel, t: Timing) -> Iterator[str]:
-    """Samples of a channel that are no readings, and where it is stuck or clipped."""
+    """Yield the problems of a channel: samples that are no readings, stuck and clipped stretches."""
     counts = ((c.nans, "NaN"), (c.infinities, "infinite"), (c.wild, "absurd"))
     parts = [f"{number} {what}" for number, what in counts if number]
     if parts:
@@ -161,7 +161,7 @@ def _times(stretches: tuple[Stretch, ...], count: int) -> str:
 
 def _team_time(found: Inspection) -> Iterator[str]:
     timing = found.survey.timing
-    # Robots of a table share its stamps and what is wrong with them.
+    # Robots of one table share its stamps and therefore their problems.
     robots: dict[str, list[str]] = {}
     for robot, t in enumerate(timing):
         for what in _stamps(t):
@@ -197,7 +197,7 @@ def _team_samples(found: Inspection) -> Iterator[str]:
         ("theta", -d.gimbal_limit_rad, d.gimbal_limit_rad),
         ("tau", -torque, torque),
     ):
-        # Ranges that a mistake in the wiring explains are not told again.
+        # A wiring mistake already explains these ranges.
         beyond = {
             who: (c.lowest, c.highest)
             for robot, who, c in every
@@ -210,7 +210,7 @@ def _team_samples(found: Inspection) -> Iterator[str]:
 
 
 def _beyond_range(beyond: dict[str, tuple[float, float]], low: float, high: float, unit: str) -> str:
-    """Channels of one kind that leave their range."""
+    """Describe the channels of one kind that leave their range."""
     spans = [reached[1] - reached[0] for reached in beyond.values()]
     turn = ""
     if unit == "rad" and any(abs(span / _TURN - 1.0) < _ONE_TURN for span in spans):
@@ -226,7 +226,7 @@ def _beyond_range(beyond: dict[str, tuple[float, float]], low: float, high: floa
 
 
 def _oscillating(channels: Sequence[tuple[str, str, Channel]]) -> Iterator[str]:
-    """The effort that oscillates most, or else the angle, and what shakes with it."""
+    """Describe the effort that oscillates most, or else the angle, and name the other oscillating channels."""
     lines = [(who, unit, c.oscillation) for who, unit, c in channels if c.oscillation is not None]
     if not lines:
         return
@@ -263,7 +263,7 @@ def _team_wiring(found: Inspection) -> Iterator[str]:
         yield _mistake(mistake)
     misfit = wiring.undone
     if misfit.suspicious:
-        # Robots that move together, of which only the forces do not fit.
+        # Velocities agree and only forces disagree.
         moving = [value for name, value in misfit.scaled.items() if name not in ("force", "moment")]
         together = misfit.determined and not misfit.faults and max(moving, default=0.0) ** 2 < SUSPICIOUS
         hint = ": they move together, so does the log lack a robot, or does something else carry or push?"
@@ -275,7 +275,7 @@ def _team_wiring(found: Inspection) -> Iterator[str]:
 
 
 def _mistake(found: Found) -> str:
-    """A mistake, what it cannot be told from, and its evidence."""
+    """Describe a mistake, the alternatives that fit equally well, and its evidence."""
     others = ""
     if found.alternatives:
         some = "; ".join(m.sentence for m in found.alternatives[:3])
@@ -288,7 +288,7 @@ def _mistake(found: Found) -> str:
 
 
 def evidence(misfit: Misfit) -> str:
-    """The largest disagreements in words."""
+    """Describe the largest disagreements."""
     if misfit.faults:
         return "; ".join(fault.reason for fault in misfit.faults[:2])
     worst = sorted(misfit.scaled, key=lambda name: -misfit.scaled[name])[:2]
@@ -317,25 +317,25 @@ def _team_estimate(found: Inspection) -> Iterator[str]:
 
 
 def percent(share: float) -> str:
-    """A share in percent, two digits, never as a power of ten where it is large."""
+    """Format a share in percent with two digits, without an exponent."""
     value = 100.0 * share
     return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
 
 
 def milliseconds(delay_s: float, se_s: float) -> str:
-    """A delay's size with its standard error of two digits."""
+    """Format a delay's size and its standard error with two digits."""
     digits = max(0, 1 - floor(log10(max(1e3 * se_s, 1e-3))))
     return f"{1e3 * abs(delay_s):.{digits}f} +- {1e3 * se_s:.{digits}f} ms"
 
 
 def _unit_of(gain: float) -> str | None:
-    """What a gain between two channels that should be equal says of a unit; None where there is nothing to say."""
+    """Return the unit error that explains a gain between two channels that should be equal, or None."""
     return next((words for factor, words in FACTORS.items() if abs(abs(gain) / factor - 1.0) < CLOSE), None)
 
 
 def _joint_time(found: JointInspection) -> Iterator[str]:
     whole = len(found.logs) == 1 and found.logs[0].usable.all()
-    # A rate that changes makes no gaps.
+    # A change of the rate makes no gaps.
     yield from _stamps(replace(found.timing, gaps=0, missing=0) if whole else found.timing)
 
 
@@ -360,7 +360,7 @@ def _joint_samples(found: JointInspection) -> Iterator[str]:
 
 
 def _joint_range(found: JointInspection, log: JointLog, j: int) -> Iterator[str]:
-    """Positions that the model's joint cannot take."""
+    """Yield positions outside the range of the model's joint."""
     robot, low, high = found.robot, float(log.q[:, j].min()), float(log.q[:, j].max())
     span = robot.upper[j] - robot.lower[j]
     margin = MARGIN * (1.0 + (span if np.isfinite(span) else 0.0))
@@ -376,7 +376,7 @@ def _joint_range(found: JointInspection, log: JointLog, j: int) -> Iterator[str]
 
 
 def _saturated(found: JointInspection, log: JointLog) -> Iterator[str]:
-    """Drives that give all they have."""
+    """Yield drives at their limit."""
     robot, duty = found.robot, log.drive.duty
     for j, joint in enumerate(log.joints if log.torque is not None else ()):
         limit = robot.torque_limit[j]
@@ -437,7 +437,7 @@ def _joint_wiring(found: JointInspection) -> Iterator[str]:
 
 
 def wrong_scales(found: JointInspection) -> dict[int, float]:
-    """Joints whose torque is so many times what the model asks for that no mass explains it."""
+    """Return, by joint, gains of measured over modelled torque that no mass explains."""
     log = found.logs[0] if found.logs else None
     if found.wiring is None or found.wiring.found or log is None or log.torque is None:
         return {}
@@ -447,7 +447,7 @@ def wrong_scales(found: JointInspection) -> dict[int, float]:
 
 
 def mistake_words(mistake: JointMistake, joints: Sequence[str]) -> str:
-    """A mistake in the columns of joints in words."""
+    """Describe a mistake in the columns of joints."""
     own = [joints[j] for j in mistake.joints]
     names = "all joints" if len(own) == len(joints) > 2 else listed(own)
     return {
@@ -463,7 +463,7 @@ def mistake_words(mistake: JointMistake, joints: Sequence[str]) -> str:
 
 
 def _velocities(found: Sequence[Follows], log: JointLog) -> Iterator[str]:
-    """What measured velocities are, beside differentiated positions."""
+    """Yield measured velocities that disagree with the derivative of the positions."""
     for one in found:
         dq, unit = f"dq of {log.joints[one.joint]}", _unit_of(one.gain)
         if one.strays:

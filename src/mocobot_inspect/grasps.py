@@ -1,4 +1,4 @@
-"""Motion and force of the robots' grasps from their channels, however wrong these are, and one rigid body for all."""
+"""Compute motion and force of the robots' grasps from possibly wrong channels, and fit one rigid body to them."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ from estimator.statistics import rms
 from mocobot_inspect.signals import Signals, noise_gains
 
 WRONG_SHARE = 0.01
-"""A range that more than this share of the samples leaves is a fault of the wiring, not of some samples."""
+"""Share of samples outside a range above which the wiring is at fault rather than single samples."""
 FARTHEST_M = 5.0
-"""Grasps farther apart than this are a wrong unit of lengths or angles."""
+"""Largest plausible distance between grasps; a larger one means a wrong unit of lengths or angles."""
 _POSTURE = 3.0  # relative change of forces per radian
 _RANK = 1e-6
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a robot's channels cannot be what they are taken for.
+    """Why a robot's channels cannot be what the map says.
 
     Attributes:
-        share: share of the instants that say so.
-        reason: the same in words.
+        share: share of the instants that show it.
+        reason: the reason in words.
     """
 
     share: float
@@ -52,11 +52,11 @@ class Fault:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """What follows from one robot's positions alone.
+    """Quantities that follow from one robot's positions alone.
 
     Attributes:
         legs: geometry at the driven angles.
-        told: the same by the design at the angles as read, which is how wrist positions and forces are told.
+        told: geometry of the design at the angles as read; logged wrist positions and forces refer to it.
         h_dot, h_ddot: velocity and acceleration of the wrist in the arm's own frame [m/s, m/s^2], shape (Q, 3).
         own_torque: spring torques that move the arm itself [N m], shape (Q, 3).
         faults: why the positions cannot be right.
@@ -72,7 +72,7 @@ class Arm:
 
 @dataclass(frozen=True, eq=False)
 class Gimbal:
-    """What follows from one robot's gimbal angles alone.
+    """Quantities that follow from one robot's gimbal angles alone.
 
     Attributes:
         R_bi: orientation of {i} in the arm's own frame, shape (Q, 3, 3).
@@ -88,17 +88,17 @@ class Gimbal:
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """What one robot says of its grasp frame {i}.
+    """Motion and force of one robot's grasp frame {i}.
 
     Attributes:
         omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
         velocity, acceleration: of the origin of {i} [m/s, m/s^2], in {i}, shape (Q, 3).
         up: unit vector against gravity in {i}, shape (Q, 3).
-        force: on the payload in {i} [N], shape (Q, 3); the moment that moves the gimbal's own bodies, some mN m, is
-            left out.
+        force: on the payload in {i} [N], shape (Q, 3). The moment that moves the gimbal's own bodies, some mN m, is
+            neglected.
         lift: vertical force on the payload [N], shape (Q,).
         rise: vertical acceleration of the wrist [m/s^2], shape (Q,).
-        noise: of one component of omega [rad/s], velocity [m/s], force [N] and up [rad].
+        noise: noise of one component of omega [rad/s], velocity [m/s], force [N] and up [rad], shape (4,).
     """
 
     omega: Array
@@ -113,7 +113,7 @@ class Grasp:
 
 
 def arm_motion(signals: Signals, robot: int, arms: Arms) -> Arm | Fault:
-    """The arm of one robot (from 0), or why it cannot be in such postures."""
+    """Return the motion of one arm (from 0), or the fault if its postures are impossible."""
     design, arm = design_of(arms), arm_of(arms, robot)
     position, wrist = signals.position.values[:, :, robot], signals.level == "wrist"
     faults: tuple[Fault, ...] = ()
@@ -149,17 +149,17 @@ def arm_motion(signals: Signals, robot: int, arms: Arms) -> Arm | Fault:
 
 
 def _driven(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Array, LegGeometry]:
-    """Driven angles and geometry of a robot as designed; InputError where it cannot be in such postures."""
+    """Return driven angles and geometry of the robot as designed; InputError if a posture is impossible."""
     angles = inverse_kinematics(position[0], design) if wrist else position[0]
     return angles, leg_geometry(angles, design)
 
 
 def _possible(position: Array, design: OmnidDesign, *, wrist: bool) -> Array | None:
-    """Positions without the few instants that no arm as designed can be in; None where these are too many.
+    """Replace the few impossible instants of positions by their neighbours; return None if there are too many.
 
     Args:
         position: driven angles or wrist positions with rates and accelerations, shape (3, Q, 3).
-        design: the robots' numbers.
+        design: design of the robots.
         wrist: whether they are wrist positions.
     """
     if wrist:
@@ -174,7 +174,7 @@ def _possible(position: Array, design: OmnidDesign, *, wrist: bool) -> Array | N
 
 
 def gimbal_motion(signals: Signals, robot: int, arms: Arms) -> Gimbal:
-    """The gimbal of one robot (from 0)."""
+    """Return the motion of one robot's gimbal (from 0)."""
     theta, arm = signals.theta.values[:, :, robot], arm_of(arms, robot)
     limit = design_of(arms).gimbal_limit_rad
     true = theta[0] - arm.of("theta_zero") if isinstance(arm, ArmUnit) else theta[0]
@@ -186,16 +186,16 @@ def gimbal_motion(signals: Signals, robot: int, arms: Arms) -> Gimbal:
 def grasp_motion(
     signals: Signals, robot: int, arm: Arm | Fault, gimbal: Gimbal, arms: Arms
 ) -> tuple[Grasp | None, tuple[Fault, ...]]:
-    """Motion and force at one grasp, None where the arm cannot be in such postures.
+    """Return motion and force of one grasp.
 
     Args:
-        signals: the team's channels.
-        robot: which robot, from 0.
-        arm, gimbal: what follows from its positions and gimbal angles.
-        arms: the robots' numbers.
+        signals: channels of the team.
+        robot: number of the robot, from 0.
+        arm, gimbal: motion of its arm and gimbal.
+        arms: the robots as calibrated, or as designed.
 
     Returns:
-        The motion, and the faults of all channels.
+        The grasp, None if the arm's postures are impossible, and the faults of all channels.
     """
     if isinstance(arm, Fault):
         return None, (*gimbal.faults, arm)
@@ -211,11 +211,11 @@ def grasp_motion(
     # Each leg pushes along its rod, see ``wrist_of``.
     force = np.sum(legs.rod * ((tau - arm.own_torque) / legs.leverage)[..., None], axis=-2)
     value, rate, _ = noise_gains()
-    lever = 1.0 if wrist else design.proximal_length_m  # of driven rates and torques, in order of magnitude
+    lever = 1.0 if wrist else design.proximal_length_m  # order of magnitude, for driven rates and torques
     of_theta, of_position, of_effort = (
         rms(group.noise[robot]) for group in (signals.theta, signals.position, signals.effort)
     )
-    # A wrong posture turns and stretches forces, too: by as much as it is off, in order of magnitude.
+    # An error of the posture also rotates and scales forces, by about its own size.
     off = value * (of_position / design.proximal_length_m if wrist else of_position)
     noise = [
         rate * of_theta,
@@ -259,11 +259,11 @@ class Body:
     Attributes:
         R_1i, p_1i: grasp frames, shapes (N, 3, 3), (N, 3) [m].
         omega, alpha: mean angular velocity [rad/s] and acceleration [rad/s^2], shape (Q, 3).
-        acceleration: of the origin of {1}, mean [m/s^2], shape (Q, 3).
+        acceleration: mean acceleration of the origin of {1} [m/s^2], shape (Q, 3).
         up: mean direction against gravity, shape (Q, 3).
         noise: as in ``Grasp``, the largest of all robots.
-        turns: whether it turns about two axes, clearly above the noise.
-        spread: disagreements of the robots, each with its signal and its noise; none for one robot.
+        turns: whether it rotates about two axes, clearly above the noise.
+        spread: disagreements of the robots, each with its signal and its noise; empty for one robot.
         gravity_mps2: magnitude of gravity.
     """
 
@@ -285,20 +285,21 @@ class Body:
 
     @cached_property
     def regressor(self) -> Array:
-        """Total force and moment in {1} by the ten inertial parameters, shape (Q, 6, 10)."""
+        """Regressor of the total wrench in {1} for the ten inertial parameters, shape (Q, 6, 10)."""
         specific = self.acceleration + self.gravity_mps2 * self.up
         return newton_euler_regressor(self.omega, self.alpha, specific)
 
 
 def rigid_body(told: Sequence[Grasp], gravity_mps2: float, most_noise: Array | None = None) -> Body | None:
-    """The motion that fits best, or None where no robot tells or the numbers overflow.
+    """Return the best-fitting rigid motion, or None without grasps or if the numbers overflow.
 
-    Rotations by Wahba's problem (paper, (3)-(5)), positions by linear least squares (6)-(8), both against robot 1.
+    Rotations solve Wahba's problem (paper, (3)-(5)), positions a linear least-squares problem (6)-(8), both against
+    robot 1.
 
     Args:
-        told: what the robots say, the first one being {1}.
+        told: motions of the grasps; the first frame is {1}.
         gravity_mps2: magnitude of gravity.
-        most_noise: bound of the noise, as in ``Grasp``.
+        most_noise: upper bound of the noise, as in ``Grasp``.
     """
     if not told or not all(np.isfinite(np.sum(g.force)) and np.isfinite(np.sum(g.omega)) for g in told):
         return None
@@ -345,6 +346,6 @@ def rigid_body(told: Sequence[Grasp], gravity_mps2: float, most_noise: Array | N
 
 
 def _position(w: Array, difference: Array) -> Array:
-    """p that best explains v_j - v_1 = w x p in {1}; shortest where it is not unique."""
+    """Return the p that best fits v_j - v_1 = w x p in {1}; the shortest one if it is not unique."""
     moment = np.mean(cross(difference, w), axis=0)
     return np.asarray(np.linalg.lstsq(cross_information(w), moment, rcond=_RANK)[0], dtype=np.float64)

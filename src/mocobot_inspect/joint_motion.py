@@ -1,6 +1,7 @@
-"""Smooth motion of a joint log, and how its other channels follow it: gains, delays and their standard errors.
+"""Smooth motion of a joint log, and gain and delay of its other channels against it, with standard errors.
 
-Measured velocities, torques and commands are compared with the motion; what all joints share is told from all together.
+Measured velocities are compared with differentiated positions, and positions with their commands. A delay common to
+all joints is estimated from all together.
 """
 
 from __future__ import annotations
@@ -17,38 +18,39 @@ from estimator.filtering import differentiate, low_pass
 from mocobot_logs.joints.joint_log import JointLog
 
 CUTOFF_HZ, CUTOFF_SHARE = 10.0, 0.1
-"""Low-pass of positions and torques alike: motion of robots is slower; a tenth of the rate where that is little."""
+"""Cut-off of the low-pass for positions and torques [Hz], above the motion of robots; at low rates this share of the
+rate."""
 MOST_ROWS = 1500
-"""Samples looked at, at most: a model's torque takes 20 us a sample, and fifty mistakes are tried."""
+"""Largest number of samples used: inverse dynamics takes 20 us a sample, and about fifty mistakes are tried."""
 MOVES = 1e-6
-"""Spans below this are no motion [rad or m]."""
+"""Smallest range that counts as motion [rad or m]."""
 NOISES = 12.0
-"""Spans below so many standard deviations of the noise behind the low-pass are no motion either."""
+"""Smallest range that counts as motion, in standard deviations of the low-passed noise."""
 
 LONGEST_S = 0.1
-"""Longest delay that is looked for [s]."""
+"""Longest delay that is searched [s]."""
 FOLLOWS = 0.8
-"""Correlation with the motion from which on a channel is taken to follow it, up to gain and delay."""
+"""Least correlation with the motion at which a channel counts as following it."""
 _UNKNOWN_S, _UNKNOWN = 2e-3, 0.2
-"""A delay with a larger standard error than this [s], and than this share of a period, is not known."""
+"""Largest standard error of a known delay: the larger of this time [s] and this share of a period."""
 _APART, _GRID = 3.0, 0.02
-"""Standard errors within which joints agree; share of a period to which interpolation tells a delay."""
-_CLEAR = 0.5  # share of a signal that must not be noise for a correlation to mean anything
+"""Standard errors within which joints agree; accuracy of interpolated delays, as a share of a period."""
+_CLEAR = 0.5  # share of a signal's variance above noise that a meaningful correlation needs
 _ITERATIONS = 12
-_BLOCKS = 10  # of a log, whose errors are independent of each other
+_BLOCKS = 10  # blocks of a log whose errors count as independent
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Smooth motion and torques of J joints at Q samples, all through one low-pass.
+    """Smooth motion and torques of J joints at Q samples, all through the same low-pass.
 
     Attributes:
-        log: what it is of.
+        log: the log.
         q, dq, ddq: positions and their derivatives, shape (Q, J).
-        torque: shape (Q, J), NaN where a joint has none; a duty, which is a torque but for its gain and what the
-            speed takes off it, where it has that instead.
-        torque_noise: noise of the torques that the low-pass lets through, shape (J,).
-        at: the samples' numbers in the log, shape (Q,).
+        torque: torques, shape (Q, J), NaN where a joint has none. A joint without a torque has its duty here, which is
+            a torque up to a gain and a term proportional to the speed.
+        torque_noise: noise of the torques after the low-pass, shape (J,).
+        at: indices of the samples in the log, shape (Q,).
     """
 
     log: JointLog
@@ -68,7 +70,7 @@ class Motion:
 
 
 def motion_of(log: JointLog) -> Motion:
-    """Smooth motion of a log, away from its ends and from gaps."""
+    """Return the smooth motion of a log, away from its ends and from gaps."""
     q = smooth(log, log.q)
     dq = differentiate(q, log.rate_hz)
     ddq = differentiate(dq, log.rate_hz)
@@ -83,34 +85,34 @@ def motion_of(log: JointLog) -> Motion:
 
 
 def cutoff_hz(log: JointLog) -> float:
-    """Cut-off of the low-pass [Hz]."""
+    """Return the cut-off frequency of the low-pass [Hz]."""
     return min(CUTOFF_HZ, CUTOFF_SHARE * log.rate_hz)
 
 
 def smooth(log: JointLog, values: Array) -> Array:
-    """A signal of the log through the low-pass, shape (Q, ...); joints without one stay NaN."""
+    """Return a signal of the log after the low-pass, shape (Q, ...); NaN stays NaN."""
     known = np.isfinite(values)
     return np.where(known, low_pass(np.where(known, values, 0.0), log.rate_hz, cutoff_hz(log)), np.nan)
 
 
 def passed_noise(log: JointLog, raw: Array, smoothed: Array) -> Array:
-    """Noise that the low-pass lets through, shape (J,).
+    """Estimate the noise after the low-pass, shape (J,).
 
-    What it takes off is noise, and as much of white noise is left as its band is of the whole.
+    The removed part is taken as white noise; the remaining noise is proportional to the pass band's share.
     """
     return np.std(raw - smoothed, axis=0) * np.sqrt(2.0 * cutoff_hz(log) / log.rate_hz)
 
 
 @dataclass(frozen=True)
 class Follows:
-    """How a channel follows the motion.
+    """Gain and delay of a channel against the motion.
 
     Attributes:
-        joint: of the model, from 0.
-        gain, gain_se: of the channel over the motion, and its standard error.
-        delay_s, delay_se_s: of the channel after the motion, NaN where noise hides it, and its standard error [s].
-        correlation: between them, the delay taken out; of its size only.
-        possible: correlation that noise leaves of a channel that follows.
+        joint: index of the joint in the model, from 0.
+        gain, gain_se: gain of the channel over the motion, and its standard error.
+        delay_s, delay_se_s: delay of the channel behind the motion, NaN if noise hides it, and its standard error [s].
+        correlation: absolute correlation after the delay is removed.
+        possible: largest correlation that the noise allows.
     """
 
     joint: int
@@ -123,23 +125,23 @@ class Follows:
 
     @property
     def strays(self) -> bool:
-        """Whether it follows less than noise explains."""
+        """Whether the correlation is lower than noise explains."""
         return self.possible > _CLEAR and self.correlation < FOLLOWS * self.possible
 
 
 def velocity_follows(motion: Motion) -> list[Follows]:
-    """Measured velocities against differentiated positions, through one low-pass."""
+    """Compare measured velocities with differentiated positions, after the same low-pass."""
     log = motion.log
     if log.dq is None:
         return []
     q = smooth(log, log.q)
-    # A derivative's noise grows with frequency: 2 pi times the cut-off over sqrt(3) in all.
+    # The noise of a derivative grows with frequency: in total by 2 pi times the cut-off over sqrt(3).
     noise = passed_noise(log, log.q, q) * 2.0 * np.pi * cutoff_hz(log) / np.sqrt(3.0)
     return _pairs(motion, log.dq, differentiate(q, log.rate_hz), noise)
 
 
 def command_follows(motion: Motion) -> list[Follows]:
-    """Positions against commanded ones: gain and delay of the motion after its command."""
+    """Compare positions with commanded ones: gain and delay of the motion behind its command."""
     log = motion.log
     if log.command is None or log.drive.command != "position":
         return []
@@ -148,7 +150,7 @@ def command_follows(motion: Motion) -> list[Follows]:
 
 
 def exchanged_commands(motion: Motion) -> list[tuple[int, int]]:
-    """Pairs of joints that follow each other's command, and not their own, from 0."""
+    """Return pairs of joints, from 0, that follow each other's command instead of their own."""
     log = motion.log
     if log.command is None or log.drive.command != "position":
         return []
@@ -163,7 +165,7 @@ def exchanged_commands(motion: Motion) -> list[tuple[int, int]]:
 
 
 def pooled(found: Sequence[Follows]) -> tuple[float, float] | None:
-    """One delay for all joints and its standard error [s]; None where known ones differ, or there are not two."""
+    """Return one delay for all joints and its standard error [s]; None if fewer than two are known or they disagree."""
     known = [(one.delay_s, one.delay_se_s) for one in found if np.isfinite(one.delay_s)]
     delay, se = np.array(known).reshape(-1, 2).T
     if len(delay) < 2:
@@ -173,13 +175,13 @@ def pooled(found: Sequence[Follows]) -> tuple[float, float] | None:
 
 
 def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[Follows]:
-    """Every moving joint's channel as gain times another one a little earlier, by least squares.
+    """Fit every moving joint's channel as a delayed copy of another one times a gain, by least squares.
 
     Args:
-        motion: of the robot.
-        late_raw: the channel, not filtered, shape (Q, J).
-        early: the other one, filtered, shape (Q, J).
-        noise: what is left of its noise, shape (J,).
+        motion: motion of the robot.
+        late_raw: the delayed channel, not filtered, shape (Q, J).
+        early: the other channel, filtered, shape (Q, J).
+        noise: noise of ``early`` after the filter, shape (J,).
     """
     log = motion.log
     late = smooth(log, late_raw)
@@ -192,7 +194,7 @@ def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[
         if not (np.isfinite(y).all() and np.isfinite(early[:, j]).all()) or np.std(y) == 0:
             continue
         delay, step, gain, se, now = 0.0, np.inf, 0.0, np.zeros(3), y
-        for _ in range(_ITERATIONS):  # the delay enters linearly, and then what is left of it
+        for _ in range(_ITERATIONS):  # Newton iteration: the model is linear in the remaining delay
             at = motion.at - delay * log.rate_hz
             now, slope = np.interp(at, samples, early[:, j]), np.interp(at, samples, rate[:, j])
             (gain, shift, _), se = solved(np.column_stack([now, -slope, np.ones_like(now)]), y)
@@ -204,7 +206,7 @@ def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[
         clear = 1.0 - np.minimum([noise[j] ** 2 / np.var(now), late_noise[j] ** 2 / np.var(y)], 1.0)
         correlation = _correlation(now, y)
         known = abs(step) < delay_se < least and correlation > FOLLOWS and clear[0] > _CLEAR
-        bias = max(float(clear[0]), _CLEAR)  # noise in what is followed makes the gain smaller
+        bias = max(float(clear[0]), _CLEAR)  # noise in the regressor reduces the gain
         out.append(
             Follows(
                 joint=int(j),
@@ -220,11 +222,14 @@ def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[
 
 
 def solved(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares and its standard errors, from residuals that are alike for a while: block by block.
+    """Solve least squares; standard errors allow for residuals that are correlated within blocks.
 
     Args:
-        columns: shape (Q, P).
-        y: shape (Q,).
+        columns: regressor, shape (Q, P).
+        y: observations, shape (Q,).
+
+    Returns:
+        Parameters and their standard errors, shape (P,) each.
     """
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     scaled = columns / size
@@ -237,7 +242,7 @@ def solved(columns: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _correlation(one: Array, other: Array) -> float:
-    """Size of the correlation, 0 where one of them stands or is not known."""
+    """Return the absolute correlation, 0 if a signal is constant or unknown."""
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
         return 0.0
     a, b = one - one.mean(), other - other.mean()

@@ -1,9 +1,12 @@
-"""Exchanged joints and wrong signs: each is undone, alone, and what lets the model explain the torques is reported.
+"""Find exchanged joints and wrong signs in a joint log.
 
-A joint's torque is what the model asks for, times a gain, plus rotor inertia, plus friction of either kind, plus an
-offset; gain, inertia and friction cannot be negative. What is left of its variance is the joint's misfit: small where
-signs and joints are right, however wrong masses are, near 1 where they are not. Rows in which a joint rests are left
-out: dry friction has any value there. A payload that the model lacks, made of point masses, competes with the mistakes.
+Each mistake is undone alone. A mistake is reported if the model then explains the torques.
+
+A joint's torque is fitted by the model's torque times a gain, rotor inertia, Coulomb and viscous friction, and an
+offset. Gain, inertia and friction are non-negative. The unexplained share of the variance is the joint's misfit. With
+correct signs and joints it is small even if masses are wrong; otherwise it is near 1. Rows in which a joint rests are
+left out, since Coulomb friction is undetermined there. A payload missing in the model, made of point masses, competes
+with the mistakes as an explanation.
 """
 
 from __future__ import annotations
@@ -25,47 +28,52 @@ Kind = Literal[
     "payload", "torque_sign", "position_sign", "torque_exchange", "position_exchange", "both_exchange", "both_signs",
     "position_degrees", "position_radians",
 ]  # fmt: skip
-"""What may be wrong; of mistakes that cannot be told apart, the first is named."""
+"""Kinds of mistakes; if several fit equally well, the first in this order is reported."""
 SUSPICIOUS = 0.2
-"""Misfit above which a joint is suspected. Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, 0.11 and
-0.27 at two whose drives are coupled; up to 0.08 on 24 simulated arms of seven joints with masses and centres off by
-10 or 50 %, none of which was suspected of anything."""
+"""Misfit above which a joint is suspected.
+
+Measured on healthy logs of a real arm: 0.003 to 0.01, but 0.11 and 0.27 at two joints with coupled drives. Measured
+on 24 simulated seven-joint arms with masses and centres off by 10 or 50 %: up to 0.08, so no joint was suspected.
+"""
 DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
-"""Factors by which undoing a mistake must lower the misfit of the joints that it concerns: where one of them is
-suspected, and where none is. Friction hides that whole joints are exchanged: 7 to 12 times on a real arm."""
+"""Factors by which undoing a mistake must lower the misfit of its joints: if one of them is suspected, and if none is.
+
+Friction can hide an exchange of whole joints, so that none is suspected. Measured on a real arm: undoing it lowers
+the misfit 7 to 12 times.
+"""
 SAME = 2.0
-"""Mistakes whose misfits, multiplied over the joints, differ by less cannot be told apart."""
+"""Ratio of the products of all joints' misfits below which two mistakes cannot be distinguished."""
 WORTH = 0.03
-"""Misfit above which a payload is thought of."""
+"""Misfit above which a payload is tried."""
 WRONG_SCALE = 8.0
-"""Gains of the model's torque beyond this, or below its inverse, are no wrong mass."""
+"""Largest gain of the model's torque, and inverse of the smallest, that wrong masses can explain."""
 SHOWS = 0.3
-"""Share of a torque's variance that the model's must make up for its gain to be known."""
+"""Least share of a torque's variance that the model must explain for its gain to be known."""
 SLOW = 0.4
-"""Share of a joint's rms speed; below it dry friction has any value, and leads or lags by milliseconds."""
-_FLOOR = 1e-4  # of a misfit
-_CHANGED = 1.5  # a joint is concerned by a mistake that changes its misfit by so much
-_RESTS = 0.05  # of the rms speed, below which the sign of a speed means nothing
+"""Share of a joint's rms speed; below it Coulomb friction is undetermined, and leads or lags by milliseconds."""
+_FLOOR = 1e-4  # added to a misfit before its logarithm
+_CHANGED = 1.5  # a mistake concerns a joint if it changes the joint's misfit by this factor
+_RESTS = 0.05  # of the rms speed; below it the sign of the speed is unreliable
 _LEAST_TORQUE = 1e-9
 _LEAST_ROWS = 20
-_POINTS = np.array(list(product((-0.3, -0.15, 0.0, 0.15, 0.3), repeat=3))).T  # of a payload's masses [m]
-_TURN = 2.0 * np.pi  # hardly any joint moves farther, and hardly any log is of less than so many degrees
-_STEPS, _SHARPENED = 10, 3  # delays tried on either side, and how often
+_POINTS = np.array(list(product((-0.3, -0.15, 0.0, 0.15, 0.3), repeat=3))).T  # point masses of a payload [m]
+_TURN = 2.0 * np.pi  # joints rarely move farther in radians, and logs rarely cover less in degrees
+_STEPS, _SHARPENED = 10, 3  # delays tried on either side, and number of refinements
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """What an inspection has to know of a robot; no simulator.
+    """The robot model that an inspection needs, without a simulator.
 
     Attributes:
         joints: names of its J joints.
-        slides: whether each slides, shape (J,); the others turn.
-        lower, upper: range of each [rad or m], infinite where there is none, shape (J,).
-        torque_limit: most that each joint's drive gives [N m or N], infinite where the model does not say, shape (J,).
-        inverse: torques without friction from positions and their first two derivatives, (Q, J) each -> (Q, J).
-        regressor: from the same, torques per unit of ten inertial parameters of the last link (mass, first moments,
-            Ixx, Iyy, Izz, Ixy, Ixz, Iyz about its frame's origin), shape (Q, J, 10).
-        mass_kg: of all that moves.
+        slides: whether each joint slides, shape (J,); the others turn.
+        lower, upper: range of each joint [rad or m], infinite if unlimited, shape (J,).
+        torque_limit: largest torque of each drive [N m or N], infinite if the model has none, shape (J,).
+        inverse: inverse dynamics without friction: positions and their first two derivatives, (Q, J) each -> (Q, J).
+        regressor: torque regressor of the last link from the same inputs, shape (Q, J, 10). Its inertial parameters are
+            mass, first moments, Ixx, Iyy, Izz, Ixy, Ixz and Iyz about the frame's origin.
+        mass_kg: mass of all moving links.
     """
 
     joints: tuple[str, ...]
@@ -83,18 +91,18 @@ class Robot:
         return tuple("m" if slides else "rad" for slides in self.slides)
 
     def asked(self, q: Array, dq: Array, ddq: Array, payload: Array | None) -> Array:
-        """Torques of the model and of ten inertial parameters at its last link, shape (Q, J)."""
+        """Return the torques of the model plus a payload of ten inertial parameters at its last link, shape (Q, J)."""
         own = self.inverse(q, dq, ddq)
         return own if payload is None else own + self.regressor(q, dq, ddq) @ payload
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """Something wrong with the columns of one joint, of two, or of all.
+    """A mistake in the columns of one joint, of two, or of all.
 
     Attributes:
-        kind: what it is; degrees are taken for radians, or radians for degrees; of a payload only the model is wrong.
-        joints: of the model, from 0.
+        kind: see ``Kind``; "position_degrees" means degrees taken for radians. A "payload" is wrong only in the model.
+        joints: indices of the joints in the model, from 0.
     """
 
     kind: Kind
@@ -102,16 +110,16 @@ class Mistake:
 
     @property
     def of_positions(self) -> bool:
-        """Whether positions are concerned, and with them all torques that the model asks for."""
+        """Whether the mistake concerns positions, and therefore all torques of the model."""
         return self.kind.startswith(("position", "both"))
 
     @property
     def of_torques(self) -> bool:
-        """Whether torques are concerned."""
+        """Whether the mistake concerns torques."""
         return self.kind.startswith(("torque", "both"))
 
     def undone(self, values: Array) -> Array:
-        """Positions, a derivative of theirs or torques, if these are concerned, without it, shape (Q, J)."""
+        """Return positions, one of their derivatives or torques with the mistake undone, shape (Q, J)."""
         out, own = values.copy(), list(self.joints)
         if self.kind.endswith("exchange"):
             out[:, own] = values[:, own[::-1]]
@@ -124,12 +132,12 @@ class Mistake:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A mistake that explains what is wrong.
+    """A mistake that explains a misfit.
 
     Attributes:
-        mistake: what it is.
-        before, after: misfit of its joints as they are and with it undone.
-        alternatives: mistakes of the same joints that the log cannot tell from it.
+        mistake: the mistake.
+        before, after: mean misfit of its joints as they are and with it undone.
+        alternatives: mistakes that share a joint with it and explain the log equally well.
     """
 
     mistake: Mistake
@@ -140,16 +148,16 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Wiring:
-    """What torques and motion say of each other.
+    """Result of the comparison of torques and motion.
 
     Attributes:
-        misfit: of every joint as it is, NaN without a torque or motion, shape (J,).
-        undone: the same with all found mistakes undone, shape (J,).
+        misfit: misfit of each joint as it is, NaN without a torque or motion, shape (J,).
+        undone: misfit with all found mistakes undone, shape (J,).
         found: the mistakes.
-        tried: how many were tried.
-        noise: share of each torque that is noise, shape (J,).
-        gains: of the model's torque in each joint's, all undone, NaN where it does not show, shape (J,).
-        payload: ten inertial parameters of what the last link carries and the model lacks, or None.
+        tried: number of mistakes tried.
+        noise: share of each torque's variance that is noise, shape (J,).
+        gains: gain of the model's torque with all mistakes undone, NaN if unknown, shape (J,).
+        payload: ten inertial parameters of a payload that the model lacks at the last link, or None.
     """
 
     misfit: Array
@@ -162,17 +170,17 @@ class Wiring:
 
     @property
     def odd_gains(self) -> NDArray[np.bool_]:
-        """Joints whose torque is so many times what the model asks for that no mass explains it, shape (J,)."""
+        """Joints whose gain no wrong mass explains, shape (J,)."""
         return _odd(self.gains)
 
 
 @dataclass(frozen=True)
 class TorqueDelay:
-    """How torques lag behind the motion.
+    """Delay of the torques behind the motion.
 
     Attributes:
-        delay_s, delay_se_s: of all torques, and its standard error [s].
-        before, after: share of their variance that model and friction leave, without and with it.
+        delay_s, delay_se_s: delay of all torques, and its standard error [s].
+        before, after: unexplained share of their variance without and with the delay.
     """
 
     delay_s: float
@@ -182,16 +190,16 @@ class TorqueDelay:
 
 
 class _Case:
-    """Signals as they are believed to be.
+    """Signals under a hypothesis, with their misfit.
 
     Attributes:
         motion: positions and their derivatives, shape (Q, J) each.
-        torque: shape (Q, J).
-        payload: ten inertial parameters of what the last link carries, or None.
+        torque: measured torques, shape (Q, J).
+        payload: ten inertial parameters of a payload at the last link, or None.
         asked: torques of the model and the payload, shape (Q, J).
-        misfit: share of each joint's torque that model, rotor inertia and friction leave unexplained, NaN where it is
-            not known, shape (J,).
-        gains: the model's gain in each torque, NaN likewise, shape (J,).
+        misfit: share of each torque that model, rotor inertia and friction leave unexplained, NaN if unknown,
+            shape (J,).
+        gains: gain of the model in each torque, NaN if unknown, shape (J,).
     """
 
     def __init__(
@@ -202,7 +210,7 @@ class _Case:
         payload: Array | None = None,
         asked: Array | None = None,
     ) -> None:
-        """Judge signals; ``asked`` if it is known."""
+        """Compute the misfit; ``asked`` may be given if it is already known."""
         self.motion, self.torque, self.payload = motion, torque, payload
         self.asked = robot.asked(*motion, payload) if asked is None else asked
         self.misfit, self.gains = np.full((2, torque.shape[1]), np.nan)
@@ -217,16 +225,16 @@ class _Case:
                 self.gains[j] = values[0]
 
     def rows(self, j: int) -> NDArray[np.bool_]:
-        """Rows of a joint that tell something: it has a torque, and moves; shape (Q,)."""
+        """Return the rows in which a joint has a torque and moves, shape (Q,)."""
         dq = self.motion[1][:, j]
         return np.isfinite(self.torque[:, j]) & (np.abs(dq) >= _RESTS * np.sqrt(np.mean(dq**2)))
 
     def columns(self, j: int, at: NDArray[np.bool_]) -> Array:
-        """What explains a joint's torque in some rows, shape (Q, 6)."""
+        """Return the regressor of a joint's torque in some rows, shape (Q, 6)."""
         return _columns(self.asked[at, j], self.motion[1][at, j], self.motion[2][at, j])
 
     def without(self, mistake: Mistake, robot: Robot) -> _Case:
-        """The same with a mistake undone."""
+        """Return the case with a mistake undone."""
         q, dq, ddq = self.motion
         if mistake.of_positions:
             q, dq, ddq = mistake.undone(q), mistake.undone(dq), mistake.undone(ddq)
@@ -237,13 +245,13 @@ class _Case:
 
     @property
     def score(self) -> float:
-        """Logarithm of the product of all misfits."""
+        """Sum of the logarithms of all misfits."""
         return float(np.nansum(np.log(self.misfit + _FLOOR)))
 
     def lacking(self, robot: Robot) -> Array | None:
-        """Ten inertial parameters of point masses at the last link that explain most, all joints taken together.
+        """Return ten inertial parameters of the point masses at the last link that fit all joints best.
 
-        None where there are none, or where they outweigh the robot.
+        None if there are none, or if they outweigh the robot.
         """
         x, y, z = _POINTS
         points = np.stack([x**0, x, y, z, y**2 + z**2, x**2 + z**2, x**2 + y**2, -x * y, -x * z, -y * z])
@@ -265,12 +273,12 @@ class _Case:
 def check_wiring(
     motions: Sequence[Motion], robot: Robot, advance: Callable[[int], object] = lambda _: None
 ) -> Wiring | None:
-    """Try every mistake; None where no joint with a torque moves.
+    """Search for mistakes; return None if no joint with a torque moves.
 
     Args:
-        motions: of every part of the log.
-        robot: its model.
-        advance: takes the number of mistakes tried.
+        motions: motion of every part of the log.
+        robot: model of the robot.
+        advance: called with the number of mistakes tried.
     """
     q, dq, ddq, torque = (
         np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq", "torque")
@@ -304,7 +312,7 @@ def check_wiring(
 
 
 def _candidates(case: _Case, robot: Robot) -> Iterator[Mistake]:
-    """Mistakes that concern at least one suspected joint, and exchanges of whole joints."""
+    """Yield mistakes that concern a suspected joint, unit errors, exchanges of whole joints, and a payload."""
     if case.payload is None and (_odd(case.gains).any() or np.any(case.misfit > WORTH)):
         yield Mistake("payload", ())
     q, dq, _ = case.motion
@@ -319,7 +327,7 @@ def _candidates(case: _Case, robot: Robot) -> Iterator[Mistake]:
     if len(suspected) > 1:
         yield Mistake("torque_sign", tuple(range(len(robot.joints))))
     for j in moving if suspected else ():
-        # A sign of a position shows in the torques of other joints, too.
+        # A wrong position sign also affects torques of other joints.
         yield Mistake("position_sign", (j,))
         if j in suspected:
             yield Mistake("torque_sign", (j,))
@@ -333,7 +341,7 @@ def _candidates(case: _Case, robot: Robot) -> Iterator[Mistake]:
 
 
 def _judged(mistake: Mistake, case: _Case, undone: _Case) -> tuple[float, float] | None:
-    """Misfit before and after of the joints that a mistake concerns, if undoing it mends them and harms no other."""
+    """Return the misfit before and after undoing a mistake, or None if it does not help or harms another joint."""
     before, after = case.misfit, undone.misfit
     known = np.isfinite(before) & np.isfinite(after)
     if np.any(after[known] > np.maximum(2.0 * before[known], SUSPICIOUS)):
@@ -358,14 +366,14 @@ def _odd(gains: Array) -> NDArray[np.bool_]:
 
 
 def _columns(asked: Array, dq: Array, ddq: Array) -> Array:
-    """The model's torque of a joint, rotor inertia, dry and viscous friction and two offsets, shape (Q, 6)."""
+    """Return the regressor (Q, 6) of a joint's torque: model, rotor inertia, Coulomb and viscous friction, offsets."""
     speed = float(np.sqrt(np.mean(dq**2)))
     direction = np.clip(dq / max(_RESTS * speed, 1e-12), -1.0, 1.0)
     return np.column_stack([asked, ddq, direction, dq, np.ones_like(dq), -np.ones_like(dq)])
 
 
 def _nonnegative(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares without negative values, and what they leave."""
+    """Return the non-negative least-squares solution and its residual."""
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     short = np.asarray(np.linalg.qr(np.column_stack([columns / size, y]), mode="r"))
     values = nnls(short[:, :-1], short[:, -1], maxiter=30 * len(size))[0] / size
@@ -373,11 +381,14 @@ def _nonnegative(columns: Array, y: Array) -> tuple[Array, Array]:
 
 
 def torque_delay(motion: Motion, asked: Array) -> TorqueDelay | None:
-    """Delay of all torques after the motion; samples in which a joint is slow are left out.
+    """Estimate the delay of all torques behind the motion; samples of slow joints are left out.
 
     Args:
-        motion: of the robot.
+        motion: motion of the robot.
         asked: torques of the model, shape (Q, J).
+
+    Returns:
+        The delay, or None if no moving joint has a torque.
     """
     log, rate = motion.log, motion.log.rate_hz
     if log.torque is None:
@@ -392,7 +403,7 @@ def torque_delay(motion: Motion, asked: Array) -> TorqueDelay | None:
     fast = np.abs(speeds) > SLOW * np.sqrt(np.mean(speeds**2, axis=0))
 
     def rest(k: int, delay_s: float) -> tuple[Array, Array, float]:
-        """Columns of a joint's torque, what they leave of it, and the logarithm of that share."""
+        """Return the active columns of a joint's torque, the residual, and the logarithm of its share."""
         at, j = fast[:, k], joints[k]
         late = np.interp(motion.at[at] / rate + delay_s, time, torque[:, k])
         columns = _columns(asked[at, j], motion.dq[at, j], motion.ddq[at, j])
@@ -407,7 +418,7 @@ def torque_delay(motion: Motion, asked: Array) -> TorqueDelay | None:
         tried = centre + np.linspace(-width, width, 2 * _STEPS + 1)
         centre = float(tried[int(np.argmin([shares(float(delay)) for delay in tried]))])
         width /= _STEPS
-    # One more step by Newton, joint by joint: they scatter by what the model lacks.
+    # One Newton step per joint; the scatter between joints reflects errors of the model.
     steps, errors = [], []
     for k in range(len(joints)):
         columns, left, _ = rest(k, centre)

@@ -1,4 +1,4 @@
-"""A look at a joint log before anyone trusts a number of it: stamps, channels, units, signs, order, delays."""
+"""Inspect a joint log: stamps, channels, units, signs, order and delays."""
 
 from __future__ import annotations
 
@@ -27,32 +27,32 @@ from mocobot_logs.joints.read import joint_logs_of
 from mocobot_logs.log import LogSource, Samples, collect
 
 LEAST_ROWS = 50
-"""Fewer samples of smooth motion tell nothing."""
+"""Least number of samples of smooth motion that are analysed."""
 WORDS = (8, 10, 12, 16, 24, 32)
-"""Bits of numbers whose sign may have got lost."""
+"""Word lengths [bits] of numbers that may have lost their sign."""
 EMPTY = 0.02
-"""Share of samples in the middle half of such a number's range, at most: wrapped ones are near its ends."""
-_NOISES, _MOVES = 4.0, 0.05  # a velocity is one beyond so much of its noise, and of its rms
+"""Largest share of such a number's samples in the middle half of its range; wrapped numbers lie near its ends."""
+_NOISES, _MOVES = 4.0, 0.05  # a velocity is motion above this multiple of its noise and this share of its rms
 
 
 @dataclass(frozen=True, eq=False)
 class JointInspection:
-    """What was found in a joint log.
+    """Results of the inspection of a joint log.
 
     Attributes:
-        name: of the log.
-        robot: its model.
-        log_map: how it was read.
-        timing: its stamps.
+        name: name of the log.
+        robot: model of the robot.
+        log_map: map of the log.
+        timing: statistics of its stamps.
         channels: every column of the map, in the map's order.
-        signs_lost: columns that must have been signed numbers, sentences.
-        logs: its parts on even grids, none if it cannot be read so.
-        unchecked: why motion and torques could not be looked at, or None.
+        signs_lost: one sentence for each column that must have been a signed number.
+        logs: its parts on uniform grids, empty if it cannot be resampled.
+        unchecked: why motion and torques were not checked, or None.
         moves: whether each joint moves, shape (J,).
         wiring: signs, order and units against the model, or None without torques.
-        velocities, commands: how they follow the motion, part by part.
+        velocities, commands: gain and delay of velocities and commands against the motion, of the longest part.
         crossed: pairs of joints whose commands are exchanged, from 0.
-        delay: of the torques, or None.
+        delay: delay of the torques, or None.
     """
 
     name: str
@@ -78,14 +78,14 @@ def inspect_joints(
     advance: Callable[[int], object] = lambda _: None,
     try_advance: Callable[[int], object] = lambda _: None,
 ) -> JointInspection:
-    """Look at a log; whatever is wrong with its samples is reported and not refused.
+    """Inspect a log; faulty samples are reported, not refused.
 
     Args:
         source: the log.
         log_map: its map.
-        robot: its model.
-        advance: takes the progress made in reading, in the source's units.
-        try_advance: takes the number of mistakes tried.
+        robot: model of the robot.
+        advance: called with the reading progress, in the source's units.
+        try_advance: called with the number of mistakes tried.
 
     Raises:
         InputError: the log cannot be read.
@@ -104,7 +104,7 @@ def inspect_joints(
         unchecked=None,
         moves=np.zeros(len(robot.joints), dtype=bool),
     )
-    # Refused, or taken for readings otherwise: they count as missing.
+    # Wild samples count as missing; otherwise they would be refused or used as readings.
     samples = replace(samples, values=np.where(wild(samples.values), np.nan, samples.values))
     try:
         logs = joint_logs_of(source.name, samples, log_map)
@@ -120,7 +120,7 @@ def inspect_joints(
 def _with_motion(
     found: JointInspection, parts: Sequence[Motion], advance: Callable[[int], object]
 ) -> JointInspection:
-    """The inspection with signs, order and delays."""
+    """Add signs, order and delays."""
     robot, longest = found.robot, max(parts, key=lambda part: len(part.q))
     wiring = check_wiring(parts, robot, advance)
     delay = None
@@ -139,7 +139,7 @@ def _with_motion(
 
 
 def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
-    """Sensors first: commands stand when they please, and so does a supply."""
+    """Return statistics of all channels; only sensors are checked for stuck stretches."""
     keys = list(log_map.channels)
     sensing = [k for k, (name, _) in enumerate(keys) if name in (*POSITIONS, *VELOCITIES, *EFFORTS)]
     order = [*sensing, *(k for k in range(len(keys)) if k not in sensing)]
@@ -154,7 +154,7 @@ def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
 def _without_rests(
     k: int, told: dict[int, Channel], log_map: JointMap, time_s: Array, values: Array
 ) -> Channel:
-    """A channel, without stretches in which a position stands because its joint's velocity or command does, too."""
+    """Remove stuck stretches of a position during which its joint's velocity or position command shows no motion."""
     c, (quantity, joint) = told[k], list(log_map.channels)[k]
     if quantity not in POSITIONS or not (c.stuck or c.clipped):
         return c
@@ -182,16 +182,16 @@ def _without_rests(
 
 
 def _rms(x: Array) -> float:
-    """Root mean square; NaN counts as zero."""
+    """Return the root mean square; NaN counts as zero."""
     return float(np.sqrt(np.nansum(x**2) / max(len(x), 1)))
 
 
 def _signs_lost(values: Array, log_map: JointMap) -> Iterator[str]:
-    """Numbers that must have been signed: they leap from one end of an unsigned word to the other.
+    """Yield a sentence for each unsigned number that jumps between the ends of its range, so must have been signed.
 
     Args:
         values: samples [SI], shape (q, C).
-        log_map: how they were read.
+        log_map: map of the log.
     """
     for x, ((quantity, joint), channel) in zip(values.T, log_map.channels.items(), strict=True):
         if channel.bits is not None:

@@ -1,4 +1,4 @@
-"""Mistakes in the wiring of a team's log that are looked for: one function each, listed in ``SUSPICIONS``."""
+"""Wiring mistakes of a team's log that are searched for: one function each, listed in ``SUSPICIONS``."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ NAMES: dict[Level, dict[Kind, str]] = {
 
 @dataclass(frozen=True)
 class Mistake:
-    """One thing that may be wrong with some robots' channels.
+    """A possible mistake in some robots' channels.
 
     Attributes:
         kind: name of the mistake in reports.
-        robots: robots concerned, from 0.
+        robots: affected robots, from 0.
         who: the robots in words.
-        channels: channels concerned, as in ``CHANNELS[level]``.
+        channels: affected channels, as in ``CHANNELS[level]``.
         what: the mistake in words, without the robots.
-        subject: what it is about, the same for its opposite.
-        undo: makes signals as they would be without it.
+        subject: topic in words, shared with the opposite mistake.
+        undo: returns signals with the mistake undone.
         sizes: its numbers for reports, by name.
-        resized: the same mistake with another size, where its size has to be fitted.
+        resized: returns the same mistake with another size, if its size must be fitted.
     """
 
     kind: str
@@ -54,7 +54,7 @@ class Mistake:
         return f"{self.who}: {self.what}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         return {
             "kind": self.kind,
             "robots": [robot + 1 for robot in self.robots],
@@ -65,7 +65,7 @@ class Mistake:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Words with commas and an "and"."""
+    """Join words with commas and an "and"."""
     if len(words) < 2:
         return "".join(words)
     return ", ".join(words[:-1]) + " and " + words[-1]
@@ -78,19 +78,19 @@ def _numbered(robots: Sequence[int], team: int) -> str:
 
 
 def _teams(team: int) -> Iterator[tuple[tuple[int, ...], str]]:
-    """All robots together, then each alone; and in words."""
+    """Yield all robots together, then each alone, with their description in words."""
     every = [tuple(range(team))] if team > 1 else []
     for robots in (*every, *((robot,) for robot in range(team))):
         yield robots, _numbered(robots, team)
 
 
 def _channels(level: Level, *kinds: Kind) -> tuple[str, ...]:
-    """Names of the three channels of each group."""
+    """Return the names of the three channels of each group."""
     return tuple(CHANNELS[level][3 * KINDS.index(kind) + k] for kind in kinds for k in range(3))
 
 
 def _mapped(signals: Signals, kinds: Sequence[Kind], robots: Sequence[int], **change: Any) -> Signals:
-    """Groups of some robots as ``Group.mapped`` changes them."""
+    """Return signals with groups of some robots changed by ``Group.mapped``."""
     return signals.having(**{kind: signals.group(kind).mapped(robots, **change) for kind in kinds})
 
 
@@ -105,14 +105,14 @@ UNITS: dict[Level, dict[Kind, tuple[tuple[str, float], ...]]] = {
     "joint": {"theta": ANGLES, "position": ANGLES, "effort": TORQUES},
     "wrist": {"theta": ANGLES, "position": LENGTHS, "effort": FORCES},
 }
-"""Units in words and factors from the logged number to SI."""
+"""Units in words, and factors from the logged number to SI."""
 COUNTS_FROM_RAD = 50.0
-"""Angles beyond this are tried as encoder counts."""
+"""Angle above which encoder counts are tried as the unit [rad]."""
 COUNT_BITS = tuple(range(8, 25))
 
 
 def wrong_unit(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
-    """Degrees, thousands and encoder counts, of all robots and of each."""
+    """Yield wrong units: degrees, factors of a thousand and encoder counts, for all robots and for each."""
     level = signals.level
     counts = [(f"in counts of 2^{bits} per turn, not radians", 2 * np.pi / 2**bits) for bits in COUNT_BITS]
     for robots, who in _teams(signals.robots):
@@ -152,20 +152,20 @@ def rearranged(
     orders: Sequence[Three] = (SAME_ORDER,),
     signs: Sequence[Three] = SIGNS,
 ) -> Iterator[Mistake]:
-    """Three channels in another order or with other signs, of all robots and of each.
+    """Yield three channels in another order or with other signs, for all robots and for each.
 
     Args:
-        signals: the team's channels.
-        design: the robots' numbers.
+        signals: channels of the team.
+        design: design of the robots.
         kind: name of the mistake in reports.
-        level: the only level at which it is looked for; None for both.
+        level: the only level at which it is tried; None for both.
         groups: groups that are rearranged together.
-        orders, signs: those that are tried: the true channel k is ``signs[k]`` times the logged ``order[k]``.
+        orders, signs: orders and signs to try: the true channel k is ``signs[k]`` times the logged ``order[k]``.
     """
     if level not in (None, signals.level):
         return
     for (robots, who), together, order, turned in product(_teams(signals.robots), groups, orders, signs):
-        # Signs of torques or forces alone are a suspicion of their own.
+        # Signs of torques or forces alone are a separate suspicion.
         elsewhere = len(orders) > 1 and together == ("effort",)
         if order == SAME_ORDER and (turned == SAME_SIGNS or elsewhere):
             continue
@@ -200,14 +200,14 @@ def _rearranged_words(
 # Columns of others
 
 MOST_AT_ONCE = 3
-"""Robots of a cycle; looked for in teams of one robot more at most."""
+"""Largest number of robots in a cycle; cycles are tried in teams of at most one robot more."""
 
 
 def swapped_robots(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
-    """One group of every pair, and of every cycle of three in small teams (in large ones, one pair after the other).
+    """Yield exchanges of one group within every pair of robots and, in small teams, within every cycle of three.
 
-    Exchanging *all* groups of two robots only renumbers them, which no data tell; so an exchanged phi is the same as
-    exchanged theta and tau.
+    An exchange of *all* groups of two robots only renumbers them, which no data can show. An exchanged phi is
+    therefore the same as exchanged theta and tau.
     """
     level, N = signals.level, signals.robots
     cycles = [(pair, pair[::-1]) for pair in combinations(range(N), 2)]
@@ -238,7 +238,7 @@ def swapped_robots(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
 
 
 def exchanged_groups(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
-    """Every pair of groups in each other's columns, of all robots and of each."""
+    """Yield exchanges of every pair of groups, for all robots and for each."""
     level = signals.level
     for (robots, who), pair in product(_teams(signals.robots), combinations(KINDS, 2)):
         named = " and ".join(NAMES[level][kind] for kind in pair)
@@ -254,7 +254,10 @@ def exchanged_groups(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]
 
 
 def _taken(signals: Signals, robots: Sequence[int], of: Sequence[int], kinds: tuple[Kind, Kind]) -> Signals:
-    """Signals in which each of two groups of some robots, or one group, holds what robots ``of`` have in the other."""
+    """Return signals in which ``robots`` take each of two groups from the other group of robots ``of``.
+
+    The two kinds may be equal; then one group moves between robots.
+    """
     first, second = (signals.group(kind) for kind in kinds)
     return signals.having(
         **{kinds[0]: first.taken(robots, second, of), kinds[1]: second.taken(robots, first, of)}
@@ -265,11 +268,11 @@ def _taken(signals: Signals, robots: Sequence[int], of: Sequence[int], kinds: tu
 
 STEP_RAD = float(np.deg2rad(15.0))
 STEPS = tuple(k for k in range(-6, 7) if k)
-"""Offsets of one joint that are tried, in steps, before the best is refined."""
+"""Offsets of one joint that are tried before the best is refined, in units of ``STEP_RAD``."""
 
 
 def wrong_zero(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
-    """Positions that count from elsewhere, then every encoder with another zero; of all robots and of each."""
+    """Yield positions with another origin, then every encoder with another zero; for all robots and for each."""
     yield from _other_origin(signals, design)
     kinds: tuple[Kind, ...] = ("position", "theta") if signals.level == "joint" else ("theta",)
     for (robots, who), kind, joint, k in product(_teams(signals.robots), kinds, range(3), STEPS):
@@ -277,7 +280,7 @@ def wrong_zero(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
 
 
 def _other_origin(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
-    """Positions that count from another posture, or the other way."""
+    """Yield positions that count from another posture or in the other direction."""
     joint, name = signals.level == "joint", NAMES[signals.level]["position"]
     home = np.array([0.0, 0.0, design.home_height_m])
     x, y, z = (float(x) for x in (inverse_kinematics(home, design) if joint else home))
@@ -296,7 +299,7 @@ def _other_origin(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
 def _shifted(
     level: Level, robots: tuple[int, ...], who: str, kind: Kind, joint: int, offset_rad: float
 ) -> Mistake:
-    """One encoder to whose angle an offset has to be added."""
+    """Return the mistake of one encoder, to whose angle an offset must be added."""
     channel, amount = _channels(level, kind)[joint], np.rad2deg(abs(offset_rad))
     why = ""
     if len(robots) > 1:
@@ -316,11 +319,11 @@ def _shifted(
 
 
 def refined(mistake: Mistake, total: Callable[[Mistake], float]) -> Mistake:
-    """A mistake with its size fitted, where it has one.
+    """Return a mistake with its size fitted, if it has one.
 
     Args:
-        mistake: as it was tried.
-        total: the misfit that is left with a mistake undone.
+        mistake: the mistake as tried.
+        total: returns the misfit that remains with a mistake undone.
     """
     if mistake.resized is None:
         return mistake
@@ -352,4 +355,4 @@ SUSPICIONS: tuple[Callable[[Signals, OmnidDesign], Iterator[Mistake]], ...] = (
     exchanged_groups,
     wrong_zero,
 )
-"""In the order in which they are believed where the data cannot tell them apart."""
+"""Suspicions in order of plausibility; the first wins if the data cannot distinguish them."""

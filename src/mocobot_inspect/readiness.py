@@ -1,4 +1,4 @@
-"""What an estimate would make of the log: excitation of every step, and what it is ready for."""
+"""Excitation of every step of an estimate from a log, and what can be estimated."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from mocobot_logs.log import Level
 QUANTITIES = ("grasps", "mass", "centre of mass", "inertia")
 AXES = ("roll", "pitch", "yaw")
 """Rotation about x, y and z of {1}."""
-_HARDLY = 0.1  # of the rotation about the liveliest axis
+_HARDLY = 0.1  # of the rotation about the axis with most motion
 _ALONG = np.cos(np.deg2rad(20.0))
 
 
@@ -32,10 +32,10 @@ class Readiness:
 
     Attributes:
         steps: excitation of every step of the estimate.
-        holds: static holds found.
+        holds: number of static holds.
         axes: angular velocity about x, y, z of {1} [rad/s rms], or None.
-        reasons: for every one of ``QUANTITIES`` why it cannot be had, None where it can.
-        flags: what the estimate itself doubts.
+        reasons: why each of ``QUANTITIES`` cannot be estimated, None if it can.
+        flags: warnings of the estimate itself.
     """
 
     steps: tuple[StepReport, ...]
@@ -49,10 +49,10 @@ def readiness(name: str, level: Level, parts: Sequence[tuple[float, Array]], arm
     """Run the estimate and report on its steps.
 
     Args:
-        name: the log's name.
-        level: what the channels are.
-        parts: uniform stretches: first instant [s] and samples (q, N, 9) at 100 Hz.
-        arms: the robots as they are, or as designed.
+        name: name of the log.
+        level: level of the channels.
+        parts: uniform stretches: start [s] and samples (q, N, 9) at 100 Hz.
+        arms: the robots as calibrated, or as designed.
     """
     try:
         with np.errstate(over="raise", divide="raise"):
@@ -89,7 +89,7 @@ def _processed(name: str, level: Level, part: Array, start_s: float, arms: Arms)
 
 
 def _reasons(estimate: PayloadEstimate, omega: Array) -> dict[str, str | None]:
-    """Why each of ``QUANTITIES`` cannot be had."""
+    """Return why each of ``QUANTITIES`` cannot be estimated, None if it can."""
     grasps = estimate.grasps is not None
     weak = [direction for step in estimate.steps for direction in step.weak]
     turning = (step.noise for step in estimate.steps if step.step.startswith("rotation"))
@@ -114,7 +114,7 @@ def _reasons(estimate: PayloadEstimate, omega: Array) -> dict[str, str | None]:
 
 
 def idle_axes(omega: Array, noise: float) -> list[str]:
-    """Axes of {1} about which there is hardly any rotation, in words; none where the idle axis is oblique.
+    """Return the axes of {1} about which there is hardly any rotation, in words; oblique axes are left out.
 
     Args:
         omega: angular velocities in {1} [rad/s], shape (Q, 3).

@@ -1,28 +1,30 @@
-"""An inspection as text and as strict JSON: no NaN, null where something is not known. SI units; robots count from 1.
+"""Format an inspection as text and as strict JSON: SI units, robots count from 1, null for NaN and unknown values.
 
 JSON of a team::
 
     format "mocobot-inspection", version 1
-    log           name, level, robots, channels, assumed_design, calibrated (whether robots are as a calibration
-                has them), free (whether the robots hold nothing)
+    log           name, level, robots, channels, assumed_design, calibrated (whether a calibration describes the
+                  robots), free (whether the robots hold nothing)
     streams       per robot: samples, start_s and duration_s (after the log's first stamp), rate_hz, jitter_rms_s,
                   jitter_max_s, gaps, missing, longest_gap_s, longest_gap_at_s, duplicates, repeats, backwards,
                   farthest_back_s, farthest_back_at_s, recorder_s
-                  (least and largest lead of the recorder's time over the stamps)
-    channels      per robot and channel: lowest, highest, nans, infinities, wild (samples that no sensor reads), step,
-                  noise, stuck_count, clipped_count, stuck and clipped (start_s after the robot's first stamp,
-                  duration_s, value, jumps), oscillation (frequency_hz, amplitude, duration_s of a fast line that
-                  stands out of the noise; or null)
-    excerpt       part_s (of a long log, else null), stretches (start_s, duration_s), unchecked (why nothing was)
+                  (smallest and largest lead of the recorder's time over the stamps)
+    channels      per robot and channel: lowest, highest, nans, infinities, wild (samples beyond any sensor's range),
+                  step, noise, stuck_count, clipped_count, stuck and clipped (start_s after the robot's first stamp,
+                  duration_s, value, jumps), oscillation (frequency_hz, amplitude, duration_s of a fast spectral line
+                  above the noise; or null)
+    excerpt       part_s (checked part of a long log, else null), stretches (start_s, duration_s), unchecked (why
+                  nothing was checked)
     segments      still_s, moving_s, rests (start_s, duration_s); or null
     clocks        per robot: offset_s, offset_se_s, drift, drift_se, differs, why_not; or null
     wiring        misfit and misfit_undone (total, relative, scaled, faults, determined, mass_kg, span_m), found (per
                   mistake: kind, robots, channels, sentence, alternatives, misfit_before, misfit_after, and its size),
-                  tried, hidden (mistakes that would not show); or null
-    excitation    as it is, and with the mistakes undone (or null): holds, axes_radps, steps (step, parameters, unit,
-                  rank, condition, singular_values, noise, weak), reasons (null: can be estimated), flags
-    findings      topic and sentence of all that is wrong
-    ready         the last line of the text
+                  tried, hidden (mistakes that these data cannot show); or null
+    excitation    as_it_is, and undone (with the mistakes undone, or null): holds, axes_radps, steps (step,
+                  parameters, unit, rank, condition, singular_values, noise, weak), reasons (null: can be estimated),
+                  flags
+    findings      topic and sentence of each problem
+    ready         last line of the text
 
 JSON of joints::
 
@@ -31,13 +33,13 @@ JSON of joints::
     stamps        as one robot of ``streams``, without start_s
     channels      by column ("q of joint1"): as in an inspection of a team's log
     parts         start_s, duration_s, samples, rate_hz, resampled, notes
-    unchecked     why motion and torques were not looked at, or null
+    unchecked     why motion and torques were not checked, or null
     joints        by joint: moves, misfit and misfit_undone (share of the torque that neither model nor friction
                   explains), gain (of the model's torque), position_step
-    velocity, command     by joint: gain, gain_se, delay_s (null where noise hides it), delay_se_s, correlation,
-                  possible (correlation that noise leaves)
+    velocity, command     by joint: gain, gain_se, delay_s (null if noise hides it), delay_se_s, correlation,
+                  possible (largest correlation that the noise allows)
     torque_delay  delay_s, delay_se_s, before, after; or null
-    payload       whether the torques are those of a robot that carries something that the model lacks
+    payload       whether the torques show a payload that the model lacks
     mistakes      kind, joints, sentence, alternatives, misfit_before, misfit_after
     findings, ready     as above
 """
@@ -75,7 +77,7 @@ _JOINT_UNITS = {
     "voltage": ("V", "V"),
     "flag": ("", ""),
 }
-"""Units of joints that turn and that slide, by the quantity's kind."""
+"""Units of a turning and of a sliding joint, by the quantity's kind."""
 _COMMAND_KINDS = {"position": "position", "velocity": "velocity", "torque": "effort"}
 
 
@@ -83,7 +85,7 @@ _COMMAND_KINDS = {"position": "position", "velocity": "velocity", "torque": "eff
 
 
 def format_inspection(found: Inspection | JointInspection) -> str:
-    """Readable report; the last line says what the log is ready for."""
+    """Return a readable report; its last line says what the log is ready for."""
     joints = isinstance(found, JointInspection)
     wrong = [f"    - {finding.sentence}" for finding in findings(found)]
     lines = [*(_joint_lines(found) if joints else _team_lines(found))]
@@ -99,7 +101,7 @@ def _plural(count: int, what: str) -> str:
 
 
 def _channel_row(name: str, width: int, channels: Sequence[Channel], unit: str) -> str:
-    """Extremes of a channel over some robots, coarsest step and largest noise."""
+    """Format a channel's extremes, coarsest step and largest noise over some robots."""
     low = min((c.lowest for c in channels if c.lowest is not None), default=None)
     high = max((c.highest for c in channels if c.highest is not None), default=None)
     if low is None or high is None:
@@ -214,7 +216,7 @@ def _wiring_lines(wiring: Wiring) -> Iterator[str]:
 
 
 def _hidden_words(mistakes: Sequence[Mistake]) -> list[str]:
-    """Mistakes that would not show, put together by subject: the robots of each."""
+    """Group mistakes that these data cannot show by subject, with the robots of each."""
     robots: dict[str, dict[str, None]] = {}
     for mistake in mistakes:
         robots.setdefault(mistake.subject, {})[mistake.who] = None
@@ -282,7 +284,7 @@ def _joint_motion(found: JointInspection) -> Iterator[str]:
 
 
 def later(delay_s: float, se_s: float) -> str:
-    """By how much one thing follows another, or comes before it."""
+    """Format the delay of one signal behind or ahead of another."""
     if np.isnan(delay_s):
         return "by a delay that noise hides"
     return f"{milliseconds(delay_s, se_s)} {'earlier' if delay_s < 0 else 'later'}"
@@ -292,7 +294,7 @@ def later(delay_s: float, se_s: float) -> str:
 
 
 def ready_line(found: Inspection | JointInspection) -> str:
-    """The verdict in one line: what the log is ready for as it is, or with what done before."""
+    """Return the verdict in one line: what the log is ready for, as it is or after corrections."""
     return f"ready for: {_joint_ready(found) if isinstance(found, JointInspection) else _team_ready(found)}"
 
 
@@ -318,7 +320,7 @@ def _team_ready(found: Inspection) -> str:
         before.insert(0, "absurd values left out (convert --drop)")
     if before:
         good = f"{_AS_IT_IS}{' and '.join(before)}: {good}"
-    # What a conversion has to do before, or an estimate refuses the log.
+    # Conversions that must come first: without them an estimate refuses the log.
     if any(t.backwards for t in found.survey.timing):
         good += "; time that runs back to be mended"
     if any(c.nans for c in channels):
@@ -329,7 +331,7 @@ def _team_ready(found: Inspection) -> str:
 
 
 def _never_ready(found: Inspection) -> str | None:
-    """Why nothing can be done with a log, or None. An estimate takes all of it: a channel that stands spoils it."""
+    """Return why the log is ready for nothing, or None. An estimate uses every channel, so a constant one spoils it."""
     if found.unchecked is not None:
         return found.unchecked
     dead = [stands.channel for stands in found.standing if stands.mostly][:_HIDDEN]
@@ -351,12 +353,12 @@ def _mistakes_above(wiring: Wiring) -> str:
 
 
 def _gap(t: Timing) -> bool:
-    """Whether samples are missing for too long to be filled in."""
+    """Return whether a gap is too long to be filled."""
     return t.rate_hz is not None and t.longest_gap_s > MAX_GAP_S + 1 / t.rate_hz
 
 
 def verdict(ready: Readiness) -> str:
-    """Yes or no for every quantity, with the reason."""
+    """Format yes or no for each quantity, with the reason."""
     same = set(ready.reasons.values())
     if len(same) == 1 and None not in same:
         return f"nothing ({same.pop()})"
@@ -391,19 +393,19 @@ def _joint_ready(found: JointInspection) -> str:
 
 
 def inspection_dict(found: Inspection | JointInspection) -> dict[str, Any]:
-    """Plain JSON values, see above."""
+    """Return the inspection as plain JSON values; the module's docstring lists the keys."""
     own = _joint_dict(found) if isinstance(found, JointInspection) else _team_dict(found)
     told = own | {"findings": findings(found), "ready": ready_line(found)}
     return msgspec.json.decode(msgspec.json.encode(told, enc_hook=lambda number: number.item()))
 
 
 def _without(record: Any, *left_out: str) -> dict[str, Any]:
-    """Fields of a dataclass by name, without some."""
+    """Return the fields of a dataclass by name, without some."""
     return _only(record, *(f.name for f in fields(record) if f.name not in left_out))
 
 
 def _only(record: Any, *names: str) -> dict[str, Any]:
-    """Some attributes of an object by name."""
+    """Return some attributes of an object by name."""
     return {name: getattr(record, name) for name in names}
 
 

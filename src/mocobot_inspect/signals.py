@@ -1,7 +1,7 @@
-"""What the wiring of a team's log is judged by: filtered channels with their rates, at a few hundred instants.
+"""Signals for the wiring check of a team's log: filtered channels with their derivatives, at a few hundred instants.
 
-Wiring mistakes permute, turn round, scale and shift channels. All of that commutes with filters and differences, so a
-mistake is undone on these few numbers and not on the log.
+Wiring mistakes permute, negate, scale and shift channels. These operations commute with filters and differences. A
+mistake can therefore be undone on these few numbers instead of the log.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ KINDS: tuple[Kind, ...] = ("position", "theta", "effort")
 RATE_HZ = 100.0
 CUTOFF_HZ = 5.0
 TRIM_S = 1.0
-"""Transients of the filter die as exp(-pi 5 Hz t): 1e-7 of them is left."""
+"""Time dropped at either end [s]; the filter's transients decay as exp(-pi 5 Hz t), to 1e-7 here."""
 INSTANTS = 200
 
 
@@ -46,7 +46,8 @@ class Group:
         factors: Sequence[float] | float = 1.0,
         offset: Sequence[float] | float = 0.0,
     ) -> Group:
-        """Channel k of some robots is channel ``order[k]`` times ``factors[k]``, plus ``offset[k]`` [SI]."""
+        """Return the group with channel k of some robots replaced by ``factors[k]`` times channel ``order[k]`` plus
+        ``offset[k]``."""
         values, noise = self.values.copy(), self.noise.copy()
         columns, gains = list(order), np.asarray(factors, dtype=float)
         for robot in robots:
@@ -56,7 +57,7 @@ class Group:
         return Group(values, noise)
 
     def taken(self, robots: Sequence[int], other: Group, of: Sequence[int]) -> Group:
-        """Some robots get what robots ``of`` have in another group."""
+        """Return the group in which ``robots`` have the channels of robots ``of`` in another group."""
         values, noise = self.values.copy(), self.noise.copy()
         at, source = list(robots), list(of)
         values[:, :, at], noise[at] = other.values[:, :, source], other.noise[source]
@@ -65,7 +66,7 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """A team's channels.
+    """Channels of a team.
 
     Attributes:
         level: joint (phi, theta, tau) or wrist (h, theta, force).
@@ -85,19 +86,19 @@ class Signals:
         return self.theta.values.shape[2]
 
     def group(self, kind: Kind) -> Group:
-        """One of the three groups."""
+        """Return one of the three groups."""
         return getattr(self, kind)
 
     def having(self, **groups: Group) -> Signals:
-        """The same with other groups, by kind."""
+        """Return the signals with some groups replaced, by kind."""
         return replace(self, **groups)
 
 
 def signals_of(level: Level, stretches: Sequence[Array], noise: Array) -> Signals:
-    """Filter uniform stretches of a log and pick ``INSTANTS`` evenly.
+    """Filter uniform stretches of a log and pick ``INSTANTS`` evenly spaced instants.
 
     Args:
-        level: what the channels are.
+        level: level of the channels.
         stretches: samples at ``RATE_HZ``, each (q, N, 9) in the order of ``CHANNELS[level]``; each longer than
             twice ``TRIM_S``.
         noise: white noise of every channel [SI], shape (N, 9).
@@ -114,14 +115,14 @@ def signals_of(level: Level, stretches: Sequence[Array], noise: Array) -> Signal
 
 
 def of_arrays(level: Level, values: Array, noise: Array) -> Signals:
-    """Signals from nine channels: values (3, Q, N, 9) and their noise (N, 9)."""
+    """Return signals from nine channels: values (3, Q, N, 9) and their noise (N, 9)."""
     groups = [Group(values[..., 3 * k : 3 * k + 3], noise[:, 3 * k : 3 * k + 3]) for k in range(3)]
     return Signals(level, *groups)
 
 
 @cache
 def noise_gains() -> tuple[float, float, float]:
-    """Noise of filtered samples, their rates and accelerations over that of one raw sample [1, 1/s, 1/s^2]."""
+    """Return noise of filtered samples, rates and accelerations over that of a raw sample [1, 1/s, 1/s^2]."""
     impulse = np.zeros(1001)
     impulse[500] = 1.0
     value = low_pass(impulse, RATE_HZ, CUTOFF_HZ)

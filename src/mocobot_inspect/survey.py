@@ -1,4 +1,5 @@
-"""One pass over a log of any length: stamps and channels of every robot, and an excerpt for what needs many samples."""
+"""Scan a log of any length once: stamps and channels of every robot, and an excerpt for tests that need many
+samples."""
 
 from __future__ import annotations
 
@@ -12,13 +13,14 @@ from mocobot_inspect.channels import Channel, ChannelTally, seconds
 from mocobot_logs.log import CHANNELS, NS, LogSource, Samples, joined
 
 GAP = 1.5
-"""Intervals longer than this many periods lack samples."""
-_FIRST = 4096  # intervals that tell the period
+"""Length of an interval, in periods, above which samples are missing."""
+_FIRST = 4096  # number of intervals that determine the period
 BLOCK_ROWS = 20_000
-"""Rows looked at together."""
+"""Number of rows that are analysed together."""
 EXCERPT_S = 600.0
 EXCERPT_ROWS = 4_000_000
-"""Longest excerpt, in time and in rows of all robots; a longer log is looked at in its liveliest part."""
+"""Longest excerpt [s], and its largest number of rows of all robots; of a longer log, the part with most motion is
+taken."""
 _BIN_S = 10.0
 
 
@@ -27,17 +29,17 @@ class Timing:
     """Stamps of one robot.
 
     Attributes:
-        samples: rows of the log, without those that repeat the one before.
+        samples: rows of the log, without those that repeat the previous reading.
         first_ns, last_ns: first and last stamp in the log's order [ns], None without rows.
         rate_hz: samples per second between gaps [Hz], or None.
-        jitter_rms_s, jitter_max_s: how far intervals are from the period, gaps left out [s].
-        gaps: intervals that lack samples.
-        missing: samples that they lack.
-        longest_gap_s, longest_gap_at_s: longest such interval, and when it begins after the first stamp [s].
-        duplicates: stamps that repeat the one before.
-        repeats: rows that repeat the one before but for the stamp; they are no samples.
-        backwards: stamps earlier than the one before.
-        farthest_back_s, farthest_back_at_s: by how much at most, and when the one before is, after the first [s].
+        jitter_rms_s, jitter_max_s: deviation of intervals from the period, without gaps [s].
+        gaps: number of intervals in which samples are missing.
+        missing: number of missing samples.
+        longest_gap_s, longest_gap_at_s: longest such interval, and its start after the first stamp [s].
+        duplicates: stamps equal to the previous one.
+        repeats: rows that hold the previous reading again under a later stamp; they do not count as samples.
+        backwards: stamps earlier than the previous one.
+        farthest_back_s, farthest_back_at_s: largest backward step, and its start after the first stamp [s].
         recorder_s: smallest and largest lead of the recorder's time over the stamps [s], or None.
     """
 
@@ -60,22 +62,22 @@ class Timing:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last stamp [s]."""
+        """Time from the first to the last stamp [s]."""
         return 0.0 if self.first_ns is None or self.last_ns is None else (self.last_ns - self.first_ns) * NS
 
 
 class TimingTally:
-    """Counts stamps as they come; memory does not grow with the log."""
+    """Counts stamps chunk by chunk; memory does not grow with the log."""
 
     def __init__(self) -> None:
-        """Start without any."""
+        """Start without stamps."""
         self._timing = Timing()
         self._period_s: float | None = None
         self._regular, self._regular_s, self._squares = 0, 0.0, 0.0
-        self._waiting: list[NDArray] = []  # intervals and when they begin, until the period is known
+        self._waiting: list[NDArray] = []  # intervals and their starts, until the period is known
 
     def add(self, samples: Samples) -> None:
-        """Count the stamps of a chunk, and the recorder's times where there are."""
+        """Count the stamps of a chunk, and the recorder's times if given."""
         t, stamp_ns = self._timing, samples.stamp_ns
         if not len(stamp_ns):
             return
@@ -95,7 +97,7 @@ class TimingTally:
             self._settle()
 
     def _settle(self) -> None:
-        """Count the intervals that are waiting for the period."""
+        """Count the waiting intervals."""
         t = self._timing
         intervals, at = np.concatenate(self._waiting, axis=1) if self._waiting else np.zeros((2, 0))
         self._waiting = []
@@ -124,7 +126,7 @@ class TimingTally:
                 t.longest_gap_s, t.longest_gap_at_s = float(intervals[k]), float(at[k])
 
     def finish(self) -> Timing:
-        """What was counted."""
+        """Return the counts."""
         self._settle()
         mean_s = self._regular_s / self._regular if self._regular else None
         self._timing.rate_hz = 1.0 / mean_s if mean_s else None
@@ -134,12 +136,12 @@ class TimingTally:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """What a log holds.
+    """Contents of a log.
 
     Attributes:
         timing, channels: per robot.
-        excerpt: samples of every robot, those of the whole log or of a part.
-        excerpt_s: beginning and end of the part after the log's first stamp [s], or None for the whole log.
+        excerpt: samples of every robot, of the whole log or of a part.
+        excerpt_s: start and end of the part after the log's first stamp [s], or None for the whole log.
         whole: stamps of the samples that lack no value, per robot.
     """
 
@@ -151,14 +153,12 @@ class Survey:
 
     @property
     def origin_ns(self) -> int:
-        """The log's first stamp [ns]."""
+        """First stamp of the log [ns]."""
         return min((t.first_ns for t in self.timing if t.first_ns is not None), default=0)
 
 
 def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None) -> Survey:
-    """Read a log; memory is bounded by blocks and the excerpt.
-
-    A log too long for the excerpt is read twice.
+    """Scan a log with bounded memory; a log too long for the excerpt is read twice.
 
     Raises:
         InputError: the log cannot be read.
@@ -186,7 +186,8 @@ def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None)
 
 
 def _as_read(channels: tuple[Channel, ...], source: LogSource, robot: int) -> tuple[Channel, ...]:
-    """Channels with the steps that a converted recording tells of, as its samples show none any more."""
+    """Return channels with the rounding steps in a converted recording's metadata, since its samples no longer show
+    them."""
     told = None if source.metadata is None else source.metadata.sampling
     if told is None or told[robot].level != source.level:
         return channels
@@ -198,15 +199,15 @@ def _as_read(channels: tuple[Channel, ...], source: LogSource, robot: int) -> tu
 
 
 class _Robot:
-    """One robot's stream.
+    """Stream of one robot.
 
     Attributes:
-        channels: its channels.
+        channels: statistics of its channels.
         stamps: its stamps, and those of the samples that lack no value.
         kept: samples for the excerpt, None once they are too many.
         first_ns: first stamp, None without samples.
         lively: motion of the gimbal by time bin.
-        rows_per_bin: most samples of a bin.
+        rows_per_bin: largest number of samples in a bin.
     """
 
     def __init__(self, source: LogSource) -> None:
@@ -220,7 +221,7 @@ class _Robot:
         self._kept_rows = self._waiting_rows = 0
 
     def push(self, samples: Samples, most_rows: int) -> None:
-        """Take samples, at least one; the excerpt holds so many at most."""
+        """Add at least one sample; the excerpt holds ``most_rows`` at most."""
         if self.first_ns is None:
             self.first_ns = int(samples.stamp_ns[0])
         full = ~np.isnan(samples.values).any(axis=1)
@@ -238,7 +239,7 @@ class _Robot:
                 self.kept = None
 
     def look(self) -> None:
-        """Look at the samples that wait for it."""
+        """Analyse the waiting samples."""
         block = joined(self._waiting, self._width)
         self._waiting, self._waiting_rows = [], 0
         if not len(block.stamp_ns) or self.first_ns is None:
@@ -257,7 +258,7 @@ class _Robot:
 
 
 def _liveliest(robots: list[_Robot], most_rows: int) -> tuple[int, int, tuple[float, float]]:
-    """Stamps between which the gimbals move most [ns], and the same after the first stamp [s]."""
+    """Return the stamps between which the gimbals move most [ns], and the same times after the first stamp [s]."""
     origin = min(robot.first_ns for robot in robots if robot.first_ns is not None)
     total: dict[int, float] = {}
     for robot in robots:

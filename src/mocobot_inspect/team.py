@@ -1,4 +1,4 @@
-"""Inspection of a team's log: everything that can be said about it before anyone trusts a number from it."""
+"""Inspect a team's log: stamps, channels, clocks, wiring and excitation."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from mocobot_inspect.team_wiring import Wiring, check_wiring
 from mocobot_logs.log import NS, THETA, Level, LogSource, Samples
 
 SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
-"""Rates within which samples are taken for those of a robot."""
+"""Slowest and fastest plausible sample rate of a robot [Hz]."""
 OFFSET_S = 2e-4
-"""Clocks that differ by more than this, and by more than five standard errors, do differ."""
+"""Smallest offset of a clock that is reported [s]; it must also exceed five standard errors."""
 SIGMAS = 5.0
 MOSTLY = 0.5
-"""A channel that stands for more than this share of its log is wrong as a whole."""
+"""Share of the log above which a constant channel is faulty as a whole."""
 MAX_GAP_S = 0.05
 SHORTEST_S = 2 * TRIM_S + 2.0
 WINDOW_S = 0.5
-_PERIODS = 3.5  # a gap in a slow log
+_PERIODS = 3.5  # median intervals: a longer one is a gap in a slow log
 _LEAST_NOISE = 1e-9
-"""No channel is known better [rad, m, N m, N]: where nothing moves at all, rounding errors would pass for motion."""
+"""Smallest noise of a channel [rad, m, N m, N], so that rounding errors of a still robot do not count as motion."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Segments:
 
     Attributes:
         still_s, moving_s: time at rest and in motion [s].
-        rests: stretches of rest (first instant, duration) [s], those long enough for a static hold.
+        rests: stretches of rest long enough for a static hold (start, duration) [s].
     """
 
     still_s: float
@@ -57,8 +57,8 @@ class Standing:
 
     Attributes:
         channel: its name, robot included.
-        seconds: for how long in all.
-        mostly: whether for so much of the log that nothing is left without.
+        seconds: total duration [s].
+        mostly: whether it lasts for at least ``MOSTLY`` of the log.
     """
 
     channel: str
@@ -68,23 +68,23 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """What was found in a log.
+    """Results of the inspection of a log.
 
     Attributes:
-        name, level, robots, channel_names: the log.
-        assumed_design: whether the robots' numbers are not the log's own.
-        design: the robots' numbers.
+        name, level, robots, channel_names: properties of the log.
+        assumed_design: whether the log lacks the robots' design, so that one was assumed.
+        design: the robots' design.
         survey: stamps and channels of every robot.
-        checked: stretches looked at, first instant and duration after the log's first stamp [s].
-        unchecked: why motion and forces could not be looked at, or None.
+        checked: checked stretches: start after the log's first stamp and duration [s].
+        unchecked: why motion and forces were not checked, or None.
         clocks: clocks of the robots, or None.
-        skewed: whether they differ; everything below then holds with that taken out.
+        skewed: whether the clocks differ; all results below are then corrected for that.
         segments: rest and motion, or None.
         wiring: suspected mistakes, or None.
-        ready: what the log is good for as it is, or None.
-        ready_undone: the same with all mistakes found undone, or None where there is none.
-        units: the robots as they are, where a calibration says, or None.
-        free: whether the robots hold nothing: there are neither ``clocks`` nor ``wiring`` nor ``ready`` then.
+        ready: what the log is ready for as it is, or None.
+        ready_undone: the same with all found mistakes undone, or None if there are none.
+        units: the robots as calibrated, or None.
+        free: whether the robots hold nothing; then ``clocks``, ``wiring`` and ``ready`` are None.
     """
 
     name: str
@@ -107,12 +107,12 @@ class Inspection:
 
     @property
     def arms(self) -> Arms:
-        """The robots as they are, or as designed."""
+        """The robots as calibrated, or else as designed."""
         return self.design if self.units is None else self.units
 
     @property
     def standing(self) -> tuple[Standing, ...]:
-        """Channels that are stuck or clipped at times, all of them harmful to an estimate from the log as it is."""
+        """Channels that are stuck or clipped at times; each spoils an estimate from the log as it is."""
         found = []
         for robot, channels in enumerate(self.survey.channels):
             least_s = MOSTLY * self.survey.timing[robot].duration_s
@@ -132,15 +132,15 @@ def inspect_log(
     trial: str | None = None,
     units: ArmUnit | None = None,
 ) -> Inspection:
-    """Look at a log; whatever is wrong with its samples is reported and not refused.
+    """Inspect a log; faulty samples are reported, not refused.
 
     Args:
         source: the log.
-        design: the robots' numbers, where the log does not say.
-        advance: takes the progress made in reading, in the source's units.
-        try_advance: takes the number of wiring mistakes tried.
-        trial: kind of trial, where the log does not say.
-        units: the robots as they are; None for what the log says.
+        design: the robots' design, used if the log has none.
+        advance: called with the reading progress, in the source's units.
+        try_advance: called with the number of wiring mistakes tried.
+        trial: kind of trial, used if the log does not state it.
+        units: the robots as calibrated; None to use those of the log.
 
     Raises:
         InputError: the log cannot be read.
@@ -149,7 +149,7 @@ def inspect_log(
     seen = survey(source, advance)
     free = (said.trial if said is not None else trial) == FREE
     if free:
-        # Nothing turns what holds nothing: gimbals that stand while the arms move are no finding.
+        # Without a payload nothing turns the gimbals, so constant ones are no finding.
         seen = replace(
             seen,
             channels=tuple(
@@ -181,7 +181,7 @@ def inspect_log(
 
 
 def _faulty(channels: tuple[Channel, ...], timing: Timing) -> list[tuple[int, int]]:
-    """Stamps between which a channel is stuck or clipped [ns]; not those of one that nearly always is."""
+    """Return intervals of stamps in which a channel is stuck or clipped [ns], except channels that mostly are."""
     assert timing.first_ns is not None
     found = []
     for every in (stretches for c in channels for stretches in (c.stuck, c.clipped)):
@@ -194,7 +194,7 @@ def _faulty(channels: tuple[Channel, ...], timing: Timing) -> list[tuple[int, in
 def _with_motion(
     result: Inspection, streams: list[tuple[Array, Array]], advance: Callable[[int], object]
 ) -> Inspection:
-    """The inspection with clocks, wiring and readiness, all of uniform stretches."""
+    """Add clocks, wiring and readiness from uniform stretches."""
     parts = stretches(streams)
     clocks = None if result.free else _clocks(parts)
     skewed = clocks is not None and any(differs(clocks, robot) for robot in range(1, result.robots))
@@ -232,26 +232,26 @@ def _with_motion(
 
 
 def _undone(part: Array, wiring: Wiring, level: Level) -> Array:
-    """The samples themselves, shape (q, N, 9), with all mistakes undone."""
+    """Return the samples with all mistakes undone, shape (q, N, 9)."""
     signals = of_arrays(level, part[None], np.zeros(part.shape[1:]))
     for found in wiring.found:
         signals = found.mistake.undo(signals)
     return np.concatenate([signals.group(kind).values[0] for kind in KINDS], axis=2)
 
 
-# Uniform stretches. Unlike resampling for an estimate (``mocobot_logs.resample``) nothing is refused: rows that are not
-# finite or go back in time are left out, gaps split the log, and what is too short is not looked at.
+# Uniform stretches. Unlike ``mocobot_logs.resample``, nothing is refused: rows that are not finite or go back in time
+# are left out, gaps split the log, and short stretches are skipped.
 
 
 def clean_stream(
     samples: Samples, origin_ns: int, faulty: Sequence[tuple[int, int]] = ()
 ) -> tuple[Array, Array]:
-    """One robot's samples, without those that cannot be used; averaged where they come faster than 100 Hz.
+    """Return one robot's usable samples, averaged if they come faster than 100 Hz.
 
     Args:
         samples: the samples.
-        origin_ns: the stamp from which time counts [ns].
-        faulty: stamps between which samples are not to be used [ns].
+        origin_ns: stamp from which time counts [ns].
+        faulty: intervals of stamps to leave out [ns].
 
     Returns:
         Increasing times [s], shape (q,), and the nine channels, all finite, shape (q, 9).
@@ -267,7 +267,7 @@ def clean_stream(
         return time_s, values
     k = round(1.0 / float(np.median(np.diff(time_s))) / RATE_HZ)
     if 2 <= k <= len(time_s):
-        # Means over the output's period: crude against aliases, but what is looked at ends at 5 Hz.
+        # A mean over the output period is a crude anti-alias filter, but only signals up to 5 Hz are used.
         starts = np.arange(0, len(time_s) - k + 1, k)
         time_s = np.asarray(np.add.reduceat(time_s[: starts[-1] + k], starts) / k, dtype=np.float64)
         values = np.asarray(np.add.reduceat(values[: starts[-1] + k], starts, axis=0) / k, dtype=np.float64)
@@ -277,14 +277,14 @@ def clean_stream(
 def stretches(
     streams: Sequence[tuple[Array, Array]], clocks: ClockEstimate | None = None
 ) -> list[tuple[float, Array]]:
-    """Uniform stretches that all robots share.
+    """Return uniform stretches that all robots share.
 
     Args:
         streams: times [s] and channels of every robot, see ``clean_stream``.
-        clocks: offsets and drifts to be taken out, where they are known.
+        clocks: offsets and drifts to remove, if known.
 
     Returns:
-        For each its first instant [s] and samples at ``RATE_HZ``, shape (q, N, 9).
+        For each stretch its start [s] and samples at ``RATE_HZ``, shape (q, N, 9).
     """
     told = []
     for robot, (time_s, values) in enumerate(streams):
@@ -297,7 +297,7 @@ def stretches(
         shared = _shared(shared, _whole(time_s))
     found = []
     for start, stop in shared:
-        # On the samples of robot 1, so that a log on one grid stays as it is.
+        # The grid starts at a sample of robot 1, so that a log on one grid is unchanged.
         first_time = told[0][0]
         start = float(first_time[np.searchsorted(first_time, start - 1e-7)])
         count = int(np.floor((stop - start) * RATE_HZ + 1e-6)) + 1
@@ -309,7 +309,7 @@ def stretches(
 
 
 def _whole(time_s: Array) -> list[tuple[float, float]]:
-    """Intervals without gaps."""
+    """Return intervals without gaps."""
     if len(time_s) < 4:
         return []
     steps = np.diff(time_s)
@@ -320,7 +320,7 @@ def _whole(time_s: Array) -> list[tuple[float, float]]:
 
 
 def _shared(a: list[tuple[float, float]], b: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intersection of two lists of intervals, both in order."""
+    """Return the intersection of two sorted lists of intervals."""
     both, i, j = [], 0, 0
     while i < len(a) and j < len(b):
         start, stop = max(a[i][0], b[j][0]), min(a[i][1], b[j][1])
@@ -341,14 +341,14 @@ def _at(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def segments(level: Level, parts: Sequence[tuple[float, Array]], design: OmnidDesign) -> Segments:
-    """Judge windows of half a second by the fastest robot.
+    """Classify windows of half a second as rest or motion by the fastest robot.
 
     Args:
-        level: what the channels are.
-        parts: uniform stretches: first instant [s] and samples (q, N, 9) at 100 Hz.
-        design: the robots' numbers.
+        level: level of the channels.
+        parts: uniform stretches: start [s] and samples (q, N, 9) at 100 Hz.
+        design: the robots' design.
     """
-    # The wrist's speed in order of magnitude: of a driven rate at joint level.
+    # Order of magnitude of the wrist's speed; at joint level from a driven joint's rate.
     lever = 1.0 if level == "wrist" else design.proximal_length_m
     window, drop = round(WINDOW_S * RATE_HZ), round(TRIM_S * RATE_HZ)
     still_s = moving_s = 0.0
@@ -369,7 +369,7 @@ def segments(level: Level, parts: Sequence[tuple[float, Array]], design: OmnidDe
 
 
 def _clocks(parts: list[tuple[float, Array]]) -> ClockEstimate | None:
-    """From the longest stretch, by its own count of time."""
+    """Estimate clocks from the longest stretch."""
     if not parts or parts[0][1].shape[1] < 2:
         return None
     start, part = max(parts, key=lambda entry: len(entry[1]))
@@ -378,7 +378,7 @@ def _clocks(parts: list[tuple[float, Array]]) -> ClockEstimate | None:
 
 
 def _known(clocks: ClockEstimate, again: ClockEstimate | None) -> ClockEstimate:
-    """What is known of each clock as it is, and of the others with all mistakes undone."""
+    """Combine clock estimates: from the log as it is where known, else from the log with all mistakes undone."""
     if again is None:
         return clocks
     new = np.array([why is not None for why in clocks.why_not])
@@ -395,6 +395,6 @@ def _known(clocks: ClockEstimate, again: ClockEstimate | None) -> ClockEstimate:
 
 
 def differs(clocks: ClockEstimate, robot: int) -> bool:
-    """Whether the clock of a robot (from 0) is known to differ from that of robot 1."""
+    """Return whether the clock of a robot (from 0) differs significantly from that of robot 1."""
     offset, error = clocks.offset_s[robot], clocks.offset_se_s[robot]
     return bool(np.isfinite(offset) and abs(offset) > max(OFFSET_S, SIGMAS * error))

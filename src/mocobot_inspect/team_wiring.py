@@ -1,24 +1,23 @@
-"""Is a team's log wired as it says? Suspected mistakes are undone one by one, and what fits far better is reported.
+"""Find wiring mistakes in a team's log: undo suspected mistakes one by one and report those that fit far better.
 
-All robots hold one rigid payload. Five disagreements follow, each over its own signal and none over zero for a true
-recording without noise:
+All robots hold one rigid payload, which predicts five disagreements to be zero. Each is divided by its own signal:
 
-- rotation: the robots' angular velocities, turned into {1} by the rotations R_1i that fit best;
-- velocity: velocities of the origin of {1} by every robot, with the p_1i that fit best;
-- tilt: the robots' directions of gravity in {1} [rad];
-- force, moment: total force and moment in {1} against the ten inertial parameters that fit best, over the forces that
-  the robots exert, and over those times their distance.
+- rotation: angular velocities of the robots, rotated into {1} by the best-fitting R_1i;
+- velocity: velocities of the origin of {1} from every robot, with the best-fitting p_1i;
+- tilt: directions of gravity in {1} from every robot [rad];
+- force, moment: total wrench in {1} against the ten best-fitting inertial parameters. The force residual is divided by
+  the forces that the robots exert, the moment residual by those forces times their distance.
 
-Without rotation about at least two axes, grasps are open. What is left then: angular *speeds* and the total vertical
-force against one mass.
+Without rotation about at least two axes, the grasps are not identifiable. Then only angular *speeds* and the total
+vertical force, fitted by one mass, are compared.
 
-Every disagreement is put in units of what a healthy robot may show: its tolerance (``TOLERANCES``) and the noise of its
-channels. The misfit is the mean of their squares: about 1 for poorly calibrated robots, hundreds for swapped channels.
+Each disagreement is scaled by what a healthy robot may show: its tolerance (``TOLERANCES``) and the noise of its
+channels. The misfit is the mean of the squares: about 1 for poorly calibrated robots, hundreds for swapped channels.
 
-A misfit beyond ``SUSPICIOUS`` is suspicious; a mistake is found when undoing it makes it ``DECISIVE`` times smaller. A
-smaller misfit may still be a mistake in the log of well calibrated robots: then undoing has to make it ``OVERWHELMING``
-times smaller. Several mistakes are found one after the other, the one that helps most first; in the end each is put
-back alone, and dropped if it hardly matters.
+A misfit above ``SUSPICIOUS`` is suspicious. A mistake is reported if undoing it makes the misfit ``DECISIVE`` times
+smaller. A smaller misfit may still hide a mistake of well calibrated robots; then the factor must be ``OVERWHELMING``.
+Several mistakes are found greedily, the most helpful first. Finally each is put back alone, and dropped if it hardly
+matters.
 """
 
 from __future__ import annotations
@@ -56,26 +55,29 @@ TOLERANCES = {
     "angular speed": 0.01,
     "lift": 0.03,
 }
-"""Disagreement of robots with encoder zeros off by 1 deg, springs by 2 %, lengths by 1 mm (rad for the tilt, else over
-the signal): the largest of four payloads in random, periodic and static trials, rounded up."""
+"""Disagreement of robots with encoder zeros off by 1 deg, springs by 2 % and lengths by 1 mm.
+
+Tilt is in rad, the others are relative to the signal. Measured: the largest of four payloads in random, periodic and
+static trials, rounded up.
+"""
 SUSPICIOUS = 2.0
-"""Misfit beyond which something is wrong; poorly calibrated robots stay below 1."""
+"""Misfit above which something is wrong; poorly calibrated robots stay below 1."""
 FAULT = 1e3
-"""What a fault of all the time adds to the misfit."""
+"""Contribution to the misfit of a fault that lasts all the time."""
 RIGID = ("rotation", "velocity", "tilt", "force", "moment")
 _LEAST_SPAN_M = 0.3
 _RANK = 1e-12
 
 DECISIVE = 4.0
-"""How many times smaller the misfit must become."""
+"""Factor by which undoing mistakes must lower a suspicious misfit."""
 WORTH_TRYING = 0.3
-"""Misfit below which there is nothing to be explained."""
+"""Misfit below which no mistake is searched."""
 OVERWHELMING = 15.0
-"""How many times smaller a misfit that is not suspicious must become."""
+"""Factor by which a mistake must lower a misfit that is not suspicious."""
 HELPS = 1.5
-"""How many times smaller one of several mistakes must make it."""
+"""Factor by which each of several mistakes must lower the misfit."""
 ALIKE = 1.3
-"""Mistakes whose misfits differ by less than this factor cannot be told apart."""
+"""Ratio of misfits below which mistakes cannot be distinguished."""
 MOST = 6
 _REFINED = 6
 
@@ -88,12 +90,12 @@ class Misfit:
 
     Attributes:
         relative: disagreements over their signals (tilt: in rad), by name.
-        scaled: the same over tolerance and noise.
-        faults: why the channels cannot be what they are taken for.
-        determined: whether the payload turns enough to compare grasps.
-        mass_kg: mass that fits best, or None.
+        scaled: disagreements over tolerance and noise, by name.
+        faults: reasons why the channels cannot be what the map says.
+        determined: whether the payload rotates enough to compare grasps.
+        mass_kg: best-fitting mass, or None.
         span_m: largest distance of a grasp from the first one, or None.
-        parts: number of disagreements that there are, those included that were left out.
+        parts: number of disagreements, including those left out.
     """
 
     relative: dict[str, float]
@@ -106,7 +108,7 @@ class Misfit:
 
     @property
     def total(self) -> float:
-        """Mean square of the scaled disagreements, and a large amount for every fault."""
+        """Mean square of the scaled disagreements, plus a large amount for every fault."""
         squares = [value**2 for value in self.scaled.values()]
         mean = sum(squares) / (self.parts or len(squares)) if squares else 0.0
         total = mean + FAULT * sum(f.share for f in self.faults)
@@ -114,12 +116,12 @@ class Misfit:
 
     @property
     def suspicious(self) -> bool:
-        """Whether robots that carry one rigid payload cannot look like this."""
+        """Whether robots that carry one rigid payload cannot cause such a misfit."""
         return self.total > SUSPICIOUS and self.tells
 
     @property
     def tells(self) -> bool:
-        """Whether a misfit means anything: next to no rotation leaves noise to be compared."""
+        """Whether the misfit is meaningful: without rotation only noise would be compared."""
         return self.determined or bool(self.faults)
 
 
@@ -128,9 +130,9 @@ class Found:
     """A mistake that explains the misfit.
 
     Attributes:
-        mistake: what is wrong.
-        alternatives: others that explain it as well.
-        misfit: with all other mistakes undone and this one not.
+        mistake: the mistake.
+        alternatives: other mistakes that explain the misfit as well.
+        misfit: misfit with all other mistakes undone, but not this one.
         after: total misfit with this one undone, too.
     """
 
@@ -141,20 +143,20 @@ class Found:
 
     @property
     def before(self) -> float:
-        """Total misfit with all other mistakes undone and this one not."""
+        """Total misfit with all other mistakes undone, but not this one."""
         return self.misfit.total
 
 
 @dataclass(frozen=True)
 class Wiring:
-    """What the search found.
+    """Result of the search.
 
     Attributes:
         as_is: misfit of the log as it is.
-        found: mistakes, the one that matters most first; empty when none is found.
+        found: mistakes, the most important first; empty if none is found.
         undone: misfit with all of them undone.
-        hidden: mistakes that would not show in these data.
-        tried: number of mistakes looked for.
+        hidden: mistakes that these data could not show.
+        tried: number of mistakes tried.
     """
 
     as_is: Misfit
@@ -165,18 +167,18 @@ class Wiring:
 
 
 class Team:
-    """Misfits of one log with mistakes undone.
+    """Computes the misfit of one log with mistakes undone.
 
-    Most mistakes leave a robot the arm or the gimbal that another mistake gave it: these are worked out once.
+    Motions of arms and gimbals are cached, since most mistakes leave them unchanged.
     """
 
     def __init__(self, signals: Signals, arms: Arms, known: dict[Any, Any] | None = None) -> None:
-        """Work out every robot's motion.
+        """Compute every robot's motion.
 
         Args:
-            signals: the team's channels.
-            arms: the robots as they are, or as designed.
-            known: arms and gimbals that were worked out of the same log.
+            signals: channels of the team.
+            arms: the robots as calibrated, or as designed.
+            known: cached motions of arms and gimbals of the same log.
         """
         self.signals, self._arms = signals, arms
         self._known = {} if known is None else known
@@ -187,7 +189,7 @@ class Team:
         self.misfit = self._judged(self._grasps, self._body)
 
     def without(self, mistake: Mistake, enough: float = np.inf) -> Misfit:
-        """The misfit with a mistake undone; one beyond ``enough`` need not be exact."""
+        """Return the misfit with a mistake undone; a value above ``enough`` need not be exact."""
         signals, grasps = mistake.undo(self.signals), list(self._grasps)
         with np.errstate(all="ignore"):  # wrong channels may divide by zero: an infinite misfit
             for robot in mistake.robots:
@@ -196,7 +198,7 @@ class Team:
         return self._judged(grasps, self._body if same_motion else None, enough)
 
     def undone(self, mistake: Mistake) -> Team:
-        """The team with a mistake undone."""
+        """Return the team with a mistake undone."""
         return Team(mistake.undo(self.signals), self._arms, self._known)
 
     def _grasp(self, signals: Signals, robot: int) -> tuple[Grasp | None, tuple[Fault, ...]]:
@@ -218,9 +220,9 @@ class Team:
         body: Body | None,
         enough: float = np.inf,
     ) -> Misfit:
-        """The misfit of grasps; forces are left out once the motion alone makes it ``enough``.
+        """Return the misfit of grasps; forces are skipped if the motion's misfit already exceeds ``enough``.
 
-        What makes noise of the signals explains nothing: noise is bounded by that of the log as it is.
+        The noise is that of the log as it is: a hypothesis that turns signals into noise must not gain from it.
         """
         faults = tuple(fault for _, of_robot in grasps for fault in of_robot)
         told = [grasp for grasp, _ in grasps if grasp is not None]
@@ -247,7 +249,7 @@ def _misfit(
     *,
     determined: bool,
 ) -> Misfit:
-    """From disagreements, each with its signal and its noise."""
+    """Compute the misfit from disagreements, each with its signal and noise."""
     if mass is not None and mass <= 0:
         faults = (*faults, Fault(1.0, f"the forces add up to a mass of {mass:.3g} kg"))
     relative, scaled = {}, {}
@@ -258,7 +260,7 @@ def _misfit(
 
 
 def _balanced(told: list[Grasp], body: Body, faults: tuple[Fault, ...]) -> Misfit:
-    """Motion, and total force and moment in {1} against the ten inertial parameters."""
+    """Return the misfit of the motion and of the total wrench in {1} against the ten inertial parameters."""
     N, Q = len(told), len(told[0].omega)
     force = np.stack([g.force @ R.T for g, R in zip(told, body.R_1i, strict=True)])
     moment = cross(body.p_1i[:, None], force)
@@ -277,7 +279,7 @@ def _balanced(told: list[Grasp], body: Body, faults: tuple[Fault, ...]) -> Misfi
 
 
 def _vertical(told: list[Grasp], body: Body, faults: tuple[Fault, ...]) -> Misfit:
-    """What can be told without any grasp frame."""
+    """Return the misfit that needs no grasp frames: angular speeds and total vertical force."""
     speed = np.stack([np.linalg.norm(g.omega, axis=1) for g in told])
     apart = float(rms(speed - speed.mean(axis=0)) * np.sqrt(len(told) / (len(told) - 1)))
     lift = np.sum([g.lift for g in told], axis=0)
@@ -292,7 +294,7 @@ def _vertical(told: list[Grasp], body: Body, faults: tuple[Fault, ...]) -> Misfi
 
 
 def _fit(Y: Array, y: Array) -> tuple[Array, Array]:
-    """Least squares of (Q, 6, 10) and (Q, 6): parameters and residuals (6 Q,)."""
+    """Solve least squares with a regressor (Q, 6, 10) and wrenches (Q, 6); return parameters and residual (6 Q,)."""
     A, b = Y.reshape(-1, Y.shape[-1]), y.ravel()
     scale = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
     A = A / scale
@@ -307,13 +309,13 @@ def check_wiring(
     *,
     look_for_hidden: bool = True,
 ) -> Wiring:
-    """Look for mistakes.
+    """Search for wiring mistakes.
 
     Args:
-        signals: the team's channels.
-        arms: the robots as they are, or as designed.
-        advance: takes the number of mistakes tried since the last call.
-        look_for_hidden: whether to find out which mistakes would not show.
+        signals: channels of the team.
+        arms: the robots as calibrated, or as designed.
+        advance: called with the number of mistakes tried since the last call.
+        look_for_hidden: whether to search mistakes that these data could not show.
     """
     design = design_of(arms)
     first = team = Team(signals, arms)
@@ -332,18 +334,18 @@ def check_wiring(
 
 
 def shows(wrong: float, right: float) -> bool:
-    """Whether a mistake is found that makes a misfit out of another."""
+    """Return whether a mistake that raises the misfit from ``right`` to ``wrong`` would be found."""
     return wrong > max(SUSPICIOUS, DECISIVE * right) or wrong > max(WORTH_TRYING, OVERWHELMING * right)
 
 
 def _best(
     team: Team, design: OmnidDesign, advance: Callable[[int], object]
 ) -> tuple[Mistake, tuple[Mistake, ...], float]:
-    """The mistake that explains most, those that explain as much, and the misfit that it leaves."""
+    """Return the mistake that explains most, its equally good alternatives, and the misfit that it leaves."""
     tried: list[tuple[float, int, Mistake]] = []
     least = np.inf
     for suspicion in SUSPICIONS:
-        # Single encoders with a wrong zero are many, and looked at only if nothing else will do.
+        # Wrong encoder zeros are many; they are tried only if nothing else explains the misfit.
         if suspicion is wrong_zero and least <= max(WORTH_TRYING, team.misfit.total / OVERWHELMING):
             break
         for mistake in suspicion(team.signals, design):
@@ -357,9 +359,9 @@ def _best(
         better = refined(mistake, lambda m: team.without(m).total)
         top.append((total if better is mistake else team.without(better).total, rank, better))
     limit = ALIKE * min(entry[0] for entry in top) + 1e-9
-    # Among those that cannot be told apart, the earliest suspicion comes first.
+    # Among equally good mistakes, the earliest suspicion comes first.
     alike = sorted((entry for entry in (*top, *tried[_REFINED:]) if entry[0] <= limit), key=lambda e: e[1])
-    # Each encoder's zero counts once, however many offsets were tried.
+    # Several offsets of one encoder count as one mistake.
     distinct: dict[object, Mistake] = {}
     for _, _, mistake in alike:
         one = mistake if mistake.resized is None else (mistake.robots, mistake.channels)
@@ -369,7 +371,7 @@ def _best(
 
 
 def _alike(others: Team, best: Mistake, alike: tuple[Mistake, ...]) -> tuple[Mistake, ...]:
-    """Those that still explain as much once all other mistakes are undone."""
+    """Return the alternatives that still explain as much once all other mistakes are undone."""
     limit = ALIKE * others.without(best).total + 1e-9
     return tuple(mistake for mistake in alike if others.without(mistake).total <= limit)
 
@@ -377,13 +379,13 @@ def _alike(others: Team, best: Mistake, alike: tuple[Mistake, ...]) -> tuple[Mis
 def _needed(
     first: Team, team: Team, chain: list[tuple[Mistake, tuple[Mistake, ...]]]
 ) -> tuple[tuple[Found, ...], Team]:
-    """Each mistake of the chain with what it is worth, without those that hardly matter once all others are undone."""
+    """Return the mistakes of the chain that still matter once all others are undone, and the team without them."""
     found = []
     for k in reversed(range(len(chain))):
         others = first
         for mistake, _ in (*chain[:k], *chain[k + 1 :]):
             others = others.undone(mistake)
-        # Where something else is wrong, too, only what is beyond doubt is accused.
+        # If something else is wrong, too, report only overwhelming improvements.
         worth = OVERWHELMING if team.misfit.suspicious else HELPS
         if others.misfit.total <= worth * team.misfit.total:
             chain, team = [*chain[:k], *chain[k + 1 :]], others
@@ -395,7 +397,7 @@ def _needed(
 def _hidden(
     team: Team, design: OmnidDesign, advance: Callable[[int], object]
 ) -> tuple[tuple[Mistake, ...], int]:
-    """Mistakes that would not have been found, had they been made, and how many were tried; encoders' zeros aside."""
+    """Return mistakes that would not be found in these data, without wrong encoder zeros, and how many were tried."""
     enough = max(SUSPICIOUS, DECISIVE * team.misfit.total)
     every = (mistake for suspicion in SUSPICIONS for mistake in suspicion(team.signals, design))
     tried = [mistake for mistake in every if mistake.resized is None]

@@ -1,1 +1,1 @@
-"""Measured logs in and out: ROS 2 bags, tables and arrays, brought onto one clock and into a recording."""
+"""Read and write measured logs: ROS 2 bags, tables and arrays, resampled onto one clock into a recording."""

@@ -1,4 +1,4 @@
-"""From a log to a recording, and from a recording to a file of any kind that is written."""
+"""Convert a log into a recording, and write a recording in any supported format."""
 
 import os
 from collections.abc import Callable
@@ -25,21 +25,22 @@ from mocobot_logs.resample import MAX_GAP_S, RATE_HZ, StreamReport, resample
 from mocobot_logs.table.arrays import METADATA_NAME
 
 UNKNOWN_TRIAL = "random"
-"""Kind of trial where nothing says which; it labels reports only."""
+"""Kind of trial if unknown; it only labels reports."""
 PERIOD_DOUBT = 0.05
-"""So much of a period may the median of jittering intervals be off: 1.25 / sqrt(1024) of what they scatter by."""
+"""Largest error of the median of jittering intervals, as a share of the period. Derived: 1.25 / sqrt(1024) of their
+scatter, rounded up."""
 _CSV_ROWS = 10_000
 
 
 @dataclass(frozen=True)
 class Labels:
-    """What a log may not say about itself; None leaves it to the log.
+    """User's statements about a log; None leaves an entry to the log.
 
     Attributes:
         trial: "random", "periodic", "static" or "free".
         payload: name of the payload.
-        design: numbers of the robots.
-        level: how the output tells the samples, "joint" or "wrist".
+        design: design of the robots.
+        level: level of the output, "joint" or "wrist".
     """
 
     trial: str | None = None
@@ -53,12 +54,12 @@ class Converted:
     """A log that became a recording.
 
     Attributes:
-        recording: on one grid and one clock, checked.
-        level: of the log.
-        streams: what was found in each robot's stream, and done to it.
-        clocks: how the robots' clocks differ, and whether that was corrected.
-        span: which part of the log it is, after the log's start, or None for all of it.
-        left_out: what was left out of the log on purpose, or because it is of no use.
+        recording: the checked recording, on one grid and one clock.
+        level: level of the log.
+        streams: properties of each robot's stream, and how it was resampled.
+        clocks: differences of the robots' clocks, and whether they were corrected.
+        span: part of the log, after the log's start, or None for all of it.
+        left_out: parts left out on request or because they are unusable.
     """
 
     recording: Recording
@@ -80,21 +81,21 @@ def convert(
     correct: bool = False,
     advance: Callable[[int], object] = lambda _: None,
 ) -> Converted:
-    """Bring a log onto one grid and check that the result is a recording that can be estimated from.
+    """Convert a log to a recording on one grid, and check that it is plausible for an estimate.
 
     Args:
         source: the log.
-        labels: what the user says of it; what the log says of itself comes second.
-        standard: design where neither says one.
-        choice: what of the log is wanted.
+        labels: the user's statements, which override the log's own.
+        standard: design if neither gives one.
+        choice: the wanted part of the log.
         rate_hz: sampling rate of the recording [Hz].
         max_gap_s: longest gap that is filled [s].
-        correct: whether the robots' clocks are brought to that of robot 1.
-        advance: takes the progress made, in the source's units.
+        correct: whether to correct the robots' clocks to that of robot 1.
+        advance: called with the progress, in the source's units.
 
     Raises:
-        InputError: the log is damaged, cannot be resampled, is not plausible (see ``check_recording``), or does not
-            have what is chosen.
+        InputError: the log is damaged, cannot be resampled, is not plausible (see ``check_recording``), or lacks what
+            is chosen.
     """
     how = partial(
         _convert, labels=labels, standard=standard, rate_hz=rate_hz, max_gap_s=max_gap_s, correct=correct
@@ -118,17 +119,17 @@ def convert_parts(
     correct: bool = False,
     advance: Callable[[int], object] = lambda _: None,
 ) -> tuple[list[Converted], list[Omission]]:
-    """Make a recording of every part of a log between gaps too long to be filled, see ``split``.
+    """Convert every part of a log between gaps too long to be filled, see ``split``.
 
     Args:
         source, labels, standard, choice, rate_hz, max_gap_s, correct, advance: as in ``convert``.
 
     Returns:
-        The recordings, at least one; and what is in none of them: what is not chosen, gaps, and parts that are too
-        short or cannot be used, with the reason.
+        At least one recording; and the omissions with their reasons: unchosen parts, gaps, and parts that are too
+        short or unusable.
 
     Raises:
-        InputError: the log is damaged, does not have what is chosen, or no part of it can be used.
+        InputError: the log is damaged, lacks what is chosen, or no part of it can be used.
     """
     extent = extent_of(source, choice, max_gap_s, advance)
     spans, out = split(extent)
@@ -140,7 +141,7 @@ def convert_parts(
             f"{source.name}: no part of it has all robots' samples for {seconds(SHORTEST_NS)} s without a gap of more "
             f"than {max_gap_s:g} s{found}"
         )
-    # A part's own period may differ from the log's by what jitter does to a median.
+    # Jitter may shift the median period of a part from that of the log.
     max_gap_s += PERIOD_DOUBT * extent.period_ns * NS
     how = partial(
         _convert, labels=labels, standard=standard, rate_hz=rate_hz, max_gap_s=max_gap_s, correct=correct
@@ -197,13 +198,13 @@ def write_converted(
     *,
     replace_bag: bool = False,
 ) -> None:
-    """Write a recording at the level of its metadata, as what the target's name says.
+    """Write a recording at the level of its metadata, in the format that the target's name states.
 
     Args:
-        recording: what to write.
+        recording: the recording.
         path: target, see ``output_kind``.
-        advance: takes the number of samples written since the last call.
-        replace_bag: whether the folder of a bag that was written here may be replaced.
+        advance: called with the number of samples written since the last call.
+        replace_bag: whether to replace the folder of a bag that this program wrote.
 
     Raises:
         InputError: it cannot be written.
@@ -216,7 +217,7 @@ def write_converted(
     elif kind == "npz":
         write_npz(recording, path, level)
     else:
-        from mocobot_logs.bag.write import write_bag  # its library takes a third of a second to load
+        from mocobot_logs.bag.write import write_bag  # the import takes a third of a second
 
         storage = "sqlite3" if kind == "sqlite3" else "mcap"
         write_bag(
@@ -225,12 +226,12 @@ def write_converted(
 
 
 def write_csv(recording: Recording, path: Path, level: Level = "joint") -> None:
-    """Write a recording as CSV: a header, commas, the columns of docs/recording.md, every number to its last bit.
+    """Write a recording as CSV: a header, commas, the columns of docs/recording.md, every number exactly.
 
-    A text table has no place for metadata; who reads it has to say trial, payload and design again.
+    A text table holds no metadata; a reader must supply trial, payload and design.
 
     Args:
-        recording: what to write.
+        recording: the recording.
         path: target; an existing file is replaced once the new one is complete.
         level: "joint" or "wrist".
 
@@ -246,10 +247,10 @@ def write_csv(recording: Recording, path: Path, level: Level = "joint") -> None:
 def write_npz(recording: Recording, path: Path, level: Level = "joint") -> None:
     """Write a recording as NPZ: ``time`` (Q,), then ``phi``, ``theta``, ``tau`` and ``ref`` of shape (Q, N, 3).
 
-    At wrist level ``h`` and ``force`` take the place of phi and tau. ``mocobot`` holds the metadata as JSON text.
+    At wrist level ``h`` and ``force`` replace phi and tau. ``mocobot`` holds the metadata as JSON text.
 
     Args:
-        recording: what to write.
+        recording: the recording.
         path: target; an existing file is replaced once the new one is complete.
         level: "joint" or "wrist".
 

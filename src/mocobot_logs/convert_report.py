@@ -1,16 +1,15 @@
-"""What happened to a log on its way to a recording, as text and as JSON with these keys:
+"""Report on a conversion, as text and as JSON with these keys:
 
 format, version        "mocobot-conversion", 1
 log                    as the user named it
 level                  of the log: "joint" or "wrist"
 recordings             list of {file, samples, rate_hz, duration_s, level, trial, payload, from_s, to_s, streams,
-                       clocks}; from_s and to_s say which part of the log it is, in seconds after its start, null
-                       for all of it
-recordings[].streams   one per robot: what ``mocobot_logs.resample.StreamReport`` holds, and on_grid: whether its
-                       samples, after what ``method`` says, were on the recording's grid
+                       clocks}; from_s and to_s are the part of the log in seconds after its start, null for all of it
+recordings[].streams   one per robot: the fields of ``mocobot_logs.resample.StreamReport``, and on_grid: whether its
+                       samples, after ``method``, were on the recording's grid
 recordings[].clocks    {corrected, offset_s, offset_se_s, drift, drift_se, why_not}: lists by robot, null where unknown
-left_out               list of {from_s, to_s, robot, samples, why}: robot is null for all robots, samples where
-                       they were not counted
+left_out               list of {from_s, to_s, robot, samples, why}: robot is null for all robots, samples is null if
+                       not counted
 """
 
 import math
@@ -27,9 +26,9 @@ from mocobot_logs.log import Array, repeated
 from mocobot_logs.resample import StreamReport
 
 SURE = 4.0
-"""Standard errors beyond which a difference of clocks is pointed out ..."""
+"""Standard errors above which a clock difference is reported ..."""
 SMALL_S, SMALL_DRIFT = 1e-4, 5e-6
-"""... if it is more than this [s, s/s]; 0.1 ms changes estimates by less than the sensors' noise."""
+"""... if it also exceeds this [s, s/s]; 0.1 ms changes estimates by less than the sensors' noise."""
 _COLUMNS = (
     ("samples", ""),
     ("rate", "Hz"),
@@ -50,16 +49,16 @@ _DONE = {
     ("fitted", True): "fitted by polynomials, as they are many and uneven, low-passed and thinned",
     ("fitted", False): f"fitted by polynomials, as they are many and uneven, low-passed, thinned and {_ONTO}",
 }
-"""What was done to a robot's samples, by method and by whether its grid is the recording's."""
+"""Processing of a robot's samples, by method and by whether its grid is the recording's."""
 
 
 def format_conversion(converted: Converted, name: str, out: Path) -> str:
-    """Readable report: what was found in each stream, the clocks, where the recording is, and what was left out.
+    """Return a readable report: streams, clocks, location of the recording, and omissions.
 
     Args:
         converted: the result.
         name: the log, as the user named it.
-        out: where the recording was written.
+        out: path of the recording.
     """
     recording, streams = converted.recording, converted.streams
     if converted.span is not None:
@@ -90,7 +89,7 @@ def format_conversion(converted: Converted, name: str, out: Path) -> str:
 
 
 def format_on_the_fly(converted: Converted, name: str) -> str:
-    """One line about a log that was converted in passing, with what may be wrong with that."""
+    """Return one line about a log that another command converted, with possible problems."""
     metadata, streams = converted.recording.metadata, converted.streams
     duration_s = (len(converted.recording.time) - 1) / metadata.rate_hz
     robots = f"{metadata.robots} robot{'s' * (metadata.robots > 1)}"
@@ -105,7 +104,7 @@ def format_on_the_fly(converted: Converted, name: str) -> str:
 
 
 def format_omissions(left_out: Sequence[Omission]) -> str:
-    """What of a log is in no recording, one line each."""
+    """Return the omitted parts of a log, one line each."""
     lines = ["[[Left out of the log]]"]
     for each in left_out:
         whose = "" if each.robot is None else f" of robot {each.robot}"
@@ -175,7 +174,7 @@ def _clocks(converted: Converted) -> list[str]:
 
 
 def _differ(estimate: ClockEstimate) -> bool:
-    """Whether clocks differ beyond doubt, and by what matters."""
+    """Return whether clocks differ significantly and by a relevant amount."""
     if not estimate.determined:
         return False
     offset, drift = np.abs(estimate.offset_s), np.abs(estimate.drift)
@@ -203,12 +202,12 @@ FORMAT, VERSION = "mocobot-conversion", 1
 def conversion_dict(
     name: str, recordings: Sequence[tuple[Converted, Path | None]], left_out: Sequence[Omission]
 ) -> dict[str, Any]:
-    """Plain JSON values of a conversion, with the keys documented above.
+    """Return plain JSON values of a conversion, with the keys documented above.
 
     Args:
         name: the log, as the user named it.
-        recordings: what it became, at least one, and the file of each, if any.
-        left_out: what is in none of them.
+        recordings: at least one recording, each with its file, if any.
+        left_out: parts of the log in none of them.
     """
     return {
         "format": FORMAT,

@@ -1,4 +1,4 @@
-"""Parts of a log: what a user keeps (``12:95``) and drops (``robot=2:30-31``), and the parts between gaps.
+"""Parts of a log: a span to keep (``12:95``), spans to drop (``robot=2:30-31``), and the parts between gaps.
 
 Seconds count from the log's start, the earliest first stamp of its robots. Both ends of a span belong to it.
 """
@@ -16,18 +16,18 @@ from mocobot_logs.log import Level, LogSource, Samples, Stamps, rows_of
 from mocobot_logs.resample import is_hole
 
 SHORTEST_NS = 9_500_000_000
-"""Shortest part that becomes a trial [ns]: of what resampling leaves (it may take 0.1 s at either end), ``estimate``
-and ``diagnose`` leave out 2 s at either end for their filters, and a diagnosis needs 5 s of the rest."""
+"""Shortest part that becomes a trial [ns]. Derived: ``estimate`` and ``diagnose`` drop 2 s at either end for their
+filters. Resampling may drop 0.1 s at either end. A diagnosis needs 5 s of the rest."""
 UNEVEN_NS = 100_000_000
-"""Robots that begin or end so much apart are told of [ns]."""
+"""Smallest difference between the robots' beginnings or ends that is reported [ns]."""
 _S = r"(\d{1,12}(?:\.\d*)?|\.\d+)"
 _CROP = re.compile(rf"{_S}?:{_S}?", re.ASCII)
 _DROP = re.compile(rf"robot=(\d{{1,4}}):{_S}-{_S}", re.ASCII)
 _NS_PER_S = 1_000_000_000
 LATEST_NS = 10**12 * _NS_PER_S
-"""Where a span ends that says no end: later than any log."""
+"""End of a span without a given end: later than any log [ns]."""
 _UNEVEN = "not all robots have samples"
-_LOOK = 1024  # stamps that tell the period
+_LOOK = 1024  # number of stamps that determine the period
 
 
 @dataclass(frozen=True)
@@ -39,39 +39,39 @@ class Span:
 
     @property
     def length_ns(self) -> int:
-        """From one end to the other [ns]."""
+        """Length [ns]."""
         return self.last_ns - self.first_ns
 
     def holds(self, after_ns: Stamps) -> NDArray[np.bool_]:
-        """Which times after the log's start [ns] are inside."""
+        """Return which times after the log's start [ns] are inside."""
         return (after_ns >= self.first_ns) & (after_ns <= self.last_ns)
 
     def __str__(self) -> str:
-        """Such as "12 to 95 s"."""
+        """Return text such as "12 to 95 s"."""
         return f"{seconds(self.first_ns)} to {'the end' if self.last_ns >= LATEST_NS else f'{seconds(self.last_ns)} s'}"
 
 
 @dataclass(frozen=True)
 class Drop:
-    """Samples of one robot, counted from 1, that are left out."""
+    """A span whose samples of one robot, counted from 1, are left out."""
 
     robot: int
     span: Span
 
     def __str__(self) -> str:
-        """As a user says it."""
+        """Return the span in the form of the command line."""
         return f"robot={self.robot}:{seconds(self.span.first_ns)}-{seconds(self.span.last_ns)}"
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What is wanted of a log: the part that is kept (None for all of it), and what is left out of that."""
+    """The wanted part of a log: the span to keep (None for all of it), and the drops within it."""
 
     crop: Span | None = None
     drops: tuple[Drop, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether anything is left out."""
+        """Return whether anything is left out."""
         return self.crop is not None or bool(self.drops)
 
 
@@ -84,10 +84,10 @@ class Omission:
     """Time of a log that is in no recording.
 
     Attributes:
-        span: after the log's start.
-        robot: whose samples are left out, from 1, or None for all robots.
-        samples: how many of them, where they were counted.
-        why: in words.
+        span: time after the log's start.
+        robot: robot whose samples are left out, from 1, or None for all robots.
+        samples: number of these samples, or None if not counted.
+        why: the reason in words.
     """
 
     span: Span
@@ -97,20 +97,20 @@ class Omission:
 
 
 def parse_choice(crop: str | None, drops: Iterable[str] = ()) -> Choice:
-    """What is wanted, from the words of the command line.
+    """Parse the options of the command line.
 
     Args:
         crop: ``FROM:TO``; either may be missing.
         drops: ``robot=N:FROM-TO`` each.
 
     Raises:
-        InputError: one is not of that form, or ends before it begins.
+        InputError: an option has another form, or ends before it begins.
     """
     return Choice(None if crop is None else _crop(crop), tuple(_drop(drop) for drop in drops))
 
 
 def seconds(ns: int) -> str:
-    """Nanoseconds as seconds, to the last digit and none more."""
+    """Format nanoseconds as seconds without rounding."""
     text = f"{Decimal(ns) / _NS_PER_S:f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
@@ -146,16 +146,16 @@ def _drop(text: str) -> Drop:
 
 
 class Piece:
-    """What a log has in a span of time, without what is dropped, as a ``LogSource``."""
+    """A span of a log without the dropped samples, as a ``LogSource``."""
 
     def __init__(self, source: LogSource, origin_ns: int, span: Span | None, drops: tuple[Drop, ...]) -> None:
-        """Take the log; nothing is read yet.
+        """Initialise; nothing is read yet.
 
         Args:
             source: the log.
             origin_ns: stamp from which span and drops count [ns].
-            span: what is kept, None for all.
-            drops: what is left out.
+            span: span to keep, None for all.
+            drops: samples to leave out.
         """
         self.name = source.name if span is None else f"{source.name} ({span})"
         self.level: Level = source.level
@@ -165,7 +165,7 @@ class Piece:
         self._drops = [[d.span for d in drops if d.robot == i + 1] for i in range(source.robots)]
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """As ``LogSource.chunks``; what comes after the span is not read.
+        """Yield samples as ``LogSource.chunks``; reading stops after the span.
 
         Raises:
             InputError: the log is damaged, or holds what its map does not allow.
@@ -187,16 +187,15 @@ class Piece:
 
 @dataclass(frozen=True)
 class Extent:
-    """When a log has samples, by the robots' stamps, in nanoseconds after its start.
+    """Time covered by a log, by the robots' stamps, in nanoseconds after its start.
 
     Attributes:
         origin_ns: stamp of the start, the earliest first stamp of all robots [ns].
-        chosen: what of the log is kept.
-        common: from the latest first to the earliest last sample of the robots, as chosen; None if they have no time
-            in common.
-        holes: robot (from 1) and time without samples, from sample to sample, that is too long to be filled.
+        chosen: the span that is kept.
+        common: from the latest first to the earliest last kept sample of the robots; None if they share no time.
+        holes: robot (from 1) and time between samples, for each gap too long to be filled.
         left_out: what the choice leaves out.
-        period_ns: the longest period of a robot's samples [ns].
+        period_ns: longest period of a robot's samples [ns].
     """
 
     origin_ns: int
@@ -210,13 +209,16 @@ class Extent:
 def extent_of(
     source: LogSource, choice: Choice, max_gap_s: float, advance: Callable[[int], object] = lambda _: None
 ) -> Extent:
-    """Look through a log; only its stamps are kept in memory. Rows that lack a value are no samples.
+    """Scan a log; only its stamps stay in memory. Rows that lack a value do not count as samples.
 
     Args:
         source: the log.
-        choice: what is wanted of it.
-        max_gap_s: longest time without samples beyond one period that is no hole [s].
-        advance: takes the progress made, in the source's units.
+        choice: the wanted part.
+        max_gap_s: longest time without samples that is filled, beyond one period [s].
+        advance: called with the progress, in the source's units.
+
+    Raises:
+        InputError: the log is damaged or empty, or lacks what is chosen.
     """
     for drop in choice.drops:
         if not 1 <= drop.robot <= source.robots:
@@ -229,7 +231,7 @@ def extent_of(
         raise InputError(f"{source.name}: has no samples")
     origin_ns = min(first for first, _ in ends.values())
     last_ns = max(last for _, last in ends.values()) - origin_ns
-    after = [np.asarray(each - origin_ns) for each in stamps]  # wraps for what the screen refuses
+    after = [np.asarray(each - origin_ns) for each in stamps]  # may wrap for stamps that are refused later
     chosen, left_out = Span(0, last_ns), []
     if (crop := choice.crop) is not None:
         if crop.first_ns > last_ns:
@@ -270,7 +272,7 @@ def extent_of(
 def _stamps(
     source: LogSource, advance: Callable[[int], object]
 ) -> tuple[list[Stamps], dict[int, tuple[int, int]]]:
-    """Stamps of every robot's whole rows, and by robot its first and last stamp of all."""
+    """Return the stamps of every robot's complete rows, and each robot's first and last stamp of all rows."""
     parts: list[list[Stamps]] = [[np.empty(0, np.int64)] for _ in range(source.robots)]
     ends: dict[int, tuple[int, int]] = {}
     for robot, samples in source.chunks(advance):
@@ -301,9 +303,9 @@ def _common(kept: list[Stamps]) -> Span | None:
 
 
 def split(extent: Extent) -> tuple[list[Span], list[Omission]]:
-    """Spans in which every robot has samples without a hole, however short, and what lies between them, in order.
+    """Return spans in which every robot has samples without a long gap, however short, and the omissions between them.
 
-    A hole in one robot's samples is one for all: forces and motions of a team mean something together only.
+    A gap of one robot counts for all, since forces and motions of a team are only meaningful together.
     """
     if extent.common is None:
         return [], []

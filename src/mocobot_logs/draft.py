@@ -1,4 +1,4 @@
-"""Drafts of maps: TOML that reads a log as far as names and values tell, with comments where they do not."""
+"""Draft a map: TOML that reads a log as far as names and values tell, with comments on doubtful lines."""
 
 from __future__ import annotations
 
@@ -34,17 +34,18 @@ from mocobot_logs.table.table import Table, Wanted
 from mocobot_logs.units import COUNTS, DATES, FACTORS
 
 DOUBTFUL = "doubtful: "
-"""Begins what a line that needs a look says."""
+"""Prefix of the comment on a line that the user must check."""
 _LISTED = 12
 _PLAUSIBLE = {"angle": 3.2, "torque": 60.0, "length": 1.5, "force": 600.0}
-"""No arm's angle, torque, reach or force is larger [rad, N m, m, N]."""
+"""Largest plausible angle, torque, reach and force of an arm [rad, N m, m, N]."""
 _SURE = {"angle": (1.8, 10.0), "torque": (30.0, 200.0), "length": (1.0, 10.0), "force": (300.0, 2000.0)}
-"""Values up to the first are in SI, from the second on in the smaller unit; between, either may be."""
+"""Largest values that are certainly in SI, and smallest that are certainly in the smaller unit; in between, either may
+be."""
 _SMALLER = {"angle": "deg", "torque": "mNm", "length": "mm", "force": "mN"}
 _MOST_DEGREES = 400.0
-"""Whole numbers beyond are counts."""
+"""Largest angle in degrees; larger whole numbers are counts."""
 _ONE_TURN = 0.01
-"""Angles that cover a full turn to this share of it are those of an encoder that starts again there."""
+"""A range within this share of a full turn means an encoder that wraps around."""
 _RATES_HZ = (10.0, 20_000.0)
 
 
@@ -53,9 +54,9 @@ class Draft:
     """A draft of a map.
 
     Attributes:
-        text: TOML.
-        doubtful: number of lines that need a look.
-        missing: what was not found, without which the map is not complete.
+        text: the map in TOML.
+        doubtful: number of lines that the user must check.
+        missing: required channels that were not found; the map is incomplete without them.
         robots: number of robots found.
     """
 
@@ -69,8 +70,8 @@ def draft_of(path: Path, episode: int | None = None) -> Draft:
     """Draft the map of a team's log.
 
     Args:
-        path: a log of any format, whatever its names.
-        episode: which episode of a LeRobot dataset; may be None if it holds only one.
+        path: a log of any format, with any names.
+        episode: episode of a LeRobot dataset; may be None if it holds only one.
 
     Raises:
         InputError: there is no such log, or it is damaged.
@@ -93,10 +94,10 @@ def draft_joint_map(
     """Draft the map of a log of one robot's joints.
 
     Args:
-        path: a log of any format, whatever its names.
-        joints: the model's.
-        slides: whether each of them slides.
-        episode: which episode of a LeRobot dataset; may be None if it holds only one.
+        path: a log of any format, with any names.
+        joints: names of the model's joints.
+        slides: whether each joint slides.
+        episode: episode of a LeRobot dataset; may be None if it holds only one.
 
     Raises:
         InputError: there is no such log, or it is damaged.
@@ -129,12 +130,12 @@ def _unused(names: Sequence[str]) -> list[str]:
 
 
 def _printable(text: str) -> str:
-    """Text as a comment may hold it: in one line, without control characters."""
+    """Return text that fits a comment: one line, without control characters."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
 def _opened(path: Path, kind: Kind, episode: int | None) -> tuple[Table, list[Candidate], list[str]]:
-    """A table, what its columns may be, and lines of a map that say how its text is written, if unlike most."""
+    """Return a table, the candidates among its columns, and the map's lines on the text format if it is unusual."""
 
     def has_values(candidates: list[Candidate]) -> bool:
         return any(c.values is not None and len(c.values) for c in candidates if c.reading.group != "time")
@@ -145,7 +146,7 @@ def _opened(path: Path, kind: Kind, episode: int | None) -> tuple[Table, list[Ca
         try:
             other = open_table(path, kind, CsvMap(decimal=","))
             again = of_table(other)
-        except InputError:  # its rows do not fit its header so
+        except InputError:  # the rows do not fit the header with a decimal comma
             return table, candidates, []
         if has_values(again):
             return other, again, ["[csv]", 'decimal = ","', ""]
@@ -156,7 +157,7 @@ def _opened(path: Path, kind: Kind, episode: int | None) -> tuple[Table, list[Ca
 
 
 def _time_lines(table: Table, candidates: Sequence[Candidate], robots: Robots) -> list[str]:
-    """The lines of [time], by the candidates that are called like time."""
+    """Return the lines of [time], from the candidates with names of time."""
     times = [candidate for candidate in candidates if candidate.reading.group == "time"]
     if not times:
         return ["[time]", f"# {DOUBTFUL}nothing is called like time", '# column = "?"', '# unit = "s"', ""]
@@ -177,7 +178,7 @@ def _time_lines(table: Table, candidates: Sequence[Candidate], robots: Robots) -
 
 
 def _choose_time(table: Table, times: list[Candidate], robots: Robots) -> tuple[str, Candidate, list[str]]:
-    """Name of the column, with a placeholder where every robot has its own; the column; and what is doubtful."""
+    """Return the column's name (with a placeholder if each robot has its own), the column, and the doubts."""
     if robots.called:
         for template, each in templates_of(times).items():
             if set(robots.called) <= set(each):
@@ -197,7 +198,7 @@ def _has_dates(table: Table, column: str) -> bool:
 
 
 def _guess_time(values: Array) -> tuple[str, str | None]:
-    """Unit of time by the intervals between stamps, and what is doubtful about it."""
+    """Guess the unit of time from the intervals between stamps; return it and the doubt, if any."""
     steps = np.diff(values)
     steps = steps[steps > 0]
     step = float(np.median(steps)) if len(steps) else 0.0
@@ -210,7 +211,7 @@ def _guess_time(values: Array) -> tuple[str, str | None]:
 
 
 def team_draft(path: Path, found: Found, settings: Sequence[str]) -> Draft:
-    """The whole map, with ``settings`` as the lines of [time] and [csv]."""
+    """Draft the whole map of a team; ``settings`` are the lines of [time] and [csv]."""
     channels, robots = found.channels, found.robots
     level = max(CHANNELS, key=lambda each: sum(channel in channels for channel in CHANNELS[each]))
     wanted = [*CHANNELS[level], *(REF if all(channel in channels for channel in REF) else ())]
@@ -233,7 +234,6 @@ def team_draft(path: Path, found: Found, settings: Sequence[str]) -> Draft:
 
 
 def _team_line(channel: str, candidates: Sequence[Candidate], templates: Templates, robots: Robots) -> str:
-    """The line of one channel."""
     if not candidates:
         return f"# {DOUBTFUL}nothing is called like {channel}\n# {channel} = {{ ... }}"
     name, mine, doubts = _choose(candidates, templates, robots)
@@ -271,7 +271,7 @@ def _comment(doubts: Sequence[str], extent: str) -> str:
 def _choose(
     candidates: Sequence[Candidate], templates: Templates, robots: Robots
 ) -> tuple[str, list[Candidate], list[str]]:
-    """Name of a channel with the placeholder in it, what it stands for, and what is doubtful about the choice."""
+    """Return a channel's name with the placeholder, the candidates that it stands for, and the doubts."""
     if not robots.called:
         best = min(candidates, key=lambda c: (c.reading.unit is None, len(c.name)))
         others = [c.name for c in candidates if c is not best]
@@ -290,7 +290,7 @@ def _choose(
 
 
 def _guess_unit(channel: str, values: Array) -> tuple[str, str | None]:
-    """Unit of a channel by all its values, and what is doubtful about it."""
+    """Guess the unit of a channel from all its values; return it and the doubt, if any."""
     dimension = dimension_of(channel)
     si, smaller = next(iter(FACTORS[dimension])), _SMALLER[dimension]
     largest = float(np.max(np.abs(values), initial=0.0))
@@ -308,7 +308,7 @@ def _guess_unit(channel: str, values: Array) -> tuple[str, str | None]:
 
 
 def _doubt_unit(channel: str, unit: str, values: Array) -> str | None:
-    """What speaks against a unit that a name tells."""
+    """Return the doubt about a unit that a name states, or None."""
     if unit == COUNTS:
         return "counts_per_turn must be filled in"
     dimension = dimension_of(channel)
@@ -332,7 +332,7 @@ _WORDS: dict[str, set[str]] = {
     "supply": {"supply", "bus", "battery", "vin", "volts"},
     "q": {"q", "pos", "position", "angle", "joint", "state", "ang"},
 }  # fmt: skip
-"""Words that tell a quantity, the most telling first."""
+"""Words that identify a quantity, most specific first."""
 _MOTOR = {"motor", "drive", "actuator", "rotor"}
 _AT_MOTOR = {
     "q": "motor_position",
@@ -341,15 +341,15 @@ _AT_MOTOR = {
     "command": "motor_command",
 }
 _TURNS = 4.0 * np.pi
-"""Joints that turn farther than that are taken to be logged in degrees [rad]."""
+"""Largest range of a turning joint in radians; a larger one counts as degrees."""
 _METRES = 20.0
-"""Slides that go farther than that are taken to be logged in millimetres [m]."""
+"""Largest range of a sliding joint in metres; a larger one counts as millimetres."""
 _ROWS = 20_000
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where one quantity of all joints is: keys of a map with placeholders, and the columns that they stand for."""
+    """Location of one quantity of all joints: keys of a map with placeholders, and the columns that they stand for."""
 
     keys: Mapping[str, str]
     columns: tuple[str, ...] = ()
@@ -377,7 +377,7 @@ def _joint_draft(
 def _joint_columns(
     table: Table, joints: Sequence[str], time: str | None
 ) -> tuple[dict[str, _Place], list[str]]:
-    """Places by quantity, and columns that are of no use."""
+    """Return places by quantity, and the unused columns."""
     names = [name for name in dict.fromkeys([*table.aliases, *table.shapes]) if name != time]
     templates: dict[str, dict[int, str]] = {}
     for name in names:
@@ -403,7 +403,10 @@ def _joint_columns(
 
 
 def _joint_templates(name: str, joints: Sequence[str]) -> Iterator[tuple[str, int]]:
-    """A name with a placeholder in the place of a joint's name or number, and which joint that is."""
+    """Yield a name with a placeholder for a joint's name or number, and that joint's index.
+
+    If the name holds no joint's name, the name itself comes last, with index 0.
+    """
     for j, joint in sorted(enumerate(joints), key=lambda each: -len(each[1])):
         at = re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
         if at is not None:
@@ -417,7 +420,7 @@ def _joint_templates(name: str, joints: Sequence[str]) -> Iterator[tuple[str, in
 
 
 def _quantity(name: str) -> str | None:
-    """What a name says that it holds."""
+    """Return the quantity that a name states, or None."""
     words = {token.lower() for token in TOKEN.findall(re.sub(r"\{\w+\}|\[.*?\]", " ", name))}
     for quantity, telling in _WORDS.items():
         if words & telling:
@@ -426,7 +429,6 @@ def _quantity(name: str) -> str | None:
 
 
 def _joint_line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]) -> str:
-    """The line of one channel."""
     kind, motor, doubts = QUANTITIES[name].kind, QUANTITIES[name].motor, []
     slide = all(slides) and not motor
     if any(slides) and not all(slides) and kind in ("position", "velocity", "effort"):
@@ -458,7 +460,7 @@ def _joint_line(name: str, place: _Place, values: Array | None, slides: Sequence
 
 
 def _first_values(table: Table, columns: Sequence[str]) -> Array | None:
-    """The first finite values of some columns, all together."""
+    """Return the first finite values of some columns, concatenated; None if they cannot be read."""
     plain = {c: c if c in table.shapes else c.partition("[")[0] for c in columns}  # brackets may hold a unit
     wanted = tuple(dict.fromkeys(table.aliases.get(c, (plain[c], None))[0] for c in columns))
     if not all(name in table.shapes for name in wanted):
@@ -471,8 +473,8 @@ def _first_values(table: Table, columns: Sequence[str]) -> Array | None:
 
 
 def _joint_topics(path: Path, joints: Sequence[str]) -> tuple[dict[str, _Place], list[str]]:
-    """The topic of joint states that has most of the model's joints, and the others."""
-    from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # its library takes a third of a second to load
+    """Return the places in the joint state topic with most of the model's joints, and the other topics."""
+    from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
     from mocobot_logs.bag.files import BagFiles
     from mocobot_logs.bag.read import Look
 

@@ -1,6 +1,6 @@
-"""What the names of a log's columns and topics say: quantity, joint or axis, unit, robot.
+"""Parse names of columns and topics: quantity, joint or axis, unit, robot.
 
-A name is read alone first (``Reading``); then names that differ by the robot alone are one channel of all robots.
+Each name is first parsed alone (``Reading``). Names that differ only by the robot then form one channel of all robots.
 """
 
 import re
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mocobot_logs.bag.cdr import MessageType
 
 JOINED = "\x1f"
-"""Stands between topic, joint and field where these are read as one name."""
+"""Separator between topic, joint and field in a combined name."""
 INDEX = {"z": 2, "y": 1, "x": 0, "yaw": 2, "pitch": 1, "roll": 0}
 _TURNS = ("yaw", "pitch", "roll")
 _COMMAND = {"ref", "reference", "cmd", "command", "commanded", "setpoint", "desired", "target", "goal"}
@@ -46,7 +46,7 @@ UNITS = {
     "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "us": "us", "usec": "us",
     "µs": "us", "ns": "ns", "nsec": "ns",
 }  # fmt: skip
-"""Units of maps by the words that names hold."""
+"""Units of maps by the words in names."""
 _UNIT = re.compile(r"(?:\s*[\[(]\s*([^\[\]()]{1,12}?)\s*[\])]|[_.\s/-]([A-Za-z°µ]{1,7}))\s*$")
 TOKEN = re.compile(r"[A-Z]?[a-z°µ]+|[A-Z]+(?![a-z])|\d+")
 _GLUED = re.compile(r"(f|h|force|theta|ref|gimbal|cmd|pos|p)([xyz])")
@@ -58,11 +58,11 @@ class Reading:
 
     Attributes:
         group: "phi", "tau", "theta", "h", "force", "ref" or "time".
-        index: joint as the name counts it, or axis (x 0, y 1, z 2), or None for time.
+        index: joint number as in the name, or axis (x 0, y 1, z 2), or None for time.
         axis: whether ``index`` is an axis.
-        unit: as a map calls it, or None where the name does not say.
-        rest: spans of the name's tokens that say neither, one of which may tell the robot.
-        doubt: what is not sure about it, or None.
+        unit: unit in a map, or None if the name has none.
+        rest: spans of the remaining tokens, one of which may identify the robot.
+        doubt: what is uncertain, or None.
     """
 
     group: str
@@ -74,11 +74,11 @@ class Reading:
 
 
 def read_name(name: str, *, element: bool = False) -> Reading | None:
-    """What a name says, None if it is of no use.
+    """Parse a name; return None if it names no channel.
 
     Args:
         name: the name.
-        element: whether it ends in the index of an element of an array.
+        element: whether it ends in the index of an array element.
     """
     unit, end = _unit(name)
     for told, stop in dict.fromkeys([(unit, end), (None, len(name))]):
@@ -89,7 +89,7 @@ def read_name(name: str, *, element: bool = False) -> Reading | None:
 
 
 def _unit(name: str) -> tuple[str | None, int]:
-    """The unit that a name ends in, and where the rest ends."""
+    """Return the unit at the end of a name, and the end of the rest."""
     found = _UNIT.search(name)
     if found is None:
         return None, len(name)
@@ -179,16 +179,17 @@ def _joint(
 
 
 def _rest(tokens: list[tuple[str, int, int]], used: set[str], at: int | None) -> tuple[tuple[int, int], ...]:
-    """Spans of what is left; a robot may be called like a quantity, so only whole words of it are taken out."""
+    """Return the spans of the remaining tokens; only whole tokens are removed, since a robot's name may hold a
+    quantity."""
     return tuple((a, b) for k, (text, a, b) in enumerate(tokens) if k != at and text not in used)
 
 
 ROWS = 200_000
-"""So many rows are looked at."""
+"""Number of rows that are read."""
 _LONGEST_ARRAY = 64
 
 Place = tuple[str, tuple[int, ...]]
-"""A column, and the index in it."""
+"""A column and an index in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,10 +197,10 @@ class Candidate:
     """A number that a log has in every row or message.
 
     Attributes:
-        name: of a column; or topic, joint and field, or topic and field, with ``JOINED`` between them.
-        keys: which keys of a map these are.
+        name: a column; or topic, joint and field, or topic and field, with ``JOINED`` between them.
+        keys: keys of a map for these parts.
         reading: what the name says.
-        values: the first ones, without NaN, or None where they could not be read.
+        values: first values without NaN, or None if they could not be read.
     """
 
     name: str
@@ -208,12 +209,12 @@ class Candidate:
     values: Array | None
 
     def place(self, name: str) -> dict[str, str]:
-        """Keys and values of a map for the name, or for the name with a placeholder in it."""
+        """Return keys and values of a map for the name, or for the name with a placeholder."""
         return dict(zip(self.keys, name.split(JOINED), strict=True))
 
 
 def of_table(table: Table) -> list[Candidate]:
-    """Candidates of a table."""
+    """Return the candidates of a table."""
     places: dict[Place, str] = {}
     for column, shape in table.shapes.items():
         if np.prod(shape, dtype=object) == 1:
@@ -235,7 +236,7 @@ def of_table(table: Table) -> list[Candidate]:
     if not found and places:
         _values(
             table, [next(iter(places))]
-        )  # names of nothing: is the header none, with other rows below it?
+        )  # reads one column, to refuse a table whose rows do not fit its header
     values = _values(table, [place for place, reading in found.items() if reading.group != "time"])
     for place, reading in found.items():
         if reading.group == "time":
@@ -250,7 +251,7 @@ def _reading(name: str, place: Place) -> Reading | None:
 
 
 def _of_robots(column: str, robot: int, k: int) -> Reading | None:
-    """Element of an array (N, 3): the first index counts robots."""
+    """Parse an element of an array (N, 3) whose first index counts robots."""
     reading, start = read_name(f"{column}[{k}]", element=True), len(column) + 1
     if reading is None:
         return None
@@ -260,14 +261,14 @@ def _of_robots(column: str, robot: int, k: int) -> Reading | None:
 
 
 def _values(table: Table, places: list[Place]) -> dict[Place, Array]:
-    """First values of some places; nothing of columns that hold no numbers."""
+    """Return the first values of some places; columns without numbers are left out."""
     try:
         return _values_of(table, places)
     except BrokenRowsError:
         raise
     except InputError:
         found: dict[Place, Array] = {}
-        for place in places:  # one of them: which?
+        for place in places:  # find out which place has no numbers
             try:
                 found |= _values_of(table, [place])
             except InputError:
@@ -294,8 +295,8 @@ _DEEPEST, _MOST = 4, 64
 
 
 def of_bag(path: Path) -> tuple[list[Candidate], frozenset[str]]:
-    """Candidates of a bag (joints of joint states, numbers of other messages), and topics that have no stamps."""
-    from mocobot_logs.bag.cdr import (  # takes a third of a second
+    """Return the candidates of a bag (joints of joint states, numbers of other messages), and topics without stamps."""
+    from mocobot_logs.bag.cdr import (  # the import takes a third of a second
         JOINT_STATE,
         CdrReader,
         Selector,
@@ -317,7 +318,7 @@ def of_bag(path: Path) -> tuple[list[Candidate], frozenset[str]]:
             else:
                 selectors = [Selector(field) for field in _numbers(kind, kind.name, 0)[:_MOST]]
         except InputError:
-            continue  # of a type that is not read, and so of no use
+            continue  # the type cannot be read
         messages = look.first(name, _BAG_BYTES) if selectors else None
         if messages is None:
             continue
@@ -335,7 +336,7 @@ def of_bag(path: Path) -> tuple[list[Candidate], frozenset[str]]:
 
 
 def _numbers(kind: "MessageType", name: str, depth: int) -> list[str]:
-    """Dotted paths of the floating numbers outside arrays."""
+    """Return the dotted paths of the floating-point numbers outside arrays."""
     from rosbags.interfaces import Nodetype
 
     paths = []
@@ -356,16 +357,16 @@ def _is_stamped(kind: "MessageType") -> bool:
 
 
 HOLE = "\0"
-"""Stands for the robot in a name."""
+"""Placeholder for the robot in a name."""
 
 
 @dataclass(frozen=True)
 class Robots:
-    """How names tell robots.
+    """How names distinguish robots.
 
     Attributes:
-        called: what tells each robot in names, in order; nothing where there is a single one.
-        placeholder: of a map: ``{robot}``, ``{robot0}`` or ``{name}``; "" for a single robot.
+        called: the part of the name that identifies each robot, in order; empty for a single robot.
+        placeholder: placeholder in a map: ``{robot}``, ``{robot0}`` or ``{name}``; "" for a single robot.
     """
 
     called: tuple[str, ...]
@@ -373,11 +374,11 @@ class Robots:
 
 
 Templates = dict[str, dict[str, Candidate]]
-"""Names with ``HOLE`` in the place of the robot, and what fills it."""
+"""Names with ``HOLE`` in place of the robot, then candidates by the text that fills it."""
 
 
 def templates_of(candidates: Sequence[Candidate]) -> Templates:
-    """Every way in which names of one channel may differ by the robot alone."""
+    """Return every way in which names of one channel may differ only by the robot."""
     found: Templates = defaultdict(dict)
     for candidate in candidates:
         name = candidate.name
@@ -391,7 +392,7 @@ def templates_of(candidates: Sequence[Candidate]) -> Templates:
 
 
 def find_robots(channels: Mapping[str, Templates]) -> Robots:
-    """What tells the robots in most channels; of equals, the larger set and numbers from 1 or 0."""
+    """Find the texts that identify robots in most channels; ties go to numbers from 1 or 0, then to the larger set."""
     votes: Counter[frozenset[str]] = Counter()
     for templates in channels.values():
         for told in {frozenset(each) for each in templates.values() if len(each) > 1}:
@@ -418,13 +419,13 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Found:
-    """What the names of a log tell.
+    """Channels and robots found in the names of a log.
 
     Attributes:
-        candidates: all of them.
-        channels: those that are channels.
-        templates: by channel, how their names differ by the robot.
-        robots: what these are called.
+        candidates: all candidates.
+        channels: candidates by channel.
+        templates: by channel, how names differ by the robot.
+        robots: how names distinguish robots.
     """
 
     candidates: Sequence[Candidate]
@@ -441,7 +442,7 @@ def find_channels(candidates: Sequence[Candidate]) -> Found:
 
 
 def _by_channel(candidates: Sequence[Candidate]) -> dict[str, list[Candidate]]:
-    """Candidates by the channel that their names tell."""
+    """Group candidates by the channel that their names state."""
     from_0 = {
         group
         for group in ("phi", "tau", "theta")

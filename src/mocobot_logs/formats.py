@@ -1,6 +1,6 @@
-"""What a log is, told from its first bytes or from what its folder holds, and what to say of damaged ones.
+"""Identify the format of a log from its first bytes or its folder, and report damaged files.
 
-Libraries that read logs are not loaded here: it takes time.
+Libraries that read logs are imported elsewhere, since that takes time.
 """
 
 from collections.abc import Iterator
@@ -15,17 +15,20 @@ from estimator.inputs import open_input, printable
 
 LONGEST = 200
 readable = partial(system_errors, done="read")
-"""A block in which what the operating system refuses becomes one sentence: that a file cannot be read."""
+"""Context manager that turns errors of the operating system into one sentence: that a file cannot be read."""
 
 
 def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
-    """All of a file that describes something.
+    """Read a small file of metadata.
 
     Args:
         path: the file.
-        most_bytes: more are not read.
-        where: what messages call the file.
-        kind: what it should be, for the message.
+        most_bytes: largest allowed size [bytes].
+        where: name of the file in messages.
+        kind: expected content, for messages.
+
+    Raises:
+        InputError: the file cannot be read, or is too large.
     """
     with readable(where), open_input(path) as file:
         content = file.read(most_bytes + 1)
@@ -35,26 +38,26 @@ def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
 
 
 def detail_of(error: BaseException) -> str:
-    """The first line of an error's message, or its type where there is none: printable and short."""
+    """Return the first line of an error's message, printable and short, or its type if there is none."""
     lines = str(error).splitlines()
     return shown(lines[0].strip() if lines else "", LONGEST) or type(error).__name__
 
 
 def shown(text: str, longest: int = 60) -> str:
-    """Text of a file as a terminal may show it."""
+    """Return text of a file in a form that a terminal can show."""
     return printable(text[:longest], keep="")[:longest]
 
 
 @contextmanager
 def told_in_one_sentence(where: str, kind: str) -> Iterator[None]:
-    """Whatever a library raises inside the block on a file of some kind, as one sentence."""
+    """Turn every error of a library inside the block into one sentence about the file."""
     try:
         yield
     except InputError:
         raise
     except PermissionError as error:
         raise InputError(f"{where}: cannot be read (permission denied)") from error
-    except Exception as error:  # on damaged bytes libraries raise many types, not all of them their own
+    except Exception as error:  # for damaged bytes libraries raise many types, not all of them their own
         raise InputError(f"{where}: not a readable {kind}, or a damaged one ({detail_of(error)})") from error
 
 
@@ -67,14 +70,14 @@ SUFFIXES: dict[str, OutputKind] = {
     ".db3": "sqlite3",
     "": "folder",
 }
-"""What is written, by the target's suffix; a bag's folder has none."""
+"""Output formats by suffix of the target; a bag's folder has none."""
 
 
 def output_kind(path: Path) -> OutputKind:
-    """What a target is to hold.
+    """Return the output format of a target.
 
     Raises:
-        InputError: nothing is written under such a name.
+        InputError: the suffix belongs to no output format.
     """
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None or not path.name:
@@ -102,7 +105,7 @@ MATLAB = b"MATL"
 
 
 def log_kind(path: Path) -> Kind:
-    """What a log is; a recording that merely lies in a dataset is none of its data.
+    """Return the format of a log; a recording inside a dataset's folder does not belong to the dataset.
 
     Raises:
         InputError: there is no such log, or its format is not known.
@@ -122,7 +125,7 @@ def log_kind(path: Path) -> Kind:
             head = file.read(4)
     except PermissionError as error:
         raise InputError(f"{path}: cannot be read (permission denied)") from error
-    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL
         if isinstance(error, InputError):
             raise
         raise InputError(f"{str(path)!r:.80}: not a usable file name ({detail_of(error)})") from error
@@ -147,7 +150,7 @@ def log_kind(path: Path) -> Kind:
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a Parquet file says that it is a recording.
+    """Return whether a Parquet file is a recording.
 
     Raises:
         InputError: it cannot be read.
@@ -161,7 +164,7 @@ def is_recording(path: Path) -> bool:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is meant as a bag: a folder with a bag's files, or a file that begins or is named like one."""
+    """Return whether a path is a bag: a folder with a bag's files, or a file with a bag's first bytes or suffix."""
     try:
         if path.is_dir():
             return (path / BAG_METADATA).exists() or any(has_bag_suffix(entry) for entry in path.iterdir())
@@ -175,12 +178,12 @@ def is_bag(path: Path) -> bool:
 
 
 def has_bag_suffix(path: Path) -> bool:
-    """Whether a file is named like one of a bag."""
+    """Return whether a file has the suffix of a bag."""
     return path.name.lower().endswith(BAG_SUFFIXES)
 
 
 def dataset_root(path: Path) -> Path | None:
-    """The LeRobot dataset that a path is, or whose data file it is; None if it is neither."""
+    """Return the LeRobot dataset that a path is or belongs to; None if there is none."""
     for folder in (path, *(path.parents[2:3] if path.is_file() else ())):
         if (folder / DATASET_INFO).is_file():
             return folder

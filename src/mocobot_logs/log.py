@@ -1,9 +1,8 @@
-"""A measured log as it comes: every robot's samples with its own stamps, nothing checked or resampled yet.
+"""Measured logs before any check or resampling: every robot's samples with its own stamps.
 
-Readers are sources: they hand out a log in chunks, so that an hour of ten robots at 1 kHz never has to be in memory.
-What they hand out is in SI units and in mocobot's channels already; what is wrong with the samples (gaps, NaN, time
-running backwards) is still in it, for ``inspect`` to see and for the resampler to fill or refuse.
-Only rows that a logger wrote again are left out (``Readings``), and counted.
+Readers are sources that yield a log in chunks, so that long logs need not fit in memory. Samples are already in SI
+units and in mocobot's channels. Gaps, NaN and decreasing stamps are still present, for ``inspect`` to report and for
+the resampler to fill or refuse. Only rows that repeat a reading are left out (``Readings``), and counted.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +30,7 @@ CHANNELS: dict[Level, tuple[str, ...]] = {
 REF = ("ref_x", "ref_y", "ref_z")
 """Optional channels of one robot: commanded wrist position in {b} [m]."""
 NS = 1e-9
-"""One nanosecond [s]: stamps are whole nanoseconds, since a float of the Unix time resolves 0.24 us only."""
+"""One nanosecond [s]. Stamps are integer nanoseconds, since a float of the Unix time resolves only 0.24 us."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +38,10 @@ class Samples:
     """Samples of one robot, in the order of the log.
 
     Attributes:
-        stamp_ns: when the robot says it took them [ns], shape (q,).
-        values: the source's channels [SI], NaN where a message lacked one, shape (q, C).
-        log_ns: when the recorder wrote them [ns], shape (q,), or None where the format does not say.
-        repeats: rows after each that repeat it and are left out, shape (q,); none if not given.
+        stamp_ns: time of sampling by the robot's clock [ns], shape (q,).
+        values: channels of the source [SI], NaN where a message lacked one, shape (q, C).
+        log_ns: time of recording [ns], shape (q,), or None if the format has none.
+        repeats: number of omitted rows after each row that repeat it, shape (q,); zero if not given.
     """
 
     stamp_ns: Stamps
@@ -51,7 +50,7 @@ class Samples:
     repeats: Stamps = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Without word of any, no row is left out."""
+        """Set ``repeats`` to zero if not given."""
         if self.repeats is None:
             object.__setattr__(self, "repeats", np.zeros(len(self.stamp_ns), np.int64))
 
@@ -60,12 +59,12 @@ class LogSource(Protocol):
     """A log that can be read in chunks, any number of times.
 
     Attributes:
-        name: what messages call it, the path as the user gave it.
-        level: which channels it has.
+        name: path as the user gave it, used in messages.
+        level: level of its channels.
         robots: number of robots.
         channels: columns of ``Samples.values``: ``CHANNELS[level]``, then ``REF`` if the log has commands.
-        metadata: what the log says about itself where it was written by mocobot, else None.
-        size: all that there is to read, in units of ``advance`` (bytes, rows or messages).
+        metadata: metadata of a log that mocobot wrote, else None.
+        size: total amount to read, in units of ``advance`` (bytes, rows or messages).
     """
 
     name: str
@@ -76,10 +75,10 @@ class LogSource(Protocol):
     size: int
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Samples of one robot after the other as the log has them: (robot from 0, its next samples).
+        """Yield samples in the order of the log: (robot from 0, its next samples).
 
         Args:
-            advance: takes the progress made since the last call.
+            advance: called with the progress since the last call.
 
         Raises:
             InputError: the log is damaged, or holds what its map does not allow.
@@ -122,7 +121,7 @@ def collect(source: LogSource, advance: Callable[[int], object] = lambda _: None
 
 
 def joined(parts: Sequence[Samples], channels: int) -> Samples:
-    """Samples of one robot in one piece; ``log_ns`` only where every part has it."""
+    """Concatenate samples of one robot; ``log_ns`` is kept only if every part has it."""
     if not parts:
         return Samples(np.empty(0, np.int64), np.empty((0, channels)))
     logs = [part.log_ns for part in parts if part.log_ns is not None]
@@ -135,27 +134,27 @@ def joined(parts: Sequence[Samples], channels: int) -> Samples:
 
 
 def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Samples:
-    """Some of the rows, by a mask or by their numbers."""
+    """Return some rows, by mask, indices or slice."""
     log_ns = None if samples.log_ns is None else samples.log_ns[keep]
     return Samples(samples.stamp_ns[keep], samples.values[keep], log_ns, samples.repeats[keep])
 
 
 _EFFORTS = ("tau", "force_", "torque", "link_torque", "motor_torque", "current")
 _UNMEASURED = ("ref_", "command", "motor_command", "duty", "motor_voltage", "supply", "enabled")
-"""How names of channels begin, for teams and for joints, that hold measured efforts and no measurements at all."""
+"""Prefixes of channel names, for teams and joints: measured efforts, and channels that are no measurements."""
 
 
 class Readings:
-    """A log without rows that repeat the one before, as a ``LogSource``; ``Samples.repeats`` counts them."""
+    """A log without rows that repeat the previous reading, as a ``LogSource``; ``Samples.repeats`` counts them."""
 
     def __init__(self, source: LogSource) -> None:
-        """Take the log; nothing is read yet."""
+        """Wrap a log; nothing is read yet."""
         self.level: Level = source.level
         self.name, self.robots, self.channels = source.name, source.robots, source.channels
         self.metadata, self.size, self._source = source.metadata, source.size, source
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """As ``LogSource.chunks``.
+        """Yield samples as ``LogSource.chunks``.
 
         Raises:
             InputError: the log is damaged, or holds what its map does not allow.
@@ -170,7 +169,7 @@ class Readings:
 
 
 class _Stream:
-    """Rows of one robot; the last reading waits, as the next rows may repeat it."""
+    """Rows of one robot; the last reading is held back, since the next rows may repeat it."""
 
     def __init__(self, channels: tuple[str, ...]) -> None:
         self._measured = [k for k, name in enumerate(channels) if not name.startswith(_UNMEASURED)]
@@ -181,24 +180,24 @@ class _Stream:
         self._rows = 0
 
     def push(self, samples: Samples) -> Samples | None:
-        """Take rows; readings that are complete, once ``BLOCK`` rows are there."""
+        """Add rows; return the complete readings once ``BLOCK`` rows are waiting."""
         self._waiting.append(samples)
         self._rows += len(samples.stamp_ns)
         return self._judged(self._rows // BLOCK * BLOCK) if self._rows >= BLOCK else None
 
     def finish(self) -> Samples:
-        """The last readings."""
+        """Return the last readings."""
         return joined([self._judged(self._rows), self._held], self._channels)
 
     def _judged(self, rows: int) -> Samples:
-        """Readings among the next rows, but for the last."""
+        """Return the readings among the next rows, except the last."""
         samples = joined(self._waiting, self._channels)
         self._waiting, self._rows = [rows_of(samples, slice(rows, None))], self._rows - rows
         again = self._repeats.of(samples.values[:rows, self._measured])
         held = [self._held] * len(self._held.stamp_ns)
         samples = joined([*held, rows_of(samples, slice(rows))], self._channels)
         again = np.concatenate([np.zeros(len(held), dtype=bool), again])
-        again[1:] &= np.diff(samples.stamp_ns) != 0  # rows with one stamp are another matter
+        again[1:] &= np.diff(samples.stamp_ns) != 0  # equal stamps mean duplicates, not repeats
         kept = np.flatnonzero(~again)
         readings = rows_of(samples, kept)
         readings.repeats[:] += np.diff(kept, append=len(again)) - 1
@@ -207,5 +206,5 @@ class _Stream:
 
 
 def repeated(rows: int) -> str:
-    """What to say of rows that repeat the one before."""
+    """Describe rows that repeat the previous reading."""
     return f"{rows} row{'s' * (rows > 1)} repeat{'s' * (rows == 1)} the one before, and a reading counts once"

@@ -1,6 +1,6 @@
-"""Maps of a team's logs: where each channel of each robot is, in which unit, sign and zero (docs/measured-data.md).
+"""Maps of a team's logs: location, unit, sign and zero of each robot's channels (docs/measured-data.md).
 
-What every map has (places, units, time, the form of text tables) is parsed here for the maps of one robot's joints too.
+The parsers of places, units, time and text tables also serve the maps of one robot's joints.
 """
 
 import re
@@ -25,9 +25,9 @@ from mocobot_logs.units import COUNTS, DATES, TIME_UNITS, si_factor
 VERSION = 1
 MAX_ROBOTS = 1000
 GAP_OF_ROBOTS = 20
-"""So far beyond the last robot found another one is looked for, which would mean that one is missing."""
+"""Number of robots beyond the last one in which another is searched; finding one means that a robot is missing."""
 MAPS = ("omnid-ros2", "mocobot-ros2", "mocobot", "mocobot-wrist", "mocobot-arrays", "mocobot-arrays-wrist")
-"""Built-in maps."""
+"""Names of the built-in maps."""
 PLACES = ("topic", "joint", "field", "column")
 JOINT_FIELDS = ("position", "velocity", "effort")
 _PLACEHOLDERS = ("robot", "robot0", "name", "channel")
@@ -37,7 +37,7 @@ _TIME = ("column", "unit", "clock")
 _CSV = ("delimiter", "decimal")
 _CHANNEL = (*PLACES, "unit", "sign", "offset", "counts_per_turn", "optional")
 KEYS = (*_REQUIRED, *_OPTIONAL, *_TIME, *_CSV, *_CHANNEL)
-"""Every key of a map but the channels' names."""
+"""Every key of a map except the channels' names."""
 _LARGEST_BYTES = 1 << 20
 _DIMENSIONS = {
     "phi": "angle", "theta": "angle", "tau": "torque", "h": "length", "force": "force", "ref": "length"
@@ -53,18 +53,18 @@ Values = Mapping[str, Any]
 
 
 def dimension_of(channel: str) -> str:
-    """What a channel such as ``phi1``, ``theta_z`` or ``force_x`` measures: an angle, a length, a torque or a force."""
+    """Return what a channel such as ``phi1``, ``theta_z`` or ``force_x`` measures: angle, length, torque or force."""
     return _DIMENSIONS[channel.partition("_")[0].rstrip("123")]
 
 
 def units_of(channel: str) -> tuple[str, ...]:
-    """Units in which a channel may be logged."""
+    """Return the units in which a channel may be logged."""
     return _UNITS[dimension_of(channel)]
 
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """Where one channel of one robot is, and how to bring it to SI: ``scale * (raw + offset)``.
+    """Location of one channel of one robot, and its conversion to SI: ``scale * (raw + offset)``.
 
     Attributes:
         topic: topic of a bag, or None.
@@ -72,10 +72,10 @@ class ChannelMap:
         field: ``position``, ``velocity`` or ``effort`` of that joint, or the dotted path in another message.
         column: column of a table, ``name[i, j]`` inside an array, or None.
         scale: sign times the size of one raw unit in SI.
-        offset: added before sign and unit [raw unit].
-        optional: whether a log may lack it (commands only).
-        bits: of a signed number that was logged without its sign (two's complement), or None.
-        counted: whether the raw numbers are counts, whose step is 1.
+        offset: added before sign and unit apply [raw unit].
+        optional: whether a log may lack the channel (commands only).
+        bits: width of a signed number that was logged as unsigned (two's complement), or None.
+        counted: whether raw values are counts, whose step is 1.
     """
 
     topic: str | None = None
@@ -89,7 +89,7 @@ class ChannelMap:
     counted: bool = False
 
     def apply(self, raw: Array) -> Array:
-        """Raw samples in SI; the same array where nothing is to be done."""
+        """Convert raw samples to SI; return the same array if nothing changes."""
         if self.bits is not None:
             half = 2.0 ** (self.bits - 1)
             raw = np.mod(raw + half, 2.0 * half) - half
@@ -97,23 +97,23 @@ class ChannelMap:
         return shifted * self.scale if self.scale != 1.0 else shifted
 
     def undo(self, si: Array) -> Array:
-        """SI samples as the log has them: the inverse of ``apply``."""
+        """Convert SI samples to raw values: the inverse of ``apply``, except for ``bits``."""
         return si / self.scale - self.offset
 
     def filled(self, fill: Callable[[str], str]) -> "ChannelMap":
-        """The channel with the placeholders in its texts filled."""
+        """Return the channel with the placeholders in its texts replaced."""
         texts = {key: getattr(self, key) for key in PLACES}
         return replace(self, **{key: text and fill(text) for key, text in texts.items()})
 
 
 @dataclass(frozen=True)
 class TimeMap:
-    """Where a log's time is.
+    """Location of a log's time.
 
     Attributes:
         column: column of a table, which may hold ``{robot}`` or ``{name}``; None stands for ``time``, and for
             ``timestamp`` in a LeRobot dataset.
-        unit: ``s``, ``ms``, ``us`` or ``ns``; ``iso`` for dates of ISO 8601.
+        unit: ``s``, ``ms``, ``us`` or ``ns``; ``iso`` for ISO 8601 dates.
         clock: stamp of a bag's messages: ``header`` (when the robot took the sample) or ``log`` (when it was written).
     """
 
@@ -123,13 +123,13 @@ class TimeMap:
 
     @property
     def unit_ns(self) -> int | None:
-        """Nanoseconds in one unit, None for dates."""
+        """Nanoseconds per unit, None for dates."""
         return TIME_UNITS.get(self.unit)
 
 
 @dataclass(frozen=True)
 class CsvMap:
-    """How a text table is written: what stands between two cells (None to find out), and the decimal mark."""
+    """Form of a text table: delimiter between cells (None to detect it) and decimal mark."""
 
     delimiter: str | None = None
     decimal: Literal[".", ","] = "."
@@ -137,19 +137,19 @@ class CsvMap:
 
 @dataclass(frozen=True)
 class LogMap:
-    """A map: strict, complete, and the same for every robot up to overrides.
+    """A complete, checked map; all robots share it except for overrides.
 
     Attributes:
-        name: what messages call it.
-        level: whether angles and torques or wrist positions and forces are logged.
-        robots: number of robots, or None to count those that the log has.
+        name: name of the map in messages.
+        level: whether the log holds angles and torques, or wrist positions and forces.
+        robots: number of robots, or None to count those in the log.
         trial: kind of trial, or None.
-        time: where time is.
-        csv: how a text table is written.
+        time: location of the time.
+        csv: form of a text table.
         common: every mapped channel in the order of ``Samples.values``, with placeholders.
-        required: channels that every log has.
-        own: by robot (from 1), the channels that differ.
-        called: what the robots are called, in order, or nothing.
+        required: channels that every log must have.
+        own: channels that differ, by robot (from 1).
+        called: names of the robots in order, or empty.
     """
 
     name: str
@@ -169,11 +169,11 @@ class LogMap:
         return tuple(self.common)
 
     def meaning(self, name: str, robot: int) -> str:
-        """What messages call a channel of one robot, counted from 1."""
+        """Return the name of a channel of one robot, counted from 1, in messages."""
         return f"{name} of robot {robot}" if name in (*CHANNELS[self.level], *REF) else name
 
     def channels(self, robot: int) -> dict[str, ChannelMap]:
-        """Every mapped channel of one robot, counted from 1, placeholders filled, in the order of ``names``."""
+        """Return the mapped channels of one robot (from 1) in the order of ``names``, placeholders replaced."""
         found = {**self.common, **self.own.get(robot, {})}
         return {
             name: channel.filled(lambda text, name=name: self._fill(text, robot, name))
@@ -181,7 +181,7 @@ class LogMap:
         }
 
     def time_column(self, robot: int) -> str | None:
-        """The time column of one robot, counted from 1."""
+        """Return the time column of one robot, counted from 1."""
         return self.time.column and self._fill(self.time.column, robot)
 
     def _fill(self, text: str, robot: int, channel: str = "") -> str:
@@ -191,7 +191,7 @@ class LogMap:
         return re.sub(r"\{(\w+)\}", lambda found: values.get(found[1], found[0]), text)
 
     def require(self, key: Literal["topic", "field", "column"], kind: str) -> None:
-        """Check that the map locates every channel in a kind of log, named in the plural."""
+        """Check that the map has a location for every channel in one kind of log; ``kind`` names it in the plural."""
         tables = {"channels": self.common, **{f"robot.{r}.channels": own for r, own in self.own.items()}}
         for table, channels in tables.items():
             for name, channel in channels.items():
@@ -204,12 +204,15 @@ class LogMap:
     def count_robots(
         self, where: str, is_there: Callable[[int], bool], key: Literal["topic", "column"]
     ) -> int:
-        """Robots by the map, or those that a log has.
+        """Return the number of robots from the map, or count those in the log.
 
         Args:
-            where: what messages call the log.
-            is_there: whether it has anything of a robot, counted from 1.
-            key: what locates channels in it.
+            where: name of the log in messages.
+            is_there: whether the log has any channel of a robot, counted from 1.
+            key: how the log locates channels.
+
+        Raises:
+            InputError: a robot in the middle is missing.
         """
         if self.robots is not None:
             return self.robots
@@ -224,35 +227,35 @@ class LogMap:
                     f"{where}: there are {key}s of robots {count} and {later}, but none of robot {count + 1}; "
                     "robots are counted from 1 without a gap, or set by the key robots in a map"
                 )
-        return max(count, 1)  # without any robot, what the first one lacks is what is missing
+        return max(count, 1)  # without any robot, later checks report what robot 1 lacks
 
     def has_commands(self, robots: int, is_there: Callable[[ChannelMap], bool]) -> bool:
-        """Whether commands are read: mapped, and in the log of any robot unless they must be there."""
+        """Return whether to read commands: they are mapped, and either required or present for some robot."""
         if REF[0] not in self.common:
             return False
         every = [self.channels(robot)[name] for robot in range(1, robots + 1) for name in REF]
         return not all(self.common[name].optional for name in REF) or any(map(is_there, every))
 
     def one_robot_only(self, key: Literal["topic", "column"]) -> bool:
-        """Whether every robot would be read from the same place, so that a log can hold just one."""
+        """Return whether all robots would read the same place, so that a log can hold only one robot."""
         return not self.own and not any(
             re.search(r"\{(robot0?|name)\}", (getattr(channel, key) or "") + (channel.joint or ""))
             for channel in self.common.values()
         )
 
 
-# What maps of teams and of joints have in common.
+# Parts shared by maps of teams and of joints.
 
 
 def check_version(values: Values, where: str) -> None:
-    """Refuse a map of another version, before all else: it may have other keys."""
+    """Refuse a map of another version; checked first, since its keys may differ."""
     version = values.get("version", VERSION)
     if type(version) is not int or version != VERSION:
         raise InputError(f"{where}: version is {version!r:.40}; this program reads version {VERSION}")
 
 
 def table_of(values: Values, key: str, where: str) -> dict[str, Any]:
-    """A table inside another one, empty where there is none."""
+    """Return a table inside another one, empty if it is missing."""
     table = values.get(key, {})
     if not isinstance(table, dict):
         raise InputError(f"{where}: {key} is {table!r:.40}; it must be a table, [{key}]")
@@ -260,7 +263,7 @@ def table_of(values: Values, key: str, where: str) -> dict[str, Any]:
 
 
 def check_placeholders(fields: Fields, key: str, known: Sequence[str]) -> str | None:
-    """A text whose placeholders are known, None where there is none."""
+    """Return a text after a check of its placeholders, None if it is missing."""
     if key not in fields:
         return None
     text = fields.text(key)
@@ -276,12 +279,15 @@ def check_placeholders(fields: Fields, key: str, known: Sequence[str]) -> str | 
 def parse_channel(
     fields: Fields, placeholders: Sequence[str], dimension: str, units: Sequence[str], noun: str
 ) -> ChannelMap:
-    """A channel from its table.
+    """Parse a channel from its table.
 
     Args:
-        fields: of the table, ``unit`` among them.
-        placeholders: that its texts may hold.
+        fields: the table, with ``unit``.
+        placeholders: placeholders that its texts may hold.
         dimension, units, noun: see ``si_factor``.
+
+    Raises:
+        InputError: a key is missing, or a value is not allowed.
     """
     place = {key: check_placeholders(fields, key, placeholders) for key in PLACES}
     if place["column"] is None and (place["topic"] is None or place["field"] is None):
@@ -310,7 +316,7 @@ def parse_channel(
 
 
 def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEHOLDERS) -> TimeMap:
-    """Where time is, by the table ``[time]``."""
+    """Parse the table ``[time]``."""
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     return TimeMap(
         column=check_placeholders(fields, "column", placeholders),
@@ -320,7 +326,7 @@ def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEH
 
 
 def parse_csv(values: Values, where: str) -> CsvMap:
-    """How a text table is written, by the table ``[csv]``."""
+    """Parse the table ``[csv]``."""
     fields = Fields(values, (), where, _CSV)
     delimiter = values.get("delimiter")
     decimal: Literal[".", ","] = fields.one_of("decimal", (".", ",")) if "decimal" in fields else "."
@@ -334,7 +340,7 @@ def parse_csv(values: Values, where: str) -> CsvMap:
 
 
 def read_toml_map(path: Path) -> dict[str, object]:
-    """Keys and values of a map's file.
+    """Read a map's file.
 
     Raises:
         InputError: there is no such file, or it is not TOML.
@@ -365,7 +371,7 @@ def _toml(text: str, where: str) -> dict[str, object]:
 
 
 def read_map(path_or_name: Path | str) -> LogMap:
-    """A map from its file, or a built-in one by name; a name comes first.
+    """Read a map from a file, or return a built-in map by name; built-in names take precedence.
 
     Raises:
         InputError: there is no such map, the file is not TOML, or its keys or values are not allowed.
@@ -378,19 +384,19 @@ def read_map(path_or_name: Path | str) -> LogMap:
 
 @cache
 def builtin_map(name: str) -> LogMap:
-    """A built-in map.
+    """Return a built-in map.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: no built-in map has that name.
     """
     return parse_map(_toml(builtin_map_text(name), f"map {name}"), name)
 
 
 def builtin_map_text(name: str) -> str:
-    """The TOML of a built-in map, to start one's own from.
+    """Return the TOML of a built-in map, as a template for new maps.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: no built-in map has that name.
     """
     if name not in MAPS:
         raise InputError(f"map {name!r} does not exist; the built-in maps are {', '.join(MAPS)}")
@@ -398,10 +404,10 @@ def builtin_map_text(name: str) -> str:
 
 
 def parse_map(values: Values, name: str) -> LogMap:
-    """Check a map's parsed TOML and bring it into shape; ``name`` is what messages call the map.
+    """Check and parse the TOML values of a map; ``name`` is its name in messages.
 
     Raises:
-        InputError: a key is unknown or missing, or a value is not allowed; the sentence lists what is.
+        InputError: a key is unknown or missing, or a value is not allowed; the message lists the allowed ones.
     """
     where = f"map {name}"
     check_version(values, where)
@@ -451,7 +457,7 @@ def parse_map(values: Values, name: str) -> LogMap:
 
 
 def _robot_names(top: Fields, robots: int | None) -> tuple[str, ...]:
-    """What the robots are called, nothing if the map does not say."""
+    """Return the names of the robots, empty if the map has none."""
     if "names" not in top:
         return ()
     names = top.values["names"]
@@ -468,7 +474,7 @@ def _robot_names(top: Fields, robots: int | None) -> tuple[str, ...]:
 
 
 def _check_names(found: LogMap, where: str) -> None:
-    """Whether names and what holds ``{name}`` go together."""
+    """Check that names are given if and only if a text holds ``{name}``."""
     channels = [*found.common.values(), *(c for own in found.own.values() for c in own.values())]
     texts = [found.time.column, *(getattr(c, key) for c in channels for key in PLACES)]
     holds = any("{name}" in text for text in texts if text is not None)
@@ -497,7 +503,7 @@ def _common_tables(values: Values, level: Level, defaults: Values, where: str) -
 def _own_tables(
     values: Values, robots: int | None, called: tuple[str, ...], where: str
 ) -> dict[int, dict[str, dict[str, Any]]]:
-    """By robot, the tables of the channels that differ."""
+    """Return the tables of channels that differ, by robot."""
     own: dict[int, dict[str, dict[str, Any]]] = {}
     for key, table in table_of(values, "robot", where).items():
         inside = f"{where}: robot.{key}"
@@ -523,10 +529,10 @@ def _channel_tables(tables: Values, where: str) -> dict[str, dict[str, Any]]:
 
 
 def _team_channel(name: str, tables: Sequence[Values], where: str) -> ChannelMap:
-    """A channel from several tables of which later ones override."""
+    """Parse a channel from several tables; later tables override earlier ones."""
     values = {key: value for table in tables for key, value in table.items()}
     if values.get("unit") != COUNTS and not any("counts_per_turn" in table for table in tables[1:]):
-        values.pop("counts_per_turn", None)  # a default for counts does not bind channels in other units
+        values.pop("counts_per_turn", None)  # a default for counts does not apply to channels in other units
     dimension = dimension_of(name)
     fields = Fields(values, ("unit",), where, _CHANNEL)
     if "counts_per_turn" in fields:

@@ -1,9 +1,9 @@
-"""From uniform grids of several clocks to one recording on one clock.
+"""Combine uniform grids with several clocks into one recording on the clock of robot 1.
 
-Time is that of robot 1; the recording begins at the first instant of robot 1's grid at which every robot has samples,
-and counts from there. A robot whose grid has instants within 1 us of all these keeps its samples bit for bit. The
-others are read between their samples by a quintic spline: of a sine of 5 Hz sampled at 100 Hz it misses less than
-1e-7, of 1 Hz less than 1e-11.
+The recording begins at the first instant of robot 1's grid at which every robot has samples, and time counts from
+there. A robot whose grid lies within 1 us of all these instants keeps its samples bit for bit. The others are
+interpolated by a quintic spline. For a sine sampled at 100 Hz its relative error is below 1e-7 at 5 Hz and below
+1e-11 at 1 Hz.
 """
 
 import math
@@ -24,21 +24,21 @@ from mocobot_logs.log import CHANNELS, NS, REF, THETA, Array
 from mocobot_logs.resample import Resampled
 
 EARLY_S = 1.0
-"""A robot's log that ends so much before another's is broken off."""
+"""Largest difference between the ends of the robots' logs [s]; beyond it, one counts as broken off."""
 _SAME_S = 1e-6
-_SUSPECT_S = 0.5  # clocks that differ by more explain logs that end apart
+_SUSPECT_S = 0.5  # larger clock differences explain why logs end apart
 
 
 @dataclass(frozen=True, eq=False)
 class ClockReport:
-    """What is known about the robots' clocks, and what was done.
+    """Estimated clocks of the robots, and their effect on the recording.
 
     Attributes:
-        estimate: offsets and drifts, in seconds after the log's ``origin_ns``; it stands for the log as it came.
-        corrected: whether the samples were moved accordingly.
+        estimate: offsets and drifts of the log before correction, in seconds after the log's ``origin_ns``.
+        corrected: whether the samples were shifted accordingly.
         start_s: first instant of the recording by the clock of robot 1 after the log's origin [s].
-        lost_s: what each robot has before the first and after the last instant, shape (N, 2) [s].
-        untouched: per robot whether it kept its samples as they were on its own grid.
+        lost_s: time of each robot before the first and after the last instant, shape (N, 2) [s].
+        untouched: whether each robot's samples stayed on its own grid.
     """
 
     estimate: ClockEstimate
@@ -60,26 +60,25 @@ def to_recording(
 ) -> tuple[Recording, ClockReport]:
     """Put all robots on one clock.
 
-    What the log says about itself is kept; what it does not say must be given, and what is given takes its place.
+    Given labels override those of the log; labels that the log lacks must be given.
 
     Args:
         resampled: the log.
-        design: numbers of the robots.
+        design: design of the robots.
         trial: kind of trial.
         payload: name of the payload.
-        source: what produced the samples; by default the log's name.
-        correct: whether to take out the offset and the drift of every clock against that of robot 1. Otherwise
-            stamps are believed.
-        cut: whether the log is a part of another, cut out by stamps: robots whose stamps end together do not break
-            off then, whatever their clocks.
+        source: origin of the samples; by default the log's name.
+        correct: whether to remove each clock's offset and drift against robot 1. Otherwise stamps are trusted.
+        cut: whether the log was cut out of another one by stamps. Robots whose stamps end together then do not count as
+            broken off, whatever their clocks.
 
     Returns:
-        The recording, joint level in memory whatever the log's level, and what was found.
+        The recording, in memory at joint level whatever the log's level, and the clock report.
 
     Raises:
-        InputError: clocks shall be corrected and the motion does not tell how, one robot's log ends more than a
-            second before another's, they have less than 16 samples in common, a wrist position cannot be
-            reached, design or trial is missing, or a payload is named where the robots hold nothing.
+        InputError: the motion does not determine the clocks to correct, one robot's log ends more than a second before
+            another's, or they share fewer than 16 samples. Or a wrist position cannot be reached, design or trial is
+            missing, or a payload is named although the robots hold nothing.
     """
     metadata = _metadata(resampled, design, trial, payload, source)
     if metadata.trial == FREE:
@@ -98,7 +97,7 @@ def to_recording(
     N, rate_hz = resampled.robots, resampled.rate_hz
     offset_s, drift = (estimate.offset_s, estimate.drift) if correct else (np.zeros(N), np.zeros(N))
     ends_s = resampled.start_s + (np.array([len(x) for x in resampled.values]) - 1) / rate_hz
-    # The robots' first and last instants in the time of robot 1.
+    # first and last instants of the robots in the time of robot 1
     from_s, to_s = (
         estimate.middle_s + (stamp - estimate.middle_s - offset_s) / (1.0 + drift)
         for stamp in (resampled.start_s, ends_s)
@@ -159,7 +158,7 @@ def _metadata(
     given = {key: value for key, value in given.items() if value is not None}
     fixed = {"robots": resampled.robots, "rate_hz": resampled.rate_hz, "level": resampled.level}
     if known is not None:
-        # Robots as they are, of another design, are other robots.
+        # A calibration of one design does not apply to another.
         units = known.units if given.get("design", known.design) == known.design else None
         found = replace(known, **fixed, **given, units=units)
     else:
@@ -185,19 +184,19 @@ def _sampling(
     *,
     aligned: bool,
 ) -> tuple[Sampling, ...] | None:
-    """How the sensors were read, or None where the samples are as they were read.
+    """Return how the sensors were sampled, or None if the samples are unchanged.
 
     Args:
         resampled: the log.
-        start_s: the recording's beginning after the log's origin [s].
-        first_s: when each robot's first sample was taken, in the recording's time [s], shape (N,).
-        speed: how fast each robot's clock runs by that of robot 1, shape (N,).
-        untouched: whether each robot kept its samples as they were on its own grid.
-        aligned: whether clocks were brought to that of robot 1 by the motion.
+        start_s: start of the recording after the log's origin [s].
+        first_s: time of each robot's first sample in the recording's time [s], shape (N,).
+        speed: rate of each robot's clock relative to that of robot 1, shape (N,).
+        untouched: whether each robot's samples stayed on its own grid.
+        aligned: whether the clocks were corrected by the motion.
     """
     if resampled.metadata is not None and (known := resampled.metadata.sampling) is not None:
-        # What was converted before: the errors are still those of the first reading.
-        # Stamps of what was written as a recording are its time; this one may begin in the middle of it.
+        # A log converted before keeps the errors of its first sampling. Its stamps are the recording's time, and this
+        # recording may begin later.
         later = [sampling.later(resampled.origin_ns * NS + start_s) for sampling in known]
         return tuple(replace(s, aligned=s.aligned or (aligned and i > 0)) for i, s in enumerate(later))
     reports = resampled.reports
@@ -207,7 +206,7 @@ def _sampling(
         Sampling(
             native_hz=report.native_hz * float(speed[i]),
             first_s=float(first_s[i]),
-            # An interval has the errors of both of its ends.
+            # an interval has the errors of both of its ends
             jitter_s=report.jitter_rms_s / math.sqrt(2.0),
             missing=report.filled_share,
             aligned=aligned and i > 0,
@@ -220,7 +219,7 @@ def _sampling(
 
 
 def _check_ends(name: str, ends_s: Array, estimate: ClockEstimate, *, correct: bool) -> None:
-    """Whether a robot's log breaks off before the others'."""
+    """Refuse a log that ends for one robot before the others."""
     early, late = int(np.argmin(ends_s)), int(np.argmax(ends_s))
     short_s = ends_s[late] - ends_s[early]
     if short_s <= EARLY_S:
@@ -239,18 +238,18 @@ def _check_ends(name: str, ends_s: Array, estimate: ClockEstimate, *, correct: b
 
 
 def _values_at(values: Array, at: Array, tolerance: float) -> tuple[Array, bool]:
-    """Samples (Q, C) at places between them, and whether all these are samples to within ``tolerance``."""
+    """Return samples (Q, C) at fractional indices, and whether these are integers within ``tolerance``."""
     nearest = np.rint(at).astype(np.int64)
     if np.all(np.abs(at - nearest) <= tolerance):
         return values[nearest], True
-    # Only what is asked for, and enough around it that its ends do not show.
+    # Interpolate only the requested range, with a margin that hides the spline's ends.
     low, high = max(0, int(at[0]) - 64), min(len(values), int(at[-1]) + 66)
     spline = make_interp_spline(np.arange(low, high), values[low:high], k=5)
     return spline(np.clip(at, low, high - 1)), False
 
 
 def _to_joints(h: Array, force: Array, design: OmnidDesign, name: str, rate_hz: float) -> None:
-    """Turn wrist positions and forces, shape (Q, N, 3), into driven angles and torques in place."""
+    """Convert wrist positions and forces, shape (Q, N, 3), into driven angles and torques in place."""
     for i in range(h.shape[1]):
         fault = wrist_fault(h[:, i], design)
         if fault is not None:

@@ -1,4 +1,4 @@
-"""Any log by its path."""
+"""Open any log by its path."""
 
 import shlex
 from collections.abc import Iterator
@@ -18,12 +18,12 @@ from mocobot_logs.table.text import CsvTable
 
 
 def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | None = None) -> LogSource:
-    """Open a log of any format; rows that repeat the one before are left out and counted.
+    """Open a log of any format; rows that repeat the previous reading are left out and counted.
 
     Args:
         path: a file or a folder.
-        log_map: where its channels are; None for what mocobot itself writes, and for an Omnid's bags.
-        episode: which episode of a LeRobot dataset; may be None if it holds only one.
+        log_map: map of its channels; None for files that mocobot writes and for an Omnid's bags.
+        episode: episode of a LeRobot dataset; may be None if it holds only one.
 
     Raises:
         InputError: there is no such log, its format is not known, or the map does not suit it.
@@ -51,7 +51,7 @@ def _open(path: Path, log_map: LogMap | None, episode: int | None) -> LogSource:
 
 @contextmanager
 def draft_suggested(path: Path) -> Iterator[None]:
-    """A block in which a log is read without a map, and what is said if it cannot be."""
+    """Add the advice to draft a map to errors inside the block, in which a log is read without a map."""
     try:
         yield
     except InputError as error:
@@ -64,8 +64,8 @@ def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = No
 
     Args:
         path: a file, or the folder of a dataset.
-        kind: what it is, see ``log_kind``; no bag.
-        options: how a text table is written.
+        kind: format, see ``log_kind``; not "bag".
+        options: form of a text table.
         episode: as in ``open_log``.
 
     Raises:
@@ -84,7 +84,7 @@ def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = No
 
 
 def _default_map(table: Table) -> LogMap:
-    """The built-in map of what mocobot writes, by level and by whether channels are columns or arrays."""
+    """Return the built-in map of files that mocobot writes, by level and by columns or arrays."""
     if table.metadata is not None:
         return _own_map(table, table.metadata)
     names = table.shapes.keys() | table.aliases.keys()

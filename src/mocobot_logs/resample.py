@@ -1,15 +1,16 @@
-"""A measured log on uniform grids: for every robot its own, by its own stamps, at one rate.
+"""Resample a measured log onto uniform grids: one grid per robot, based on its own stamps, all at one rate.
 
-What is done to a stream, and its report, follow from its stamps:
+The stamps of a stream decide its method, which the report names:
 
-- *untouched*: every stamp within 1 us of the grid that begins at the robot's first stamp. Its samples are taken
-  bit for bit; so a round trip of a recording changes nothing.
-- *filtered*: the same for a grid k times as fine: an FIR low-pass and every k-th sample.
-- *fitted*: many samples at uneven instants: polynomials through the nearest of them, the low-pass, every k-th sample.
-- *interpolated*: any other stream: a quintic spline onto a finer grid, the low-pass, every k-th sample.
+- *untouched*: every stamp lies within 1 us of the grid that begins at the robot's first stamp. The samples are copied
+  bit for bit, so a round trip of a recording changes nothing.
+- *filtered*: the stamps lie on a grid k times as fine. An FIR low-pass is applied and every k-th sample is kept.
+- *fitted*: the samples are many and uneven. Local polynomials are fitted to the nearest samples, then low-passed and
+  decimated by k.
+- *interpolated*: any other stream. A quintic spline leads onto a finer grid, then a low-pass and decimation by k.
 
-Missing samples are filled in first, but where samples are fitted. The numbers of all this are in ``resample_filter``.
-What the low-pass needs, a tenth of a second, is lost at either end.
+Missing samples are interpolated first, except in fitted streams. ``resample_filter`` holds the numerical constants.
+The low-pass costs a tenth of a second at each end.
 """
 
 from __future__ import annotations
@@ -31,52 +32,54 @@ from mocobot_logs.resample_filter import Decimator, Grid, Interpolator, Merger, 
 
 RATE_HZ = 100.0
 MAX_GAP_S = 0.08
-"""Longest time without samples, beyond one period, that is filled in [s]: four in a row lost at 50 Hz.
+"""Longest time without samples, beyond one period, that is filled [s]: four consecutive lost samples at 50 Hz.
 
-What is filled in there is off by 7 urad and 5 mN m (rms, random trials; 0.4 urad and 0.04 mN m in periodic ones),
-for as long as the gap lasts. With 0.12 s it would be 48 urad and 15 mN m.
+Measured: filled samples are off by 7 urad and 5 mN m rms in random trials (0.4 urad and 0.04 mN m in periodic ones).
+With 0.12 s the errors are 48 urad and 15 mN m.
 """
 MOST_MISSING = 0.1
-"""Largest share of samples that may be missing; the same for samples that crowd."""
+"""Largest allowed share of missing samples; the same limit holds for samples that come too close together."""
 LONGEST_S = 1e8
-"""Three years [s]: whatever lasts longer is two clocks, and nanoseconds of it would overflow."""
+"""Longest plausible step between stamps [s], three years. Longer steps mean two clocks, and nanoseconds would
+overflow."""
 LARGEST = 1e100
-"""Larger values are no measurements, and arithmetic would overflow."""
+"""Largest plausible value. Larger ones are no measurements, and arithmetic with them would overflow."""
 SLOWEST, FASTEST_HZ = 0.25, 20e3
-"""Slowest native rate over the output rate: signals up to 5 Hz need 25 Hz; and the fastest [Hz]."""
+"""Slowest native rate as a share of the output rate (signals up to 5 Hz need 25 Hz), and the fastest native rate
+[Hz]."""
 PLAUSIBLE_HZ = 5.0
-"""Slowest log whose stamps are believed: the rate asked for is blamed, not their unit."""
+"""Slowest native rate [Hz] at which an error blames the requested rate. Below it, the error blames the unit of time."""
 MANY, UNEVEN = 2.0, 0.15
-"""Samples that make one of the output, and jitter of intervals over their mean, from which polynomials are fitted."""
+"""Thresholds for fitting polynomials: native samples per output sample, and rms jitter over the usual interval."""
 STEP_ROWS, STEP_BLOCKS = 4096, 16
-"""Rows of a block, and most blocks, in which rounding steps are looked for: a minute at 1 kHz."""
-_STAMP_S = 1e-6  # gaps are measured no finer
-_TOLERANCE = 0.01  # of the slowest rate, for clocks and jitter
+"""Rows per block and largest number of blocks in which rounding steps are searched: a minute at 1 kHz."""
+_STAMP_S = 1e-6  # resolution of gap lengths
+_TOLERANCE = 0.01  # relative margin of the slowest rate, for clock errors and jitter
 _SAME_RATE = 1e-3
-_LOOK = 1024  # rows from which the native rate is found
+_LOOK = 1024  # number of first rows that determine the native rate
 
 
 @dataclass(frozen=True)
 class StreamReport:
-    """What resampling found in one robot's stream, and what it did to it.
+    """Properties of one robot's stream, and how it was resampled.
 
     Attributes:
         robot: number of the robot, from 1.
-        samples: rows of the log, duplicates and repeats included.
-        first_ns, last_ns: its first and its last stamp [ns].
-        native_hz: rate of its samples [Hz], dropped ones counted in.
-        jitter_rms_s, jitter_max_s: how far intervals between stamps are from whole periods [s].
-        gaps: intervals in which samples are missing.
-        longest_gap_s: the longest time without samples beyond one period [s].
-        filled: samples that are missing and were interpolated, at the native rate.
-        blank: rows in which a channel is NaN: dropped, so that they are among the missing samples.
-        blank_channels: the channels that are NaN there, by the number of rows.
-        duplicates: rows that repeat the row before, stamp and values; dropped.
-        repeats: rows that repeat the row before but for the stamp: one reading; dropped, so that they are among the
-            missing samples where the rate is theirs.
-        merged: rows closer than a quarter of a period to the row before; averaged with it.
-        method: what was done.
-        steps: rounding step of every sensor's channel, 0 for none [SI].
+        samples: rows in the log, including duplicates and repeats.
+        first_ns, last_ns: first and last stamp [ns].
+        native_hz: sample rate of the log [Hz], missing samples included.
+        jitter_rms_s, jitter_max_s: deviation of intervals from whole periods [s].
+        gaps: number of intervals in which samples are missing.
+        longest_gap_s: longest time without samples, beyond one period [s].
+        filled: missing samples that were interpolated, at the native rate.
+        blank: rows dropped because a channel is NaN; they count as missing samples.
+        blank_channels: number of NaN rows by channel.
+        duplicates: rows dropped because they equal the previous row in stamp and values.
+        repeats: rows dropped because they hold the previous reading again under a later stamp. They count as missing
+            samples if the native rate is that of the rows.
+        merged: rows closer than a quarter of a period to the previous row; averaged with it.
+        method: resampling method, see the module.
+        steps: rounding step of each sensor channel, 0 for none [SI].
     """
 
     robot: int
@@ -99,11 +102,11 @@ class StreamReport:
 
     @property
     def filled_share(self) -> float:
-        """Missing samples over all that there should be."""
+        """Share of missing samples among all expected samples."""
         return self.filled / max(1, self.filled + self.samples - self.blank - self.duplicates - self.repeats)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values by name."""
+        """Return the fields as plain values by name."""
         return asdict(self) | {"filled_share": self.filled_share}
 
 
@@ -113,11 +116,11 @@ class Resampled:
 
     Attributes:
         name, level, channels, metadata: as in ``LogSource``.
-        rate_hz: rate of every grid [Hz].
-        origin_ns: the earliest stamp of the log [ns].
-        start_s: first instant of every robot's grid after the origin, by the robot's stamps [s], shape (N,).
-        values: samples [SI] of every robot, N arrays of shape (Q_i, C).
-        reports: what was found and done, N entries.
+        rate_hz: rate of all grids [Hz].
+        origin_ns: earliest stamp of the log [ns].
+        start_s: first grid instant of each robot after the origin, by the robot's stamps [s], shape (N,).
+        values: samples [SI] of each robot, N arrays of shape (Q_i, C).
+        reports: one report per robot, N entries.
     """
 
     name: str
@@ -142,20 +145,20 @@ def resample(
     max_gap_s: float = MAX_GAP_S,
     advance: Callable[[int], object] = lambda _: None,
 ) -> Resampled:
-    """Bring a log onto uniform grids, chunk by chunk; only what comes out is kept in memory.
+    """Resample a log onto uniform grids in chunks; only the output stays in memory.
 
-    The source is read a second time if a robot's stamps leave a grid that its first 1024 are on.
+    The source is read a second time if a robot's stamps leave the grid that fits its first 1024 rows.
 
     Args:
         source: the log.
         rate_hz: rate of the grids [Hz].
-        max_gap_s: longest time without samples beyond one period [s].
-        advance: takes the progress made, in the source's units.
+        max_gap_s: longest time without samples that is filled, beyond one period [s].
+        advance: called with the progress, in the source's units.
 
     Raises:
-        InputError: the log cannot be read; a robot has fewer than 16 samples, too slow or too fast ones, values
-            that are not finite, time that runs back, one stamp with two values, a gap that is too long, or more
-            than 10 % of its samples missing or crowding; or two robots have no time in common.
+        InputError: the log cannot be read, or two robots share no time. Or a robot has fewer than 16 samples, an
+            unsuitable rate, values that are not finite, or decreasing stamps. Or one of its stamps has two values, a
+            gap is too long, or more than 10 % of its samples are missing or too close together.
     """
     streams: dict[int, RobotStream] = {}
     done: dict[int, tuple[int, Array, StreamReport]] = {}
@@ -191,7 +194,7 @@ def resample(
 
 
 def _check_common_time(name: str, screens: list[Screen]) -> None:
-    """Two robots whose stamps never meet have different epochs."""
+    """Refuse robots whose stamps share no time: their clocks have different epochs."""
     spans = [(s.first_ns or 0, s.last_ns or 0) for s in screens]
     late = max(range(len(spans)), key=lambda i: spans[i][0])
     early = min(range(len(spans)), key=lambda i: spans[i][1])
@@ -208,20 +211,20 @@ def _check_common_time(name: str, screens: list[Screen]) -> None:
 
 
 def beyond_s(interval_ns: Stamps, period_ns: float) -> Array:
-    """How much longer than one period the intervals are in which samples are missing [s], 0 for the others."""
+    """Return the time beyond one period of each interval that lacks samples [s], 0 for the others."""
     return np.where(np.rint(interval_ns / period_ns) > 1, (interval_ns - period_ns) * NS, 0.0)
 
 
 def is_hole(interval_ns: Stamps, period_ns: float, max_gap_s: float) -> NDArray[np.bool_]:
-    """Whether intervals between stamps are too long to be filled."""
+    """Return whether each interval between stamps is too long to be filled."""
     return beyond_s(interval_ns, period_ns) > max_gap_s + _STAMP_S
 
 
 class RobotStream:
-    """Resamples a robot's rows as they come.
+    """Resamples one robot's rows chunk by chunk.
 
     Attributes:
-        screen: what has passed of the log.
+        screen: checks and counts of the rows so far.
     """
 
     def __init__(
@@ -234,7 +237,7 @@ class RobotStream:
         *,
         may_fit: bool = True,
     ) -> None:
-        """``robot`` counts from 1; without ``may_fit`` no stamps count as lying on a grid."""
+        """``robot`` counts from 1; with ``may_fit`` False the stamps never count as lying on a grid."""
         self._where, self._robot, self._channels = f"{name}: robot {robot}", robot, channels
         self.screen = Screen(self._where, channels)
         self._rate_hz, self._max_gap_s, self._may_fit = rate_hz, max_gap_s, may_fit
@@ -246,18 +249,18 @@ class RobotStream:
 
     @property
     def left_grid(self) -> bool:
-        """The samples began on a grid and left it: resample them again, as ones that fit none."""
+        """Whether the stamps began on a grid and left it. The stream must then be resampled with ``may_fit`` False."""
         return self._pipe is not None and self._pipe.left_grid
 
     def push(self, samples: Samples) -> None:
-        """Take the next rows."""
+        """Add the next rows."""
         self._waiting.append(samples)
         self._rows_waiting += len(samples.stamp_ns)
-        if self._rows_waiting >= _LOOK:  # a source may hand out rows one by one
+        if self._rows_waiting >= _LOOK:  # a source may yield single rows
             self._flush()
 
     def finish(self) -> tuple[int, Array, StreamReport]:
-        """Stamp of the first output sample [ns], all output samples (Q, C), and the report."""
+        """Return the stamp of the first output sample [ns], all output samples (Q, C) and the report."""
         self._flush()
         screen = self.screen
         rows = screen.rows - screen.duplicates - screen.blank - screen.repeats
@@ -297,7 +300,7 @@ class RobotStream:
 
     def _flush(self) -> None:
         waiting = self._waiting
-        if len({part.log_ns is None for part in waiting}) == 1:  # else single parts tell the recorder's time
+        if len({part.log_ns is None for part in waiting}) == 1:  # else only some parts have log_ns
             waiting = [joined(waiting, len(self._channels))]
         for samples in waiting:
             rows = self.screen.keep(samples)
@@ -311,16 +314,16 @@ class RobotStream:
         self._waiting, self._rows_waiting = [], 0
 
     def _begin(self) -> _Pipe:
-        """Find the native rate from the first rows, and what to do with all of them."""
+        """Determine the native rate from the first rows and set up the processing."""
         time_ns, values = (np.concatenate(parts) for parts in zip(*self._head, strict=True))
         self._head = []
-        grid, k = self._plan(time_ns[:_LOOK])  # the same rows whatever the chunks
+        grid, k = self._plan(time_ns[:_LOOK])  # a fixed number of rows, independent of the chunks
         self._pipe = _Pipe(grid, k, _Tally(self._where, grid, self._max_gap_s), self._max_gap_s)
         self._pipe.push(time_ns, values)
         return self._pipe
 
     def _plan(self, time_ns: Stamps) -> tuple[Grid, int]:
-        """The fine grid, and how many of its samples make one of the output."""
+        """Return the fine grid and the number of its samples per output sample."""
         period_ns = float(np.median(np.diff(time_ns)))
         native_hz, slowest_hz = 1.0 / (period_ns * NS), SLOWEST * self._rate_hz
         if not slowest_hz * (1.0 - _TOLERANCE) <= native_hz <= FASTEST_HZ:
@@ -340,7 +343,7 @@ class RobotStream:
         interval = np.diff(time_ns)
         short = ~is_hole(interval, period_ns, self._max_gap_s)
         lost = np.sum(np.rint(interval[short] / period_ns)) - np.sum(short)
-        # A logger that is faster than its messages stamps each with the time of its own next row.
+        # A logger faster than its messages stamps each message with the time of its own next row.
         again = self.screen.repeats > 0 and lost > MOST_MISSING * len(time_ns)
         fits = self._may_fit and not again and abs(period_ns / spacing_ns - 1.0) < _SAME_RATE
         if fits and fitting.holds(time_ns):
@@ -348,7 +351,7 @@ class RobotStream:
         jitter_ns = interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns
         rms_ns = float(np.sqrt(np.mean(jitter_ns**2)))
         uneven = native_hz >= MANY * self._rate_hz and rms_ns > UNEVEN * period_ns
-        if uneven or again:  # most intervals are shorter than the mean one, and none is told from a gap
+        if uneven or again:  # most intervals are shorter than the mean, and no gap can be identified
             period_ns = float(np.mean(interval[short]))
         native_hz = 1.0 / (period_ns * NS)
         k = fineness(native_hz, self._rate_hz, fitted=uneven)
@@ -357,20 +360,20 @@ class RobotStream:
 
 
 class Screen:
-    """Drops repeated rows and rows that lack a value, and refuses what no resampling can mend.
+    """Drops repeated rows and rows that lack a value, and refuses rows that resampling cannot handle.
 
     Attributes:
-        rows: rows seen.
-        repeats: rows among them that repeat the one before but for the stamp: samples that are missing.
-        duplicates: rows dropped because they repeat the one before, stamp and values.
-        blank: rows dropped because a channel is NaN: samples that are missing.
-        blank_channels: how many of them by channel that is.
+        rows: number of rows seen.
+        repeats: rows that hold the previous reading again under a later stamp; they count as missing samples.
+        duplicates: rows dropped because they equal the previous row in stamp and values.
+        blank: rows dropped because a channel is NaN; they count as missing samples.
+        blank_channels: number of NaN rows by channel.
         first_ns, last_ns: first and last stamp [ns], None before the first row.
-        log_ns: first and last time of the recorder [ns], None where the log has none.
+        log_ns: first and last time of the recorder [ns], None if the log has none.
     """
 
     def __init__(self, where: str, channels: tuple[str, ...]) -> None:
-        """Take the names that messages need: of the log (and its robot), and of the channels."""
+        """``where`` names the log (and robot) in error messages, ``channels`` the channels."""
         self.rows = self.repeats = self.duplicates = self.blank = 0
         self.blank_channels: Counter[str] = Counter()
         self.first_ns: int | None = None
@@ -380,7 +383,7 @@ class Screen:
         self._last: Array | None = None
 
     def keep(self, samples: Samples) -> tuple[Stamps, Array]:
-        """Rows of a chunk that say something new: time since the first row [ns], shape (q,), and values (q, C)."""
+        """Return the new rows of a chunk: time since the first row [ns], shape (q,), and values (q, C)."""
         lacking = np.isnan(samples.values)
         whole = np.flatnonzero(~lacking.any(axis=1))
         left_out = int(samples.repeats.sum())
@@ -404,7 +407,7 @@ class Screen:
         same = stamp == before
         same[0] &= self._last is not None
         repeats = same & np.all(values == above, axis=1)
-        # Differences of floats do not overflow, as those of whole nanoseconds may.
+        # Differences of floats do not overflow; differences of integer nanoseconds may.
         leaps = np.abs(stamp.astype(float) - before.astype(float)) > LONGEST_S / NS
         bad = ~_is_number(values).all(axis=1) | (stamp < before) | (same & ~repeats) | leaps
         if bad.any():
@@ -447,9 +450,9 @@ def _seconds(ns: int) -> str:
 
 
 class _Tally:
-    """Counts what the intervals between stamps say: gaps, filled, longest_gap_s, jitter_max_s as in ``StreamReport``.
+    """Statistics of the intervals between stamps: gaps, filled, longest_gap_s and jitter_max_s as in ``StreamReport``.
 
-    Where samples are many and uneven, no interval tells how many are missing, and none counts as missing.
+    If samples are many and uneven, intervals do not reveal missing samples; then none counts as missing.
     """
 
     def __init__(self, where: str, grid: Grid, max_gap_s: float) -> None:
@@ -464,7 +467,8 @@ class _Tally:
         return float(np.sqrt(self._squares / max(1, self._intervals)))
 
     def add(self, time_ns: Stamps) -> None:
-        """Count the intervals between consecutive times after the first stamp [ns]; refuse one that is too long."""
+        """Count the intervals between consecutive times [ns] after the first stamp; refuse an interval that is too
+        long."""
         interval = np.diff(time_ns)
         if not len(interval):
             return
@@ -491,8 +495,9 @@ class _Tally:
         self.jitter_max_s = max(self.jitter_max_s, float(np.max(np.abs(jitter_s))))
 
     def check(self, rows: int, merged: int) -> None:
-        """Refuse a stream of ``rows``, of which ``merged`` crowd, if too many are missing or crowd."""
-        # Uneven stamps leave intervals that are long, and as many that are short; samples that are lost leave fewer.
+        """Refuse a stream of ``rows`` if too many are missing, or too many were ``merged`` with the previous row."""
+        # Jitter lengthens and shortens intervals equally often. The total count of rows falls only if samples are
+        # lost.
         missing = min(self.filled, round(self._span_ns / self._period_ns) + 1 - rows)
         expected = rows + missing
         if missing > MOST_MISSING * expected:
@@ -510,7 +515,7 @@ class _Tally:
 
 
 class _Pipe:
-    """What is done to a stream once its rate is known: count, merge, fill, interpolate, low-pass, thin."""
+    """Processes a stream once its rate is known: count, merge, fill, interpolate, low-pass, decimate."""
 
     def __init__(self, grid: Grid, k: int, tally: _Tally, max_gap_s: float) -> None:
         self.tally, self.decimator, self.left_grid = tally, Decimator(k), False
@@ -541,7 +546,7 @@ class _Pipe:
             self._feed(time_ns, values)
 
     def finish(self, rows: int) -> Array:
-        """All output samples of ``rows``; none if they left the grid."""
+        """Return all output samples of a stream of ``rows``; none if the stamps left the grid."""
         held = None if self._merger is None else self._merger.finish()
         self.tally.check(rows, self.merged)
         if self.left_grid:
@@ -557,9 +562,9 @@ class _Pipe:
 
 
 class _StepFinder:
-    """Finds rounding steps in blocks of rows, wherever the pieces end in which they come.
+    """Finds the rounding step of each sensor channel from blocks of fixed length, independent of the chunks.
 
-    A block that rests shows no step, and one that moves fast repeats no value; the median of those that tell is taken.
+    A block at rest shows no step, and a block of fast motion repeats no value. The median of the found steps counts.
     """
 
     def __init__(self) -> None:
@@ -568,16 +573,16 @@ class _StepFinder:
         self._votes: list[list[float]] = []
 
     def add(self, values: Array) -> None:
-        """Look at the next rows, shape (q, C)."""
+        """Add the next rows, shape (q, C)."""
         while len(values) and len(self._votes) < STEP_BLOCKS:
             part, values = np.split(values[:, :SENSORS], [STEP_ROWS - self._rows])
-            self._waiting.append(part.copy())  # the piece that it is cut from may be large
+            self._waiting.append(part.copy())  # a view would keep the whole chunk in memory
             self._rows += len(part)
             if self._rows == STEP_ROWS:
                 self._vote()
 
     def steps(self) -> tuple[float, ...]:
-        """Step of each of the sensors' channels, 0 for none [SI]."""
+        """Return the step of each sensor channel, 0 for none [SI]."""
         if self._waiting:
             self._vote()
         told = [[step for step in votes if step > 0] for votes in zip(*self._votes, strict=True)]

@@ -1,19 +1,24 @@
-"""The anti-alias rule: how finely a stream is interpolated, and the low-pass before samples are left out.
+"""Interpolate a stream onto a fine grid, low-pass it against aliasing, and decimate it.
 
-Let r be the output rate. A stream whose stamps lie on the grid of k r, k whole, has that grid already. Every other
-stream is interpolated by a quintic spline onto k r, with k r at least three times the native rate, or just above
-it from 5 r on. A spline is no perfect interpolator: a tone of frequency f leaves images at n native +- f, weaker by
-the sixth power of sinc(frequency / native), and an image near a multiple of k r folds to a low frequency. With these
-k, all that ends up below 0.2 r and does not belong there is weaker by 88 dB or more, for evenly spaced samples and
-every native rate from 0.5 r on. Slower streams have no such promise: their images begin below 0.2 r. The spline
-itself takes 3e-8 from a tone of 5 Hz sampled at 100 Hz, 2e-6 at 50 Hz and 3e-4 at 25 Hz; from 19 Hz at 100 Hz, 2e-4.
-Uneven samples say less about fast signals: with stamps 10 % of a period off their places, a tone at 0.3 of a native
-rate of 1 kHz leaves 4e-4 of its amplitude below 0.18 r, one at 0.49 leaves 3 %.
+Let r be the output rate. A stream whose stamps lie on the grid of k r (k an integer) needs no interpolation. Every
+other stream is interpolated by a quintic spline onto k r. k r is at least three times the native rate, or just above
+the native rate if that is 5 r or more.
 
-Then, for k > 1, a linear-phase FIR filter, its delay taken out, and every k-th sample: flat to 5e-6 below 0.2 r,
-weaker than -108 dB from 0.5 r on, so that nothing above half the output rate folds to anywhere.
+A spline is no perfect interpolator. A tone of frequency f leaves images at n native +- f, attenuated by the sixth
+power of sinc(frequency / native). An image near a multiple of k r aliases to a low frequency. With these k, all
+aliases below 0.2 r are attenuated by 88 dB or more, for evenly spaced samples and native rates from 0.5 r. For slower
+streams this does not hold, since their images begin below 0.2 r.
 
-Before that, rows that crowd are averaged (``Merger``) and missing samples filled in (``fill_gaps``).
+The spline's own relative error for a tone of 5 Hz is 3e-8 at a rate of 100 Hz, 2e-6 at 50 Hz and 3e-4 at 25 Hz. For
+19 Hz at 100 Hz it is 2e-4.
+
+Uneven samples resolve fast signals less well. Example: a native rate of 1 kHz, with stamps off by 10 % of a period. A
+tone at 0.3 of the native rate leaves 4e-4 of its amplitude below 0.18 r; one at 0.49 leaves 3 %.
+
+For k > 1, a linear-phase FIR filter with its delay removed follows, then every k-th sample is kept. The filter is
+flat to 5e-6 below 0.2 r and below -108 dB from 0.5 r, so nothing above half the output rate aliases.
+
+Before interpolation, rows that are too close are averaged (``Merger``) and missing samples are filled (``fill_gaps``).
 """
 
 from __future__ import annotations
@@ -35,19 +40,19 @@ PASS, STOP = 0.2, 0.5
 """Edges of the transition band over the output rate: 20 and 50 Hz at 100 Hz."""
 RIPPLE_DB = 110.0
 OVERSAMPLING, PLENTY, FITTED = 3.0, 5.0, 10.0
-_ROUND = 0.01  # a clock that runs fast by this share asks for no finer grid
+_ROUND = 0.01  # relative clock error that needs no finer grid
 
 
 def fineness(native_hz: float, rate_hz: float, *, fitted: bool = False) -> int:
-    """k of the grid k ``rate_hz`` onto which a stream of ``native_hz`` is interpolated or ``fitted``."""
+    """Return k of the grid k ``rate_hz`` onto which a stream of ``native_hz`` is interpolated or ``fitted``."""
     ratio = native_hz / rate_hz
-    if fitted:  # smooth already
+    if fitted:  # already smooth
         ratio = min(ratio, FITTED)
     return max(1, math.ceil((ratio if ratio >= PLENTY else OVERSAMPLING * ratio) * (1 - _ROUND)))
 
 
 def low_pass_taps(k: int) -> Array:
-    """Taps of the filter on the grid of k samples per output sample, symmetric, 2 M + 1 with M a multiple of k."""
+    """Return the symmetric filter taps for k grid samples per output sample: 2 M + 1 taps, M a multiple of k."""
     length, _ = kaiserord(RIPPLE_DB, (STOP - PASS) / (k / 2))
     half = k * math.ceil(length / 2 / k)
     window: Any = ("kaiser", kaiser_beta(RIPPLE_DB))
@@ -55,11 +60,10 @@ def low_pass_taps(k: int) -> Array:
 
 
 class Decimator:
-    """Low-pass and thin a stream piece by piece; for k = 1 it passes everything on as it is.
+    """Low-passes and decimates a stream in pieces; for k = 1 the stream is unchanged.
 
     Attributes:
-        lead: output samples before the first one given out; as many are missing at the end. The filter would
-            need samples from before the log for them.
+        lead: number of output samples lost at each end, where the filter lacks input.
     """
 
     def __init__(self, k: int) -> None:
@@ -70,7 +74,7 @@ class Decimator:
         self._kept: Array | None = None
 
     def push(self, fine: Array) -> Array:
-        """Output samples that are complete after the next samples of the fine grid, (n, C) -> (m, C)."""
+        """Add samples of the fine grid (n, C) and return the complete output samples (m, C)."""
         if self._k == 1:
             return fine
         if self._kept is not None:
@@ -85,31 +89,31 @@ class Decimator:
 
 
 CROWDED = 0.25
-"""Rows closer than this share of a period are one sample: nothing may be differenced between them."""
+"""Rows closer than this share of a period count as one sample, since a slope between them would be noise."""
 _GAP_DEGREE = 7
-_SIDE = 4  # samples on either side of a gap that suffice for one that is a single sample
+_SIDE = 4  # samples on either side that suffice for a gap of one sample
 
 
 def side(missing: int) -> int:
-    """Samples on either side of a gap that its filling rests on."""
+    """Return the number of samples on either side that the filling of a gap uses."""
     return max(_SIDE, missing + 2)
 
 
 def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Put samples where some are missing, evenly spaced in each gap.
+    """Insert missing samples, evenly spaced in each gap.
 
-    They lie on the polynomial of degree 7 through ``side`` samples before and after the gap, by least squares where
-    these are more than eight. A spline would swing with noise, the wider the longer the gap; this has 0.8 to 1.9 times
-    the noise of one sample, however long the gap. It misses 4e-12 of a sine of 1 Hz sampled at 100 Hz with one sample
-    missing, 9e-9 with five; 1.3e-6 and 3e-3 of one of 5 Hz.
+    They lie on a polynomial of degree 7 through ``side`` samples before and after the gap. If these are more than
+    eight, the polynomial is fitted by least squares. A spline would amplify noise in wide gaps; this fit has 0.8 to
+    1.9 times the noise of one sample. Relative errors for a sine sampled at 100 Hz: at 1 Hz 4e-12 with one sample
+    missing and 9e-9 with five. At 5 Hz they are 1.3e-6 and 3e-3.
 
     Args:
-        time: of the samples, strictly increasing, shape (q,); q at least 2.
-        values: shape (q, C).
-        missing: how many samples are missing after each but the last, shape (q - 1,).
+        time: times of the samples, strictly increasing, shape (q,); q at least 2.
+        values: samples, shape (q, C).
+        missing: number of missing samples after each sample but the last, shape (q - 1,).
 
     Returns:
-        time and values with the filled samples in place.
+        Times and values with the filled samples in place.
     """
     gaps = np.flatnonzero(missing)
     if not len(gaps):
@@ -132,9 +136,9 @@ def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[A
 
 
 def polynomial_weights(nodes: Array, targets: Array, degree: int) -> Array:
-    """Weights of the samples at ``nodes`` (g, w) for the value at each of ``targets`` (g, m), shape (g, m, w).
+    """Return weights of samples at ``nodes`` (g, w) for the values at ``targets`` (g, m), shape (g, m, w).
 
-    That of the polynomial of ``degree``, or what the nodes allow, that is nearest to the samples (least squares).
+    They evaluate the least-squares polynomial of ``degree``, or less if there are too few nodes.
     """
     centre, half = (nodes[:, :1] + nodes[:, -1:]) / 2, (nodes[:, -1:] - nodes[:, :1]) / 2
     degree = min(degree, nodes.shape[1] - 1)
@@ -145,19 +149,19 @@ def polynomial_weights(nodes: Array, targets: Array, degree: int) -> Array:
 
 
 class Merger:
-    """Averages rows less than ``CROWDED`` periods after the row before, chunk by chunk; counts them as ``merged``.
+    """Averages rows less than ``CROWDED`` periods after the previous row, chunk by chunk; ``merged`` counts them.
 
-    A callback that is late and then in time leaves two samples a moment apart. Any slope between them would be noise.
+    A late callback followed by a punctual one gives two samples close together. A slope between them would be noise.
     """
 
     def __init__(self, period_ns: float) -> None:
-        """Merge by the native period [ns]."""
+        """``period_ns`` is the native period [ns]."""
         self.merged = 0
         self._least_ns = CROWDED * period_ns
         self._open: tuple[Stamps, Array] | None = None
 
     def push(self, time_ns: Stamps, values: Array) -> tuple[Stamps, Array]:
-        """Rows that are complete now; those that later ones may still join are held back."""
+        """Add rows and return those that are complete; rows that later ones may still join are held back."""
         if self._open is not None:
             time_ns = np.concatenate([self._open[0], time_ns])
             values = np.concatenate([self._open[1], values])
@@ -169,7 +173,7 @@ class Merger:
         return self._average(time_ns[:last], values[:last], starts[:-1])
 
     def finish(self) -> tuple[Stamps, Array]:
-        """What was held back."""
+        """Return the rows held back."""
         if self._open is None:
             raise ValueError("nothing was pushed")
         return self._average(*self._open, np.array([0]))
@@ -185,9 +189,9 @@ class Merger:
 
 
 BLOCK = 4096
-_DECAY = 48  # rows; in a quintic spline a sample's weight falls by 0.43 per row, to 1e-18 here
+_DECAY = 48  # rows; a quintic spline's weights fall by 0.43 per row, to 1e-18 here
 TOLERANCE_NS = 1000
-"""Stamps this close to the grid are on it: time that is read from decimals or floats is no more exact."""
+"""Largest distance from the grid of a stamp on it [ns]; times parsed from decimals or floats are no more exact."""
 _DEGREE = 5
 
 
@@ -196,12 +200,12 @@ class Grid:
     """Evenly spaced instants after a robot's first stamp.
 
     Attributes:
-        spacing_ns: of the instants [ns].
-        period_ns: of the robot's samples [ns].
+        spacing_ns: spacing of the instants [ns].
+        period_ns: period of the robot's samples [ns].
         fits: whether the samples lie on the grid, with ``period_ns`` equal to ``spacing_ns``.
-        fitted_rows: so many nearest samples, to which a polynomial is fitted at every instant; 0 for a spline through
-            all samples. A spline through samples of which some are a moment apart would swing with their noise.
-        uneven: whether intervals scatter so that none tells how many samples are missing.
+        fitted_rows: number of nearest samples to which a polynomial is fitted at every instant; 0 for a spline through
+            all samples. A spline would amplify the noise of samples that are close together.
+        uneven: whether intervals scatter too much to reveal missing samples.
     """
 
     spacing_ns: float
@@ -211,34 +215,34 @@ class Grid:
     uneven: bool = False
 
     def holds(self, time_ns: Stamps) -> bool:
-        """Whether all times [ns] are within ``TOLERANCE_NS`` of instants of the grid, no two at the same."""
+        """Return whether all times [ns] are within ``TOLERANCE_NS`` of distinct instants of the grid."""
         index = self.index(time_ns)
         off = np.abs(time_ns - index * self.spacing_ns)
         return bool(np.all(off <= TOLERANCE_NS + 0.5) and np.all(np.diff(index) > 0))
 
     def index(self, time_ns: Stamps) -> Stamps:
-        """The nearest instants' numbers."""
+        """Return the indices of the nearest instants."""
         return np.rint(time_ns / self.spacing_ns).astype(np.int64)
 
 
 class Interpolator:
     """Fills gaps and interpolates onto a grid, in blocks of ``BLOCK`` rows with enough rows on either side.
 
-    The result is that of the whole stream, to rounding, and does not depend on the pieces in which rows come.
+    The result equals that of the whole stream up to rounding, and does not depend on how the rows are split.
     """
 
     def __init__(self, grid: Grid, max_gap_s: float) -> None:
-        """Gaps are at most ``max_gap_s`` beyond one period [s]."""
+        """``max_gap_s`` is the longest gap beyond one period [s]."""
         self._grid = grid
         self._around = _DECAY + grid.fitted_rows + 2 * side(math.ceil(max_gap_s / NS / grid.period_ns))
         self._time: list[Stamps] = []
         self._values: list[Array] = []
         self._rows = 0
-        self._done = 0  # rows at the beginning of the buffer whose samples are given out
-        self._next = 0  # number of the next instant
+        self._done = 0  # leading rows of the buffer that are already interpolated
+        self._next = 0  # index of the next instant
 
     def push(self, time_ns: Stamps, values: Array) -> list[Array]:
-        """Blocks that are complete now, each (n, C), after the next rows."""
+        """Add rows and return the blocks that are complete, each (n, C)."""
         self._time.append(time_ns)
         self._values.append(values)
         self._rows += len(time_ns)
@@ -253,7 +257,7 @@ class Interpolator:
         return blocks
 
     def finish(self) -> Array:
-        """The last block."""
+        """Return the last block."""
         self._join()
         return self._block(self._rows)
 
@@ -261,7 +265,7 @@ class Interpolator:
         self._time, self._values = [np.concatenate(self._time)], [np.concatenate(self._values)]
 
     def _block(self, end: int) -> Array:
-        """Samples at the instants from the last block's end to before row ``end``, or to the last row's."""
+        """Return samples at the instants from the end of the last block up to row ``end``, or through the last row."""
         grid, rows = self._grid, slice(0, end + self._around)
         time_ns, values = self._time[0][rows], self._values[0][rows]
         instants = np.arange(self._next, self._before(end))
@@ -280,7 +284,7 @@ class Interpolator:
         return spline(np.clip(at, knots[0], knots[-1]))
 
     def _before(self, end: int) -> int:
-        """Number of the first instant that is not before row ``end``, or after the last row."""
+        """Return the index of the first instant not before row ``end``, or after the last row."""
         time_ns = self._time[0]
         if end == len(time_ns):
             at = time_ns[-1] / self._grid.spacing_ns
@@ -290,16 +294,16 @@ class Interpolator:
 
 
 def fitted_rows(native_hz: float, rate_hz: float) -> int:
-    """How many uneven samples of ``native_hz`` a polynomial is fitted to: those of three output periods.
+    """Return the number of uneven samples for a polynomial fit: those of three output periods, at least twelve.
 
-    That is flat below a fifth of the output rate. Fewer would count each sample by the time around it: twelve leave
-    twice the noise of even samples (a spline, with 0.7 ms of jitter at 1 kHz, seven times).
+    The fit is flat below a fifth of the output rate. With fewer samples, each would be weighted by the time around it.
+    Twelve give twice the noise of even samples (a spline with 0.7 ms of jitter at 1 kHz gives seven times).
     """
     return max(12, round(3.0 * native_hz / rate_hz))
 
 
 def _fitted(time: Array, values: Array, at: Array, width: int) -> Array:
-    """Values at instants, shape (n, C), of polynomials of degree 5 through the ``width`` nearest rows."""
+    """Return values at instants, shape (n, C), of degree-5 polynomials fitted to the ``width`` nearest rows."""
     width = min(width, len(time))
     first = np.clip(np.searchsorted(time, at) - width // 2, 0, len(time) - width)
     rows = first[:, None] + np.arange(width)
@@ -308,16 +312,16 @@ def _fitted(time: Array, values: Array, at: Array, width: int) -> Array:
 
 
 def on_grid(time_ns: Stamps, values: Array, grid: Grid, k: int) -> tuple[Array, int]:
-    """All rows of a stream at once: merged, filled, brought onto a grid, low-passed, thinned.
+    """Resample a whole stream at once: merge, fill, interpolate, low-pass, decimate.
 
     Args:
-        time_ns: after the first row [ns], shape (q,).
-        values: shape (q, C).
+        time_ns: times after the first row [ns], shape (q,).
+        values: samples, shape (q, C).
         grid: the fine grid.
-        k: so many of its samples make one of the output.
+        k: grid samples per output sample.
 
     Returns:
-        Output samples, shape (Q, C), and how many are missing before the first one (``Decimator.lead``).
+        Output samples, shape (Q, C), and the number missing before the first one (``Decimator.lead``).
     """
     if not (grid.fits or grid.fitted_rows):
         merger = Merger(grid.period_ns)
@@ -330,19 +334,19 @@ def on_grid(time_ns: Stamps, values: Array, grid: Grid, k: int) -> tuple[Array, 
 
 
 _MARGIN_S = 0.3
-"""Read before and after the recording, so that the low-pass is filled [s]."""
+"""Time read before and after the recording to fill the low-pass [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Resampling:
-    """The way from one robot's readings to its samples in a recording, as far as ``Sampling`` tells it.
+    """Simulates how one robot's readings become samples of a recording, as ``Sampling`` describes it.
 
-    Jitter and gaps are drawn; the way itself is that of ``resample`` and ``one_clock``.
+    Jitter and gaps are random; the processing is that of ``resample`` and ``one_clock``.
 
     Attributes:
-        instants_ns: when samples are read, in the recording's time [ns], shape (q,).
-        grid, thinned: onto which they are brought, see ``on_grid``.
-        rate_hz, samples: of the recording.
+        instants_ns: times of the readings in the recording's time [ns], shape (q,).
+        grid, thinned: fine grid and decimation, see ``on_grid``.
+        rate_hz, samples: rate [Hz] and number of samples of the recording.
     """
 
     instants_ns: Stamps
@@ -353,7 +357,7 @@ class Resampling:
 
     @classmethod
     def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Resampling:
-        """Draw one; the recording has ``samples`` at ``rate_hz`` [Hz]."""
+        """Draw random instants for a recording of ``samples`` at ``rate_hz`` [Hz]."""
         fits = sampling.method in ("untouched", "filtered")
         native_hz, fitted = sampling.native_hz, sampling.method == "fitted"
         k = max(1, round(native_hz / rate_hz)) if fits else fineness(native_hz, rate_hz, fitted=fitted)
@@ -371,11 +375,11 @@ class Resampling:
 
     @property
     def instants(self) -> Array:
-        """When samples are read, in the recording's time [s], shape (q,)."""
+        """Times of the readings in the recording's time [s], shape (q,)."""
         return np.asarray(self.instants_ns * NS, dtype=np.float64)
 
     def __call__(self, values: Array) -> Array:
-        """Samples of the recording from readings at ``instants``, shape (q, C) -> (Q, C)."""
+        """Return the recording's samples from readings at ``instants``, shape (q, C) -> (Q, C)."""
         time_ns = self.instants_ns - self.instants_ns[0]
         own, lead = on_grid(time_ns, values, self.grid, self.thinned)
         first_s = self.instants_ns[0] * NS + lead / self.rate_hz
@@ -387,9 +391,9 @@ class Resampling:
 
 
 def _jittered(at: Array, jitter_s: float, rng: np.random.Generator) -> Array:
-    """Instants off their even places, still in order, whose intervals scatter by sqrt(2) times ``jitter_s`` [s].
+    """Return jittered instants in order, whose intervals scatter by sqrt(2) times ``jitter_s`` [s].
 
-    Where jitter is as large as a period, putting them in order leaves less of it: more is drawn.
+    Sorting reduces jitter that is as large as a period; larger jitter is drawn to compensate.
     """
     draw = rng.standard_normal(len(at))
     drawn_s, wanted_s = jitter_s, np.sqrt(2.0) * jitter_s

@@ -1,4 +1,4 @@
-"""Units of logged quantities, their sizes in SI, and the numbers that some of them need besides."""
+"""Units of logged quantities, their sizes in SI, and the numbers that some of them need."""
 
 import math
 from collections.abc import Sequence
@@ -21,32 +21,35 @@ FACTORS: dict[str, dict[str, float]] = {
     "flag": {"1": 1.0},
 }  # fmt: skip
 COUNTS = "counts"
-"""Counts of an encoder need ``counts_per_turn`` (per metre of a slide), those of a duty ``full_scale``."""
+"""Counts of an encoder need ``counts_per_turn`` (per metre for a slide), those of a duty ``full_scale``."""
 RATED = {"%": 0.01, "permille": 0.001, "V": 1.0}
-"""Shares of a ``rated`` torque, force or current."""
+"""Units that are shares of a ``rated`` torque, force or current."""
 NUMBERED = ("counts_per_turn", "full_scale", "rated")
-"""Keys that belong to units."""
+"""Keys for numbers that belong to a unit."""
 TIME_UNITS: dict[str, int] = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
-"""Nanoseconds in one unit of time."""
+"""Nanoseconds per unit of time."""
 DATES = "iso"
-"""Dates and times of ISO 8601 in the place of numbers, or a column of time stamps."""
+"""Unit of time for ISO 8601 dates instead of numbers, or a column of timestamps."""
 
 
 def units_of(dimension: str) -> tuple[str, ...]:
-    """Every unit of a dimension, a key of ``FACTORS``."""
+    """Return every unit of a dimension, a key of ``FACTORS``."""
     counted = (COUNTS,) if dimension in ("angle", "length", "duty") else ()
     rated = tuple(RATED) if dimension in ("torque", "force", "current") else ()
     return (*FACTORS[dimension], *counted, *rated)
 
 
 def si_factor(fields: Fields, dimension: str, allowed: Sequence[str], noun: str) -> float:
-    """Size of one unit in SI.
+    """Return the size of one unit in SI.
 
     Args:
         fields: ``unit`` and the number that belongs to it, one of ``NUMBERED``.
         dimension: a key of ``FACTORS``.
-        allowed: the units that may be used.
-        noun: what messages call the quantity, in the plural.
+        allowed: the allowed units.
+        noun: name of the quantity in messages, in the plural.
+
+    Raises:
+        InputError: the unit is not allowed, or its number is missing, not allowed or not positive.
     """
     unit, where = fields.values["unit"], fields.where
     if unit not in allowed:

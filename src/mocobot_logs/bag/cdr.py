@@ -1,12 +1,11 @@
-"""Numbers out of CDR messages, many at a time.
+"""Read numbers from many CDR messages at once.
 
-Where a number lies in a CDR message depends on the lengths of the strings and arrays before it. Robots send messages
-whose lengths never change, so one message is walked field by field to find where its numbers are (its layout), and all
-messages with the same lengths, and the same joint names, are read at those places at once. A message with other lengths
-gets a layout of its own.
+In a CDR message, the position of a number depends on the lengths of the strings and arrays before it. The lengths of a
+robot's messages rarely change. The reader therefore walks one message field by field to find its layout. It then reads
+all messages with the same lengths and joint names at those positions at once. Other lengths get a layout of their own.
 
-Encapsulation is that of OMG DDSI-RTPS 2.5, section 10; alignment is plain CDR (XCDR1), which is what ROS 2 writes.
-Every refusal is an ``InputError`` that names the bag and the topic.
+Encapsulation follows OMG DDSI-RTPS 2.5, section 10; alignment is plain CDR (XCDR1), as ROS 2 writes it. Every error is
+an ``InputError`` that names the bag and the topic.
 """
 
 import re
@@ -29,12 +28,12 @@ from mocobot_logs.log import Stamps
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STRING = "std_msgs/msg/String"
 LARGEST_NESTED = 10_000
-"""Most strings and structures in one message; numbers in arrays do not count."""
+"""Largest number of strings and structures in one message; numbers in arrays do not count."""
 _SIZES = {
     "bool": 1, "byte": 1, "char": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
     "int64": 8, "uint64": 8, "float32": 4, "float64": 8,
 }  # fmt: skip
-"""Numbers of a message and their sizes [bytes]."""
+"""Sizes of number types [bytes]."""
 _SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 _TIME = "builtin_interfaces/msg/Time"
 _DEEPEST = 32
@@ -46,22 +45,23 @@ _REFUSED = {
     **dict.fromkeys((8, 9, 20, 21), "delimited CDR2"),
     **dict.fromkeys((10, 11, 18, 19), "PL_CDR2"),
 }  # numbers of RTPS and of older XTypes
-_TRAILING = 3  # bytes that bring a message to a multiple of four
+_TRAILING = 3  # most padding bytes, to a multiple of four
 _NEW_LAYOUTS = 4
-"""So many new layouts of one size are looked for among all messages of a block; beyond them, one by one."""
+"""Number of unstored layouts of one size that are matched against all messages of a group; later ones match one
+message."""
 _KEPT_LAYOUTS = 64
 _GROUP = 8192
-"""So many messages are read at once."""
+"""Number of messages that are read at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class MessageType:
-    """A message type with all that it is made of.
+    """A message type with the types it contains.
 
     Attributes:
         name: such as ``sensor_msgs/msg/JointState``.
-        types: fields of this and of every type inside it.
-        where: what messages call it: the bag and the topic.
+        types: fields of this type and of every type inside it.
+        where: bag and topic in messages.
     """
 
     name: str
@@ -69,7 +69,7 @@ class MessageType:
     where: str
 
     def fields(self, name: str) -> list[tuple[str, FieldDesc]]:
-        """Names and types of a type's fields; one byte where it has none, as ROS 2 does."""
+        """Return names and types of a type's fields; a type without fields has one byte, as in ROS 2."""
         if name not in self.types and name not in _known():
             raise InputError(
                 f"{self.where}: its messages hold the type {printable(name)}, which the bag does not define"
@@ -77,7 +77,7 @@ class MessageType:
         return (self.types[name] if name in self.types else _known()[name])[1] or _EMPTY
 
     def require(self, path: str) -> None:
-        """Refuse a dotted path that does not lead to a number, as ``point.x`` or ``data[2]`` may."""
+        """Refuse a dotted path, such as ``point.x`` or ``data[2]``, that does not lead to a number."""
         here, walked = self.name, ""
         parts = path.split(".")
         for number, part in enumerate(parts):
@@ -121,7 +121,7 @@ class MessageType:
             )
 
     def require_joints(self, field: str) -> None:
-        """Refuse messages that are no joint states with such numbers."""
+        """Refuse messages that are no joint states with the array ``field``."""
         if self.name != JOINT_STATE:
             raise InputError(
                 f"{self.where} holds {printable(self.name)}; a map's key joint goes with {JOINT_STATE}, and a dotted "
@@ -139,7 +139,7 @@ class MessageType:
 
 
 def message_type(topic: Topic, bag: str) -> MessageType:
-    """The type of a topic's messages, as the bag defines it, or as ROS 2 does where the bag does not say.
+    """Return the type of a topic's messages as the bag defines it, else as ROS 2 does.
 
     Raises:
         InputError: messages are not CDR, or the type is neither defined in the bag nor known.
@@ -159,16 +159,20 @@ def message_type(topic: Topic, bag: str) -> MessageType:
 
 
 def type_name(topic: Topic) -> str:
-    """Name of a topic's type in full: some writers leave out ``/msg/``."""
+    """Return the full name of a topic's type; some writers omit ``/msg/``."""
     name = topic.type
     return normalize_msgtype(name) if re.fullmatch(r"\w+/\w+", name) else name
 
 
 def string_of(message: bytes, where: str) -> str:
-    """The text of a std_msgs/msg/String."""
+    """Return the text of a std_msgs/msg/String.
+
+    Raises:
+        InputError: the message is not readable.
+    """
     try:
         return get_typestore(Stores.LATEST).deserialize_cdr(message, STRING).data  # type: ignore[attr-defined]
-    except Exception as error:  # the library raises its own type, and others on damaged bytes
+    except Exception as error:  # the library raises its own type, and others for damaged bytes
         raise InputError(f"{where}: its message is not a readable {STRING}") from error
 
 
@@ -182,7 +186,7 @@ def _parsed(topic: Topic, name: str, where: str) -> Typesdict:
             return {key: value for part in parts for key, value in get_types_from_idl(part).items()}
         if topic.definition_format == "ros2msg":
             return get_types_from_msg(text, name)
-    except Exception as error:  # the parser raises its own type, and others on damaged text
+    except Exception as error:  # the parser raises its own type, and others for damaged text
         raise InputError(f"{where}: the definition of its type {printable(name)} is not readable") from error
     raise InputError(
         f"{where}: its type is defined by {topic.definition_format!r:.40}; ros2msg and ros2idl are read"
@@ -198,7 +202,7 @@ def _check_depth(found: MessageType, name: str, depth: int, done: set[str]) -> N
         if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
             kind, detail = detail[0]  # type: ignore[misc]
         if kind == Nodetype.NAME:
-            # Types seen at this depth need no second look: the work stays in proportion to the definition.
+            # Types already seen at this depth are skipped, so the work is proportional to the definition.
             if (mark := f"{depth} {detail}") not in done:
                 done.add(mark)
                 _check_depth(found, str(detail), depth + 1, done)
@@ -210,22 +214,22 @@ def _check_depth(found: MessageType, name: str, depth: int, done: set[str]) -> N
 
 @cache
 def _known() -> Typesdict:
-    """Types that come with ROS 2."""
+    """Return the types that come with ROS 2."""
     return get_typestore(Stores.LATEST).fielddefs
 
 
 class CdrError(ValueError):
-    """A message is not what its type says; tells what is wrong, not where."""
+    """A message does not match its type; the text says how, ``row`` says which message."""
 
     def __init__(self, what: str, row: int = 0) -> None:
-        """What is wrong with which of the messages that are read together."""
+        """``row`` is the index of the message among those read together."""
         super().__init__(what)
         self.row = row
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """Numbers at ``offset`` in a message, one or an array, of a kind as NumPy has it."""
+    """One number or an array of numbers at ``offset`` in a message; ``kind`` is a NumPy type."""
 
     offset: int
     kind: str
@@ -233,25 +237,25 @@ class Leaf:
 
 
 class Walk:
-    """One message, walked.
+    """One message, parsed field by field.
 
     Attributes:
-        leaves: the numbers and arrays of numbers that are wanted, by dotted path.
-        joints: the strings of its field ``name``, if wanted.
-        fixed: every byte on which the places of the numbers depend: encapsulation, lengths, and names if wanted.
+        leaves: the wanted numbers and arrays of numbers, by dotted path.
+        joints: strings of the field ``name``, if wanted.
+        fixed: positions of all bytes that determine the layout: encapsulation, lengths, and names if wanted.
     """
 
     def __init__(self, message: bytes, kind: MessageType, wanted: set[str], names: bool) -> None:
-        """Walk a message with its encapsulation.
+        """Parse a message with its encapsulation.
 
         Args:
             message: the message.
             kind: its type.
             wanted: dotted paths of numbers or of arrays of numbers.
-            names: whether the strings of a field ``name`` are wanted.
+            names: whether to collect the strings of a field ``name``.
 
         Raises:
-            CdrError: the message is not what its type says, or is encapsulated in another way.
+            CdrError: the message does not match its type, or its encapsulation is not plain CDR.
         """
         if len(message) < 4:
             raise CdrError(f"it is cut off, at {len(message)} bytes")
@@ -321,7 +325,7 @@ class Walk:
         return int.from_bytes(self._message[begin : self._at], "little" if self._order == "<" else "big")
 
     def _align(self, size: int) -> None:
-        self._at += (4 - self._at) % size  # counted from behind the encapsulation
+        self._at += (4 - self._at) % size  # alignment counts from the end of the encapsulation
 
     def _skip(self, length: int) -> None:
         self._at += length
@@ -349,18 +353,18 @@ class Selector:
 
 
 class Layout:
-    """Where the wanted numbers lie in messages of one size.
+    """Positions of the wanted numbers in messages of one size.
 
     Attributes:
         joints: names of the joints, if joints are wanted.
-        lacking: for each selector, why messages of this layout have no such number; None where they do.
+        lacking: for each selector, why messages of this layout lack the number; None if they have it.
     """
 
     def __init__(self, message: bytes, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
-        """Find them in one message.
+        """Find the positions in one message.
 
         Raises:
-            CdrError: the message is not what its type says.
+            CdrError: the message does not match its type.
         """
         names = any(selector.joint is not None for selector in selectors)
         arrays = {re.sub(r"\[\d+\]$", "", selector.field) for selector in selectors}
@@ -399,14 +403,14 @@ class Layout:
         return leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Which messages, one per row, have this layout."""
+        """Return which messages, one per row, have this layout."""
         return (rows[:, self._at] == self._fixed).all(axis=1)
 
     def read(self, rows: NDArray[np.uint8]) -> tuple[Stamps, Array]:
-        """Stamps [ns] (0 without a header) and the numbers, NaN where lacking, of messages that have this layout.
+        """Read messages of this layout: stamps [ns] (0 without a header), and numbers, NaN where lacking.
 
         Raises:
-            CdrError: a stamp has a whole second or more in its nanoseconds.
+            CdrError: the nanoseconds of a stamp are 1e9 or more.
         """
         table = np.ascontiguousarray(rows).view(self._record)[:, 0]
         stamps = np.zeros(len(rows), np.int64)
@@ -430,12 +434,12 @@ class CdrReader:
 
     Attributes:
         joints: names of all joints seen, in order.
-        lacking: for each selector, why no message so far had such a number; None where some did.
-        count: messages read.
+        lacking: for each selector, why all messages so far lack the number; None if some had it.
+        count: number of messages read.
     """
 
     def __init__(self, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
-        """Take the type of the messages, the numbers, and whether to read ``header.stamp``."""
+        """``stamp`` tells whether to read ``header.stamp``."""
         self._kind, self._selectors, self._stamp = kind, tuple(selectors), stamp
         self._layouts: dict[int, list[Layout]] = {}
         self._kept = 0
@@ -444,7 +448,7 @@ class CdrReader:
         self.count = 0
 
     def read(self, messages: Messages) -> tuple[Stamps, Array]:
-        """Stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where a message lacks one, shape (q, S)."""
+        """Return stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where lacking, shape (q, S)."""
         stamps = np.zeros(len(messages), np.int64)
         values = np.empty((len(messages), len(self._selectors)))
         memory = np.frombuffer(messages.block, np.uint8)
@@ -463,7 +467,7 @@ class CdrReader:
     def _read_rows(
         self, rows: NDArray[np.uint8], index: NDArray[np.intp], stamps: Stamps, values: Array
     ) -> None:
-        """Read messages of one size: with the known layouts one after the other, then with new ones."""
+        """Read messages of one size: try the known layouts in turn, then learn new ones."""
         known = self._layouts.setdefault(rows.shape[1], [])
         tried = 0
         while len(rows):

@@ -1,7 +1,7 @@
-"""From a path to the files of a bag: a single one, or a folder whose ``metadata.yaml`` names them (rosbag2).
+"""Open the files of a bag: a single one, or a folder whose ``metadata.yaml`` names them (rosbag2).
 
-Only the names of the files and their compression are taken from ``metadata.yaml``; its topics, times and counts say
-nothing that the files do not say themselves, and are often wrong after a recording was interrupted or repaired.
+Only file names and compression are taken from ``metadata.yaml``. Its topics, times and counts are redundant, and
+often wrong after an interrupted or repaired recording.
 """
 
 import re
@@ -41,7 +41,7 @@ from mocobot_logs.formats import (
 )
 
 VERSIONS = range(1, 10)
-"""Versions of ``metadata.yaml`` that are read: all that rosbag2 has written so far."""
+"""Supported versions of ``metadata.yaml``, all that rosbag2 has written so far."""
 STORAGES = {"mcap": MCAP, "sqlite3": SQLITE}
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _METADATA_BYTES = 1 << 20
@@ -53,34 +53,34 @@ class BagFiles:
     """All files of a bag, opened.
 
     Attributes:
-        topics: by name.
+        topics: topics by name.
         size: bytes to read.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open them."""
+        """Open the files."""
         paths, self._are_packed = _files_of(path)
         self._scratch: Path | None = None
         stored = sum(file.stat().st_size for file in paths if file.is_file())
-        self._unpacked = Unpacked(str(path), stored)  # in one reading of all
-        self._on_disk = 0  # of that, unpacked copies of files
+        self._unpacked = Unpacked(str(path), stored)  # per pass over all files
+        self._on_disk = 0  # part of it: unpacked copies on disk
         self._storages = [self._opened(file, number) for number, file in enumerate(paths)]
         self.topics = merged((t for storage in self._storages for t in storage.topics.values()), str(path))
         self.size = sum(storage.size for storage in self._storages)
 
     def has_messages(self, topic: str) -> bool:
-        """Whether there is any message of a topic, as far as the files say."""
+        """Return whether a topic has messages, or may have some if the files do not say."""
         return any(storage.has_messages(topic) for storage in self._storages)
 
     def blocks(
         self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
-        """Messages of some topics in the order of the files; topics without messages in a block are left out.
+        """Yield messages of some topics in the order of the files; topics without messages in a block are left out.
 
         Args:
             topics: names of the topics.
-            advance: takes the bytes read since the last call.
-            block_bytes: about so many bytes at a time, where the file leaves the choice.
+            advance: called with the bytes read since the last call.
+            block_bytes: approximate size of a block, where the file allows a choice.
 
         Raises:
             InputError: a file is damaged.
@@ -94,7 +94,7 @@ class BagFiles:
                     yield block
 
     def _messages(self, block: dict[str, Messages], name: str) -> Iterator[dict[str, Messages]]:
-        """Messages that are compressed one by one, about ``BLOCK_BYTES`` at a time, topics in step."""
+        """Yield individually compressed messages, about ``BLOCK_BYTES`` at a time, topics in step."""
         orders = {topic: np.maximum.accumulate(m.log_ns).tolist() for topic, m in block.items()}
         held, found = 0, {topic: ([], []) for topic in block}
         for _, topic, k in sorted((at, t, k) for t, order in orders.items() for k, at in enumerate(order)):
@@ -136,7 +136,7 @@ class BagFiles:
         raise InputError(f"{name}: {what}")
 
     def _scratch_folder(self, wanted_by: Path) -> Path:
-        """A temporary folder that goes when this goes."""
+        """Return a temporary folder that is deleted with this object."""
         if self._scratch is None:
             try:
                 self._scratch = Path(mkdtemp(prefix="mocobot-bag-"))
@@ -149,10 +149,10 @@ class BagFiles:
 
 
 def _files_of(path: Path) -> tuple[list[Path], bool]:
-    """The files, and whether every message is compressed by itself."""
+    """Return the files, and whether messages are compressed individually."""
     try:
         exists, is_folder = path.exists(), path.is_dir()
-    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL
         raise InputError(f"{str(path)!r:.80}: not a usable file name ({error})") from error
     if not exists:
         raise InputError(f"{path}: there is no such file or folder")
@@ -181,7 +181,7 @@ def _head(path: Path) -> bytes:
 
 
 def _read_metadata(folder: Path) -> tuple[list[str], bool]:
-    """Names of the files, and whether every message is compressed by itself."""
+    """Return the names of the files, and whether messages are compressed individually."""
     path = folder / BAG_METADATA
     with readable(str(path)):
         if not path.is_file():
@@ -214,7 +214,7 @@ def _read_metadata(folder: Path) -> tuple[list[str], bool]:
     files = values.get("relative_file_paths")
     if not isinstance(files, list) or not files or not all(isinstance(name, str) for name in files):
         raise InputError(f"{path}: relative_file_paths is {files!r:.60}; it must list the bag's files")
-    names = [PurePosixPath(name).name for name in files]  # the oldest versions put the bag's folder before it
+    names = [PurePosixPath(name).name for name in files]  # the oldest versions prepend the bag's folder
     if "" in names or ".." in names or len(set(names)) < len(names) or any("\0" in name for name in names):
         raise InputError(
             f"{path}: relative_file_paths is {files!r:.60}; each must be another file in the folder"
@@ -226,12 +226,13 @@ def _load(content: bytes, path: Path) -> dict[str, Any]:
     text = content.decode("utf-8", errors="replace")
     depth = accumulate((1 if mark in "[{" else -1 for mark in re.findall(r"[\[\]{}]", text)), initial=0)
     if re.search(r"<<\s*:|(?:^|\s)!\S|^\s*%", text, re.MULTILINE) or max(depth) > _DEEPEST:
-        # Merged keys grow without bound, tags make objects, deep nesting takes minutes: no recorder writes them.
+        # Merged keys grow without bound, tags create objects, and deep nesting takes minutes; recorders write none of
+        # them.
         raise InputError(f"{path}: holds YAML beyond plain values, which no bag's metadata does")
     try:
         if "&" in text and any(isinstance(t, AnchorToken) for t in YAML(typ="safe", pure=True).scan(text)):
             raise ValueError("it has anchors, which no bag's metadata has")
         values = plain(YAML(typ="safe", pure=True).load(text))
-    except Exception as error:  # on damaged text the parser raises many types, not all of them its own
+    except Exception as error:  # for damaged text the parser raises many types, not all of them its own
         raise InputError(f"{path}: not readable YAML ({detail_of(error)})") from error
     return values if isinstance(values, dict) else {}

@@ -1,4 +1,4 @@
-"""What files of a bag hand over (topics, blocks of serialised messages), and decompression that is bounded."""
+"""Topics and blocks of serialised messages of a bag, and decompression with bounded memory."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,13 +15,13 @@ from mocobot_logs.formats import detail_of, shown
 from mocobot_logs.log import Stamps
 
 BLOCK_BYTES = 4 << 20
-"""About so many bytes of messages are handed over at a time, unless a chunk of the file is larger."""
+"""Approximate size of a block of messages [bytes], unless a chunk of the file is larger."""
 MESSAGE_BYTES = 16 << 20
 """Largest message that is read [bytes]; one robot's joint states take some hundred."""
 CHUNK_BYTES = 256 << 20
-"""Largest chunk of a file that is unpacked in memory; recorders write chunks of about 1 MiB."""
+"""Largest chunk that is unpacked in memory [bytes]; recorders write chunks of about 1 MiB."""
 SHOWN = 20
-"""So many topics or joints are listed in a message."""
+"""Largest number of topics or joints that a message lists."""
 _STEP = 1 << 20
 
 
@@ -32,10 +32,10 @@ class Topic:
     Attributes:
         name: such as ``/omnid1/joint/joint_states``.
         type: such as ``sensor_msgs/msg/JointState``.
-        encoding: how messages are serialised, ``cdr`` in all that is read.
-        definition_format: ``ros2msg``, ``ros2idl``, or "" where the bag has no definition of the type.
+        encoding: serialisation of the messages; only ``cdr`` is read.
+        definition_format: ``ros2msg``, ``ros2idl``, or "" if the bag does not define the type.
         definition: text of the definition.
-        count: number of messages as far as it is known, else None.
+        count: number of messages, None if unknown.
     """
 
     name: str
@@ -53,8 +53,8 @@ class Messages:
     Attributes:
         block: the memory.
         start: first byte of each message, shape (q,).
-        size: its number of bytes, shape (q,).
-        log_ns: when the recorder wrote it [ns], shape (q,).
+        size: size of each message [bytes], shape (q,).
+        log_ns: time of recording [ns], shape (q,).
     """
 
     block: bytes
@@ -63,24 +63,24 @@ class Messages:
     log_ns: Stamps
 
     def __len__(self) -> int:
-        """Number of messages q."""
+        """Return the number of messages q."""
         return len(self.start)
 
     def __getitem__(self, index: int) -> bytes:
-        """One message."""
+        """Return one message."""
         start = int(self.start[index])
         return self.block[start : start + int(self.size[index])]
 
 
 def joined(payloads: Sequence[bytes], log_ns: Stamps, where: str) -> Messages:
-    """Messages that come one by one, in one block of memory."""
+    """Join separate messages in one block of memory."""
     size = np.fromiter(map(len, payloads), np.int64, len(payloads))
     check_sizes(size, where)
     return Messages(b"".join(payloads), np.cumsum(size) - size, size, log_ns)
 
 
 def check_sizes(size: NDArray[np.int64], where: str) -> None:
-    """Refuse messages that are larger than ``MESSAGE_BYTES``."""
+    """Refuse messages larger than ``MESSAGE_BYTES``."""
     if len(size) and (largest := int(size.max())) > MESSAGE_BYTES:
         raise InputError(
             f"{where}: a message of {largest / 2**20:.1f} MiB; joint data are read from messages of at most "
@@ -89,7 +89,7 @@ def check_sizes(size: NDArray[np.int64], where: str) -> None:
 
 
 def merged(topics: Iterable[Topic], where: str) -> dict[str, Topic]:
-    """Topics by name: recorders list one once for each quality of service, and once in each file."""
+    """Merge topics by name; a bag may list one per quality of service and per file."""
     found: dict[str, Topic] = {}
     for topic in topics:
         known = found.setdefault(topic.name, topic)
@@ -106,7 +106,7 @@ def merged(topics: Iterable[Topic], where: str) -> dict[str, Topic]:
 
 
 def listed(topics: Mapping[str, Topic]) -> str:
-    """The topics of a bag and their types, for messages."""
+    """Return the topics of a bag and their types, for messages."""
     if not topics:
         return "the bag has no topics"
     first = list(topics.values())[:SHOWN]
@@ -116,21 +116,21 @@ def listed(topics: Mapping[str, Topic]) -> str:
 
 
 def listed_names(names: Sequence[str]) -> str:
-    """Names of a file, for messages."""
+    """Return names found in a file, for messages."""
     return ", ".join(map(printable, names[:SHOWN])) + (", ..." if len(names) > SHOWN else "") or "none"
 
 
 def printable(text: str) -> str:
-    """Text of a file as a terminal may show it."""
+    """Return text of a file in a form that a terminal can show."""
     return shown(text, 80)
 
 
 class UnpackError(ValueError):
-    """What was to be unpacked is damaged, or larger than it may be; says what is wrong, not where."""
+    """Packed data are damaged or too large; the text says what is wrong, not where."""
 
 
 def unpack(data: bytes, compression: str, size: int) -> bytes:
-    """Unpack a chunk that claims ``size`` bytes; the compression is "", "zstd" or "lz4", as MCAP names them.
+    """Unpack a chunk that claims ``size`` bytes; ``compression`` is "", "zstd" or "lz4", as in MCAP.
 
     Raises:
         UnpackError: unknown compression, damaged data, or another size.
@@ -158,10 +158,10 @@ def unpack(data: bytes, compression: str, size: int) -> bytes:
 
 
 def unpack_message(data: bytes) -> bytes:
-    """Unpack one message that was compressed by itself (zstd).
+    """Unpack one individually compressed message (zstd).
 
     Raises:
-        UnpackError: damaged, or larger than ``MESSAGE_BYTES``.
+        UnpackError: the message is damaged, or larger than ``MESSAGE_BYTES``.
     """
     try:
         size = zstandard.frame_content_size(data)
@@ -178,12 +178,12 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], unpacked: 
 
     Args:
         source: packed file.
-        target: where to unpack it.
-        heads: first bytes that the unpacked file may have.
-        unpacked: counts.
+        target: unpacked file.
+        heads: allowed first bytes of the unpacked file.
+        unpacked: counts the unpacked bytes.
 
     Raises:
-        InputError: damaged, not one of ``heads``, too much in all, or there is no room for it.
+        InputError: the file is damaged, does not begin with one of ``heads``, is too large, or the disk is full.
     """
     done = 0
     try:
@@ -208,7 +208,7 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], unpacked: 
 
 
 def _zstd(data: bytes, size: int) -> bytes:
-    """At most ``size`` bytes and one more."""
+    """Unpack at most ``size`` + 1 bytes."""
     unpacker = zstandard.ZstdDecompressor()
     if zstandard.frame_content_size(data) == size:  # three times as fast as a stream
         return unpacker.decompress(data, max_output_size=size) if size else b""

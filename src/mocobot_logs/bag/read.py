@@ -1,11 +1,11 @@
-"""ROS 2 bags as logs, without ROS: rosbag2 folders or single files, MCAP or SQLite, CDR messages.
+"""Read ROS 2 bags as logs, without ROS: rosbag2 folders or single files, MCAP or SQLite, CDR messages.
 
-Channels are found by a map: a topic and a joint of its sensor_msgs/msg/JointState, or a dotted path in any other
-message. Time is the messages' ``header.stamp``, or when they were logged if the map says so. Where channels of one
-robot come from several topics, ``RowAligner`` brings these onto the stamps of the fastest; commands that a log may
-lack are left out if they are not stamped together with the samples. A joint that single messages lack gives NaN.
+A map locates each channel: a topic and a joint of its sensor_msgs/msg/JointState, or a dotted path in another message.
+Time is ``header.stamp`` or, if the map says so, the time of logging. If a robot's channels come from several topics,
+``RowAligner`` brings them onto the stamps of the fastest. Optional commands are left out if their stamps differ from
+those of the samples. A joint that is missing in some messages gives NaN there.
 
-A bag is read once from front to back, a few MiB at a time, however long it is.
+A bag of any length is read once from front to back, a few MiB at a time.
 """
 
 from __future__ import annotations
@@ -39,20 +39,19 @@ from mocobot_logs.maps import ChannelMap, LogMap, builtin_map
 MAX_GAP_NS = 50_000_000
 """Longest time without samples of a topic, beyond its period, that is interpolated [ns]."""
 HELD = 1 << 16
-"""Most messages of a topic that wait for those of another one."""
+"""Largest number of messages of a topic that wait for those of another topic."""
 _AT_ONCE = 4096
-_SAME = 1.25  # periods of topics that are as fast as each other
-_CROWDED = 0.25  # of a period: closer samples leave only noise in differences between them
+_SAME = 1.25  # ratio below which periods of topics count as equal
+_CROWDED = 0.25  # of a period: differences between closer samples are only noise
 
 
 class RowAligner:
-    """Brings several topics of one robot onto the stamps of one of them, the fastest.
+    """Brings several topics of one robot onto the stamps of the fastest topic.
 
-    At its stamps, messages of the other topics with the same stamp are taken bit for bit. Where there is none, a topic
-    is interpolated by the cubic through two samples on either side: it misses 4e-7 of a sine of 1 Hz that is sampled at
-    100 Hz, and 2.3e-4 at 5 Hz (3/128 of the fourth power of the phase from sample to sample). Nothing is thinned out
-    here, so nothing aliases. There is no row where a topic has no samples: before its first, after its last, and where
-    it has a gap.
+    Messages of other topics with the same stamp are copied bit for bit. At other stamps, a topic is interpolated by
+    the cubic through two samples on either side. Its relative error for a sine is 3/128 of the fourth power of the
+    phase per sample. At 100 Hz this is 4e-7 for 1 Hz and 2.3e-4 for 5 Hz. Nothing is decimated, so nothing aliases.
+    There are no rows before a topic's first sample, after its last, or in its gaps.
     """
 
     def __init__(
@@ -62,20 +61,20 @@ class RowAligner:
         periods_ns: Sequence[float],
         columns: Sequence[NDArray[np.intp]],
     ) -> None:
-        """Prepare.
+        """Initialise without samples.
 
         Args:
-            where: what messages call the robot.
-            names: its topics.
-            periods_ns: their median periods [ns]; the first of those that are about the shortest sets the rows.
-            columns: of a row that each topic has.
+            where: name of the robot in messages.
+            names: names of its topics.
+            periods_ns: median periods of the topics [ns]; the first that is close to the shortest sets the rows.
+            columns: columns of a row that each topic fills.
         """
         self._where, self._names, self._periods, self._columns = where, names, periods_ns, columns
         self._leader = next(k for k, period in enumerate(periods_ns) if period <= _SAME * min(periods_ns))
         self._topics = [joined([], len(each)) for each in columns]
 
     def push(self, parts: Mapping[int, Samples]) -> Samples | None:
-        """Take a block (topic from 0: its messages) and return the rows that are ready, if any."""
+        """Add a block, messages by topic number from 0, and return the rows that are complete, if any."""
         for number, part in parts.items():
             if number != self._leader:
                 self._check(number, part.stamp_ns)
@@ -85,14 +84,14 @@ class RowAligner:
         others = [topic.stamp_ns for k, topic in enumerate(self._topics) if k != self._leader]
         if len(leader) < _AT_ONCE and all(len(stamps) < HELD for stamps in others):
             return None
-        # Two samples are needed behind every row.
+        # Interpolation needs two samples after every row.
         until = min(int(stamps[-2]) if len(stamps) > 1 else -(1 << 62) for stamps in others)
         later = leader > until
         ready = int(np.argmax(later)) if later.any() else len(leader)
         return self._rows(max(ready, len(leader) - HELD))
 
     def finish(self) -> Samples | None:
-        """The rows that are left, if any."""
+        """Return the remaining rows, if any."""
         return self._rows(len(self._topics[self._leader].stamp_ns))
 
     def _rows(self, ready: int) -> Samples | None:
@@ -108,7 +107,7 @@ class RowAligner:
                 )
                 good &= near
                 keep = max(len(topic.stamp_ns) - HELD // 2, 0)
-                if ready:  # what later rows need: two samples before the last row
+                if ready:  # later rows need two samples before the last row
                     keep = max(keep, int(np.searchsorted(topic.stamp_ns, rows.stamp_ns[-1])) - 2)
             self._topics[number] = rows_of(topic, slice(keep, None))
         if not good.any():
@@ -125,9 +124,9 @@ class RowAligner:
 
 
 def _interpolated(topic: Samples, at_ns: Stamps, period_ns: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Values at some stamps, and where the topic has any to either side that are close enough."""
+    """Return interpolated values at some stamps, and which stamps have close enough samples on both sides."""
     fresh = np.ones(len(topic.stamp_ns), bool)
-    fresh[1:] = topic.stamp_ns[1:] > topic.stamp_ns[:-1]  # repeated stamps say nothing new
+    fresh[1:] = topic.stamp_ns[1:] > topic.stamp_ns[:-1]  # drop repeated stamps
     stamp, values = topic.stamp_ns[fresh], topic.values[fresh]
     if len(stamp) < 2:
         return np.full((len(at_ns), values.shape[1]), np.nan), np.zeros(len(at_ns), bool)
@@ -135,7 +134,7 @@ def _interpolated(topic: Samples, at_ns: Stamps, period_ns: float) -> tuple[Arra
     nodes = after[:, None] + np.arange(-2, 2)
     cubic = (nodes[:, 0] >= 0) & (nodes[:, -1] < len(stamp))
     nodes = np.clip(nodes, 0, len(stamp) - 1)
-    time = (stamp[nodes] - at_ns[:, None]) / period_ns  # differences first: stamps are too large for floats
+    time = (stamp[nodes] - at_ns[:, None]) / period_ns  # differences first: stamps lose precision as floats
     steps = np.diff(time, axis=1)
     longest = 1.0 + MAX_GAP_NS / period_ns
     good = (time[:, 1] <= 0.0) & (time[:, 2] >= 0.0) & (steps[:, 1] <= longest)
@@ -148,12 +147,12 @@ def _interpolated(topic: Samples, at_ns: Stamps, period_ns: float) -> tuple[Arra
         same = time[:, node] == 0.0
         weights[same] = np.arange(4) == node
         good |= same
-    # A sample without weight must not count even where it is NaN.
+    # NaN times zero weight would be NaN: use 0 for samples without weight.
     return np.einsum("qn,qnc->qc", weights, np.where(weights[..., None] != 0.0, values[nodes], 0.0)), good
 
 
 def _lagrange(time: Array) -> Array:
-    """Weights of samples at ``time`` (q, n) for the value at 0."""
+    """Return Lagrange weights of samples at ``time`` (q, n) for the value at 0."""
     weights = np.ones_like(time)
     for k in range(time.shape[1]):
         for j in range(time.shape[1]):
@@ -165,37 +164,37 @@ def _lagrange(time: Array) -> Array:
 Clock = Literal["header", "log"]
 
 METADATA_TOPIC = "/mocobot/metadata"
-"""One std_msgs/msg/String with the metadata of the recording that a bag was written from."""
+"""Topic of one std_msgs/msg/String with the metadata of the recording that a bag was written from."""
 MATCHING = 0.9
-"""Share of stamps that two topics have in common from which on they count as stamped together."""
+"""Smallest share of common stamps at which two topics count as stamped together."""
 ENOUGH = 10_000
-"""Messages of a topic after which what none of them had is taken for missing; an hour need not be read for that."""
+"""Number of messages after which a field or joint that none of them had counts as missing; saves reading long bags."""
 STAMPS = 1000
-"""So many stamps of a topic are looked at before a bag is read."""
+"""Number of stamps per topic that are read before the bag itself."""
 _ENOUGH_BLOCKS = 64
-"""After so many blocks those stamps will do that were found."""
-_NAMES_BYTES = 64 << 10  # several publishers may have a part of the joints each
+"""Number of blocks after which the stamps found so far must suffice."""
+_NAMES_BYTES = 64 << 10  # several publishers may each send some of the joints
 _MAPS = ("mocobot-ros2", "omnid-ros2")
 
 
 class Look:
-    """What the first messages of a bag's topics say."""
+    """Reads the first messages of a bag's topics."""
 
     def __init__(self, bag: str, files: BagFiles) -> None:
-        """Take the bag, and what messages call it; nothing is read yet."""
+        """``bag`` is the bag's name in messages; nothing is read yet."""
         self._bag, self._files = bag, files
         self._joints: dict[str, tuple[str, ...]] = {}
         self._stamps: dict[tuple[str, str], Stamps] = {}
 
     def first(self, topic: str, block_bytes: int) -> Messages | None:
-        """The first messages of a topic, of about so many bytes; None if there are none."""
+        """Return the first messages of a topic, about ``block_bytes`` bytes, or None if it has none."""
         if not self._files.has_messages(topic):
             return None
         found = self._files.blocks((topic,), lambda _: None, block_bytes)
         return next((block[topic] for block in found), None)
 
     def joints(self, topic: str) -> tuple[str, ...]:
-        """Joints in the first messages of a topic, none if they are no joint states or there is no such topic."""
+        """Return the joints in the first messages of a topic, empty if it has no joint states or does not exist."""
         if topic not in self._files.topics:
             return ()
         if topic not in self._joints:
@@ -209,7 +208,7 @@ class Look:
         return self._joints[topic]
 
     def stamps(self, topics: Sequence[str], clock: Clock) -> dict[str, Stamps]:
-        """Stamps of the first messages of some topics [ns], with a single look at the bag."""
+        """Return stamps [ns] of the first messages of some topics, in a single pass over the bag."""
         missing = [topic for topic in topics if (topic, clock) not in self._stamps]
         kinds = {topic: message_type(self._files.topics[topic], self._bag) for topic in missing}
         readers = {topic: CdrReader(kind, (), clock == "header") for topic, kind in kinds.items()}
@@ -227,13 +226,13 @@ class Look:
         return {topic: self._stamps[topic, clock] for topic in topics}
 
     def agree(self, topics: Sequence[str], clock: Clock) -> bool:
-        """Whether the first messages of some topics are stamped together."""
+        """Return whether the first messages of some topics are stamped together."""
         first, *others = self.stamps(topics, clock).values()
         return all(_share(each, first) >= MATCHING and _share(first, each) >= MATCHING for each in others)
 
 
 def _share(some: Stamps, others: Stamps) -> float:
-    """Share of some stamps, as far as others cover them, that are among the others."""
+    """Return the share of ``some`` stamps that are among the others, within the time span of the others."""
     if not len(others):
         return 0.0
     covered = some[(some >= others.min()) & (some <= others.max())]
@@ -242,12 +241,12 @@ def _share(some: Stamps, others: Stamps) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Use:
-    """What one topic gives to one robot.
+    """The use of one topic for one robot.
 
     Attributes:
-        robot, part: number of the robot, and of the topic among those of the robot, from 0.
-        numbers: places of the channels among the topic's selectors.
-        maps: how to bring them to SI.
+        robot, part: number of the robot, and of the topic among the robot's topics, from 0.
+        numbers: indices of the channels among the topic's selectors.
+        maps: conversions to SI.
     """
 
     robot: int
@@ -258,7 +257,7 @@ class _Use:
 
 @dataclass(frozen=True, eq=False)
 class _Topic:
-    """What is read from one topic: numbers, what each means (channel and robot), and where they go."""
+    """What to read from one topic: selectors with their meaning (channel and robot), and their uses."""
 
     kind: MessageType
     selectors: dict[Selector, str]
@@ -284,7 +283,7 @@ class BagSource:
         if self._map.has_commands(self.robots, lambda channel: self._files.has_messages(channel.topic or "")):
             self.channels += REF
         self._plan()
-        if any(len(topics) > 1 for topics in self._parts):  # all at once: the bag need not be looked at again
+        if any(len(topics) > 1 for topics in self._parts):  # one pass for all topics
             self._look.stamps(tuple(self._topics), self._clock)
         may_lack = self.channels != self._map.required and self._map.common[REF[0]].optional
         if may_lack and not all(self._look.agree(topics, self._clock) for topics in self._parts):
@@ -294,10 +293,10 @@ class BagSource:
         self.metadata = self._read_metadata()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Samples of one robot after the other, see ``LogSource.chunks``.
+        """Yield samples robot by robot, see ``LogSource.chunks``.
 
         Raises:
-            InputError: the bag is damaged, a message is not what its type says, or what the map names is in no message.
+            InputError: the bag is damaged, a message does not match its type, or no message holds what the map names.
         """
         readers = {name: _Reader(topic, self._clock) for name, topic in self._topics.items()}
         aligners = [self._aligner(robot) for robot in range(self.robots)]
@@ -316,11 +315,11 @@ class BagSource:
             reader.check_end()
 
     def _choose_map(self) -> LogMap:
-        """The built-in map more of whose joints the first robot has."""
+        """Return the built-in map that names more of the first robot's joints."""
         maps = [builtin_map(name) for name in _MAPS]
         topic = maps[0].channels(1)["theta_z"].topic or ""
         if topic not in self._files.topics or type_name(self._files.topics[topic]) != JOINT_STATE:
-            return maps[-1]  # what is missing by it is said where it is used
+            return maps[-1]  # a later check reports what is missing
         there = self._look.joints(topic)
         if not there:
             raise InputError(
@@ -343,7 +342,7 @@ class BagSource:
             channels, others = log_map.channels(robot), log_map.channels(robot + 1)
             for name in log_map.required:
                 channel, other = channels[name], others[name]
-                # Robots that share a topic are told apart by their joints.
+                # Joints distinguish robots that share a topic.
                 is_own = channel.topic != other.topic or (
                     channel.joint != other.joint and channel.joint in self._look.joints(channel.topic or "")
                 )
@@ -360,7 +359,8 @@ class BagSource:
         return log_map.count_robots(self.name, is_there, "topic")
 
     def _plan(self) -> None:
-        """Find every channel of every robot: topics of each robot, columns of each topic, and what is read where."""
+        """Locate every channel of every robot: topics of each robot, columns of each topic, selectors of each
+        message."""
         selected: dict[str, dict[Selector, str]] = {}
         for robot, channel_maps in enumerate(self._maps, 1):
             for name in self.channels:
@@ -412,7 +412,7 @@ class BagSource:
         return f"{self.name}: no topic {topic!r:.80} {where}{hint}; {listed(topics)}"
 
     def _aligner(self, robot: int) -> RowAligner | None:
-        """What brings a robot's topics together; a single one needs nothing."""
+        """Return the aligner of a robot's topics; a single topic needs none."""
         topics = self._parts[robot]
         if len(topics) == 1:
             return None
@@ -442,20 +442,20 @@ class BagSource:
 
 
 def open_bag(path: Path, log_map: LogMap | None = None) -> BagSource:
-    """Open a bag: find its topics, the robots and the channels.
+    """Open a bag and find its topics, robots and channels.
 
     Args:
         path: a folder with ``metadata.yaml``, or a single .mcap or .db3 file.
         log_map: the map, or None to choose between ``mocobot-ros2`` and ``omnid-ros2`` by the joints' names.
 
     Raises:
-        InputError: there is no bag, it is damaged, or it does not hold what the map says.
+        InputError: there is no bag, it is damaged, or it lacks what the map names.
     """
     return BagSource(Path(path), log_map)
 
 
 class _Reader:
-    """Reads one topic and finds out what none of its messages had."""
+    """Reads one topic and checks that each selector occurs in some message."""
 
     def __init__(self, topic: _Topic, clock: Clock) -> None:
         self._topic, self._clock = topic, clock
@@ -463,7 +463,7 @@ class _Reader:
         self._stamped = clock == "log"
 
     def read(self, messages: Messages, parts: list[dict[int, Samples]]) -> None:
-        """Messages of a block, into the parts of the robots."""
+        """Read the messages of a block into the robots' parts."""
         stamps, numbers = self._cdr.read(messages)
         if self._clock == "log":
             stamps = messages.log_ns
@@ -472,15 +472,13 @@ class _Reader:
             self._check(f"all of the first {self._cdr.count} messages")
         for use in self._topic.uses:
             values = np.empty((len(stamps), len(use.maps)))
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # values are for the reader of the log to judge
+            with np.errstate(over="ignore", invalid="ignore"):  # later stages check the values
                 for k, (number, channel) in enumerate(zip(use.numbers, use.maps, strict=True)):
                     values[:, k] = channel.apply(numbers[:, number])
             parts[use.robot][use.part] = Samples(stamps, values, messages.log_ns)
 
     def check_end(self) -> None:
-        """Refuse a topic without messages, and one of which something was in no message."""
+        """Refuse a topic without messages, and one that lacks a selected number in every message."""
         if not self._cdr.count:
             raise InputError(f"{self._topic.kind.where} has no messages")
         self._check("every message")

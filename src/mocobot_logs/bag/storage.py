@@ -1,15 +1,13 @@
-"""MCAP files (https://mcap.dev/spec) and SQLite files as the storage of a bag, whatever state they are in.
+"""Read MCAP files (https://mcap.dev/spec) and SQLite files of a bag, including damaged ones.
 
-An MCAP file is read once from front to back, chunk by chunk, whatever its index says: the index of a damaged file lies.
-``rosbags`` goes by it (of 1000 damaged files it read 53 without some messages and without a word; 4 here), unpacks a
-chunk before it knows how much comes out (a bomb of 260 kB never ended), and takes six times as long for a message.
-Records are parsed by the ``mcap`` library, except for the headers of chunks and of messages.
+An MCAP file is read once from front to back, chunk by chunk. Its index is not used, since that of a damaged file may be
+wrong. ``rosbags`` relies on the index and unpacks a chunk before it knows the unpacked size. This reader is also about
+six times as fast per message. The ``mcap`` library parses all records except the headers of chunks and messages.
 
-An SQLite file (.db3) has the tables ``topics``, ``messages`` and, in newer ones, definitions. Messages come in the
-order in which they were inserted. The file is taken as it lies on the disk (immutable), so nothing is ever written
-beside it; a database that somebody made to harm (views, loops of pages) is stopped by SQLite's own limits and by rows
-that do not ascend. ``rosbags`` sets no limits (45 kB whose pages run in circles became 1.8 GB) and refuses a whole bag
-for one topic whose definition or quality of service it does not know.
+An SQLite file (.db3) has the tables ``topics``, ``messages`` and, in newer files, definitions. Messages come in the
+order of insertion. The file is opened as immutable, so nothing is written beside it. SQLite's limits and a check for
+ascending rows stop malicious databases (views, cyclic pages). ``rosbags`` sets no such limits, and refuses a whole bag
+if it does not know the definition or quality of service of one topic.
 """
 
 import contextlib
@@ -69,10 +67,15 @@ class McapBag:
     """One MCAP file of a bag."""
 
     def __init__(self, path: Path, name: str, unpacked: Unpacked) -> None:
-        """Find the topics: in the summary, or in the whole file where there is none; ``unpacked`` counts chunks.
+        """Find the topics in the summary or, without one, in the whole file.
+
+        Args:
+            path: the file.
+            name: its name in messages.
+            unpacked: counts the unpacked bytes of chunks.
 
         Raises:
-            InputError: not a complete MCAP file, or a damaged one.
+            InputError: the file is not a complete MCAP file, or it is damaged.
         """
         self._path, self.name, self._unpacked = path, name, unpacked
         self._channels: dict[int, Topic] = {}
@@ -99,7 +102,7 @@ class McapBag:
     def blocks(
         self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
-        """Messages of some topics, see ``BagFiles.blocks``."""
+        """Yield messages of some topics, see ``BagFiles.blocks``."""
         for block, found in self._scan(topics, advance, block_bytes):
             by_topic: dict[str, list[int]] = {}
             for channel, starts in found.items():
@@ -108,13 +111,14 @@ class McapBag:
                 yield {topic: self._messages(block, starts, topic) for topic, starts in by_topic.items()}
 
     def has_messages(self, topic: str) -> bool:
-        """Whether there is any message of a topic, as far as the file says."""
+        """Return whether a topic has messages, or may have some if the file has no counts."""
         return topic in self.topics and self.topics[topic].count != 0
 
     def _scan(
         self, topics: Collection[str] | None, advance: Callable[[int], object], most: int
     ) -> Iterator[tuple[bytes, _Starts]]:
-        """Memory and where messages of some topics, or of all, are in it, from front to back: chunks and windows."""
+        """Yield chunks and windows from front to back, with the positions of messages of some topics (None: all) in
+        each."""
         at, told = len(MCAP), 0
         end, window = self.size - len(MCAP), _WINDOW
         with self._open() as file:
@@ -143,7 +147,7 @@ class McapBag:
                         raise self._stuck(block, 0, at)
                     yield block, found
                     after = at + stop
-                    # Small steps where chunks and loose records alternate: what is read twice stays in proportion.
+                    # Small windows where chunks and loose records alternate bound the bytes that are read twice.
                     is_stopped = stop + _HEAD.size <= len(block) and block[stop] in _NOT_INSIDE
                     window = _WINDOW if is_stopped else min(2 * window, max(most, _WINDOW))
                 elif not opcode:
@@ -153,7 +157,7 @@ class McapBag:
         advance(self.size - told)
 
     def _walk(self, block: bytes, offset: int, topics: Collection[str] | None) -> tuple[_Starts, int]:
-        """Where the messages of whole records are, by channel, and where these records end."""
+        """Return the positions of messages in whole records by channel, and the end of these records."""
         found: dict[int, list[int] | None] = {}
         at, end = 0, len(block)
         head, is_message, last = _MESSAGE_HEAD.unpack_from, int(Opcode.MESSAGE), end - _MESSAGE.itemsize
@@ -180,13 +184,13 @@ class McapBag:
         return {channel: starts for channel, starts in found.items() if starts}, at
 
     def _starts(self, channel: int, topics: Collection[str] | None, offset: int) -> list[int] | None:
-        """A list for a channel that is wanted, None for another one."""
+        """Return a new list for a wanted channel, None for another one."""
         if (topic := self._channels.get(channel)) is None:
             raise self._damaged(offset, f"a message of channel {channel}, which was not announced")
         return [] if topics is None or topic.name in topics else None
 
     def _stuck(self, block: bytes, at: int, offset: int) -> InputError:
-        """The error for a record that cannot be where it is."""
+        """Return the error for a record that cannot be at its position."""
         left = len(block) - at - _HEAD.size
         if left < 0:
             return self._damaged(offset, "a record is cut off")
@@ -199,7 +203,7 @@ class McapBag:
         return self._damaged(offset, what)
 
     def _define(self, opcode: int, content: bytes, offset: int) -> None:
-        """Take note of a schema or a channel (a later one with the same number must be the same), or of counts."""
+        """Store a schema, a channel or the message counts; a repeated schema or channel must equal the first."""
         if opcode == Opcode.SCHEMA:
             schema = self._parse(Schema, content, offset)
             if self._schemas.setdefault(schema.id, schema) != schema:
@@ -222,13 +226,13 @@ class McapBag:
     def _parse(self, kind: Any, content: bytes, offset: int) -> Any:
         try:
             return kind.read(ReadDataStream(BytesIO(content)))
-        except Exception as error:  # struct.error, UnicodeDecodeError, McapError and what else damage brings
+        except Exception as error:  # struct.error, UnicodeDecodeError, McapError and others
             raise self._damaged(offset, f"its {kind.__name__} record is not readable") from error
 
     def _messages(self, block: bytes, starts: list[int], topic: str) -> Messages:
         where = f"topic {topic!r:.80}"
         start = np.array(starts, np.int64)
-        start.sort()  # several publishers of one topic have a channel each
+        start.sort()  # several publishers of a topic have a channel each
         windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(block, np.uint8), _MESSAGE.itemsize)
         heads = np.ascontiguousarray(windows[start]).view(_MESSAGE)[:, 0]
         size = heads["length"].astype(np.int64) - (_MESSAGE.itemsize - _HEAD.size)
@@ -247,7 +251,8 @@ class McapBag:
             return self._path.open("rb")
 
     def _read(self, file: BinaryIO, length: int, at: int | None = None) -> bytes:
-        """So many bytes from where the file is, or from ``at``; the caller knows that the file has them."""
+        """Read ``length`` bytes at ``at``, or at the current position; the caller has checked that the file holds
+        them."""
         with readable(self.name):
             if at is not None:
                 file.seek(at)
@@ -257,7 +262,7 @@ class McapBag:
         return content
 
     def _check_ends(self, file: BinaryIO) -> tuple[int, int]:
-        """Size of the file, and where its summary begins (0: it has none)."""
+        """Return the file's size and the position of its summary, 0 if there is none."""
         size = os.fstat(file.fileno()).st_size
         if size < len(MCAP) or self._read(file, len(MCAP)) != MCAP:
             raise InputError(f"{self.name}: not an MCAP file, it begins with other bytes")
@@ -275,7 +280,7 @@ class McapBag:
         return size, summary
 
     def _read_summary(self, file: BinaryIO, at: int) -> None:
-        """Take channels, schemas and numbers of messages from the summary."""
+        """Read channels, schemas and message counts from the summary."""
         length = self.size - _TAIL - at
         if length > CHUNK_BYTES:
             raise self._damaged(at, f"a summary of {length} bytes")
@@ -284,7 +289,7 @@ class McapBag:
             raise self._stuck(block, stop, at)
 
     def _chunk(self, file: BinaryIO, length: int, at: int) -> bytes:
-        """What is in a chunk, its checksum compared where it has one."""
+        """Return the unpacked content of a chunk, after a check of its checksum if it has one."""
         if not _CHUNK.size + 8 <= length <= 2 * CHUNK_BYTES:
             raise self._damaged(at, f"a chunk of {length} bytes")
         content = self._read(file, length)
@@ -295,7 +300,7 @@ class McapBag:
             raise self._damaged(at, "a chunk claims more bytes than it has")
         compression = content[_CHUNK.size : begin - 8].decode(errors="replace")
         if compression:
-            self._unpacked.add(min(size, CHUNK_BYTES))  # of larger ones ``unpack`` says more
+            self._unpacked.add(min(size, CHUNK_BYTES))  # ``unpack`` refuses larger chunks
         try:
             block = unpack(content[begin : begin + stored], compression, size)
         except UnpackError as error:
@@ -306,14 +311,14 @@ class McapBag:
 
 
 _OPERATIONS = 1_000_000
-"""SQLite reports after so many of its operations; a row takes some ten and at least eight bytes of the file."""
+"""Number of SQLite operations between progress calls; a row takes about ten, and at least eight bytes of the file."""
 _REQUIRED = {
     "topics": ("id", "name", "type", "serialization_format"),
     "messages": ("topic_id", "timestamp", "data"),
 }
-_MOST_ROWS = 10_000  # of the tables that describe topics
+_MOST_ROWS = 10_000  # in the tables that describe topics
 
-_Row = tuple[int, bytes, int, int]  # topic, message, when it was logged [ns], number of the row
+_Row = tuple[int, bytes, int, int]  # topic, message, time of logging [ns], row number
 
 
 class SqliteBag:
@@ -323,7 +328,7 @@ class SqliteBag:
         """Find the topics.
 
         Raises:
-            InputError: not a complete SQLite file with the tables of a bag, or a damaged one.
+            InputError: the file is not a complete SQLite file with the tables of a bag, or it is damaged.
         """
         self.path, self.name = path, name
         self._check_file()
@@ -336,12 +341,12 @@ class SqliteBag:
     def blocks(
         self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
-        """Messages of some topics, see ``BagFiles.blocks``."""
+        """Yield messages of some topics, see ``BagFiles.blocks``."""
         ids = [key for key, name in self._ids.items() if name in topics]
         last, told, held = -(1 << 63), 0, 0
         with self._connected() as connection:
             marks = ",".join("?" * len(ids))
-            # By rowid: no index is trusted, nothing sorted, and the file is read from front to back.
+            # The order by rowid needs no index and no sort, and reads the file from front to back.
             rows = connection.execute(
                 f"SELECT topic_id, data, timestamp, rowid FROM messages NOT INDEXED WHERE topic_id IN ({marks}) "
                 "ORDER BY rowid",
@@ -362,7 +367,7 @@ class SqliteBag:
         advance(self.size - told)
 
     def has_messages(self, topic: str) -> bool:
-        """Whether there is any message of a topic."""
+        """Return whether a topic has messages."""
         ids = [key for key, name in self._ids.items() if name == topic]
         with self._connected() as connection:
             marks = ",".join("?" * len(ids))
@@ -373,7 +378,7 @@ class SqliteBag:
         return InputError(f"{self.name}: damaged, {what}")
 
     def _next(self, rows: Iterator[_Row], block_bytes: int) -> list[_Row]:
-        """Rows of about one block."""
+        """Return rows of about one block."""
         found, held = [], 0
         try:
             for row in rows:
@@ -415,7 +420,7 @@ class SqliteBag:
         if not head.startswith(SQLITE):
             raise InputError(f"{self.name}: not an SQLite file, it begins with other bytes")
         page = int.from_bytes(head[16:18], "big")
-        pages = int.from_bytes(head[28:32], "big") if head[24:28] == head[92:96] else 0  # else out of date
+        pages = int.from_bytes(head[28:32], "big") if head[24:28] == head[92:96] else 0  # else outdated
         whole = max(pages * (65536 if page == 1 else page), 100)
         if self.size < whole:
             raise InputError(f"{self.name}: cut off, the SQLite file has {self.size} of {whole} bytes")

@@ -1,14 +1,14 @@
-"""Recordings as ROS 2 bags: rosbag2 folders or single files, MCAP or SQLite, that the robot's own tools open.
+"""Write recordings as ROS 2 bags: rosbag2 folders or single files, MCAP or SQLite, readable by ROS 2 tools.
 
 Topics per robot i, from 1:
 
-- ``/omnid{i}/joint/joint_states`` (sensor_msgs/msg/JointState): at joint level the joints phi1, phi2, phi3 (position
-  [rad], effort = spring torque [N m]), at wrist level x, y, z (position of the wrist in {b} [m], effort = force of the
-  springs on it [N]), then gimbal_z, gimbal_y, gimbal_x (position [rad], effort 0: they are passive); no velocities.
+- ``/omnid{i}/joint/joint_states`` (sensor_msgs/msg/JointState). At joint level: joints phi1, phi2, phi3 (position
+  [rad], effort = spring torque [N m]). At wrist level: x, y, z (position of the wrist in {b} [m], effort = force of the
+  springs on it [N]). Both: gimbal_z, gimbal_y, gimbal_x (position [rad], effort 0: they are passive); no velocities.
 - ``/omnid{i}/wrist/command`` (geometry_msgs/msg/PointStamped): commanded wrist position in {b} [m], if recorded.
 
-``/mocobot/metadata`` (std_msgs/msg/String, latched) has the recording's metadata as JSON, once. Header stamps and log
-times are the recording's times. The maps ``mocobot-ros2`` and ``omnid-ros2`` read such bags.
+``/mocobot/metadata`` (std_msgs/msg/String, latched) holds the recording's metadata as JSON, once. Header stamps and
+log times are the recording's times. The maps ``mocobot-ros2`` and ``omnid-ros2`` read such bags.
 """
 
 import sqlite3
@@ -50,10 +50,10 @@ from mocobot_logs.log import Array, Level, Stamps
 
 
 class ChecksummedMcap:
-    """The storage that ``rosbags.rosbag2.Writer`` calls; its own writes no checksums, so that damage goes unseen."""
+    """MCAP storage for ``rosbags.rosbag2.Writer`` with checksums, which the library's own storage lacks."""
 
     def __init__(self, path: Path, compression: CompressionMode) -> None:
-        """Create ``<folder>/<folder's name>.mcap``; ``compression`` is that of the bag around it."""
+        """Create ``<folder>/<folder's name>.mcap``; ``compression`` of the bag is ignored."""
         del compression
         self.path = path / f"{path.name}.mcap"
         self._file = self.path.open("xb")
@@ -80,7 +80,7 @@ class ChecksummedMcap:
         )
 
     def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        """Write a message, logged when it was stamped [ns]."""
+        """Write a message; ``timestamp`` [ns] is both its log time and its publish time."""
         self._writer.add_message(self._channels[connection.id], timestamp, bytes(data), timestamp)
 
     def close(self, version: int, metadata: str) -> None:
@@ -104,7 +104,7 @@ _ARM: dict[Level, tuple[str, ...]] = {"joint": ("phi1", "phi2", "phi3"), "wrist"
 _GIMBAL = ("gimbal_z", "gimbal_y", "gimbal_x")
 _LAST_S = 2**31 - 1  # seconds of a stamp are an int32
 _AT_ONCE = 4096
-_VERSION = 8  # of metadata.yaml; the newest in which quality of service is text, as ROS 2 Humble needs it
+_VERSION = 8  # of metadata.yaml: the newest with quality of service as text, as ROS 2 Humble needs it
 _LATCHED = Qos(
     QosHistory.KEEP_LAST,
     1,
@@ -130,16 +130,16 @@ def write_bag(
     advance: Callable[[int], object] = lambda _: None,
     replace_bag: bool = False,
 ) -> None:
-    """Write a recording as a ROS 2 bag; at joint level every sample comes back bit by bit, times to the nanosecond.
+    """Write a recording as a ROS 2 bag; at joint level samples are bit-exact, times exact to the nanosecond.
 
     Args:
-        recording: what to write.
+        recording: the recording.
         path: a single file if it ends in .mcap or .db3 (an existing one is replaced once the new one is complete),
             else a new folder with ``metadata.yaml``.
         level: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
         storage: "mcap" or "sqlite3".
-        advance: takes the number of samples written since the last call.
-        replace_bag: whether a bag in a folder that this program wrote may be replaced, once the new one is complete.
+        advance: called with the number of samples written since the last call.
+        replace_bag: whether to replace a bag's folder that this program wrote, once the new one is complete.
 
     Raises:
         InputError: the target exists or cannot be written, times are not within [0, 2^31) s, or level or storage is
@@ -158,7 +158,7 @@ def write_bag(
             whole_file(path) if single else whole_folder(path, "bag") as target,
             scratch_folder(path.parent) as scratch,
         ):
-            folder = scratch / name  # a bag's files are named like its folder
+            folder = scratch / name  # a bag's files are named after its folder
             with _Writer(folder, version=_VERSION, storage_plugin=plugin) as bag:
                 _write(recording, stamps, level, bag, advance)
             for file in folder.iterdir():
@@ -174,7 +174,7 @@ def write_bag(
 
 
 def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
-    """Whether the target is a single file."""
+    """Check the target; return whether it is a single file."""
     suffix = path.suffix.lower()
     single = suffix in SUFFIXES.values()
     try:
@@ -200,7 +200,7 @@ def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
 
 
 def _stamps(recording: Recording) -> Stamps:
-    """Times in whole nanoseconds; seconds apart, since a float of the Unix time has no room for them."""
+    """Return times as integer nanoseconds; whole seconds are converted separately to keep precision."""
     time = recording.time
     if not (np.isfinite(time).all() and (not len(time) or 0 <= time.min() <= time.max() < _LAST_S)):
         raise InputError(
@@ -241,7 +241,7 @@ def _write(
 
 
 def _values(recording: Recording, part: slice, level: Level) -> Iterator[tuple[Array, ...]]:
-    """What goes into the messages of each stream: position and effort of the joints, or the point."""
+    """Yield the content of each stream's messages: position and effort of the joints, or the point."""
     for robot in range(recording.metadata.robots):
         position, effort = recording.phi[part, robot], recording.tau[part, robot]
         if level == "wrist":
@@ -257,12 +257,12 @@ def _values(recording: Recording, part: slice, level: Level) -> Iterator[tuple[A
 
 @dataclass(frozen=True, eq=False)
 class _Stream:
-    """Messages of one topic that differ in their stamps and numbers only.
+    """Messages of one topic that differ only in stamps and numbers.
 
     Attributes:
         connection: the topic.
         template: one message.
-        record: where its stamp and its numbers are.
+        record: positions of its stamp and numbers.
     """
 
     connection: Connection
@@ -270,7 +270,7 @@ class _Stream:
     record: np.dtype
 
     def messages(self, stamps: Stamps, *values: Array) -> list[bytes]:
-        """One message per stamp, with numbers (q, n) for each array that the record has after the stamp."""
+        """Return one message per stamp, with numbers (q, n) for each array of the record after the stamp."""
         rows: NDArray[np.uint8] = np.tile(np.frombuffer(self.template, np.uint8), (len(stamps), 1))
         table = rows.view(self.record)[:, 0]
         table["sec"], table["nanosec"] = np.divmod(stamps, 1_000_000_000)

@@ -1,4 +1,4 @@
-"""Maps of one robot's joint logs: what each column is of which joint, and what lies between motors and joints."""
+"""Maps of one robot's joint logs: quantity and joint of each column, and the transmission between motors and joints."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ Kind = Literal["position", "velocity", "effort", "current", "duty", "voltage", "
 
 @dataclass(frozen=True)
 class Quantity:
-    """One kind of column.
+    """A kind of column.
 
     Attributes:
         kind: what it measures.
-        motor: whether it is of the motor's side of the gear.
-        shared: whether it is one column of the robot, not one of each joint.
+        motor: whether it is measured on the motor's side of the gear.
+        shared: whether the robot has one such column, not one per joint.
     """
 
     kind: Kind
@@ -64,7 +64,7 @@ QUANTITIES: dict[str, Quantity] = {
     "supply": Quantity("voltage", shared=True),
     "enabled": Quantity("flag", shared=True),
 }
-"""By the name of its channel in a map; a command is of the kind that ``[control] command`` says."""
+"""Quantities by channel name in a map; ``[control] command`` sets the kind of a command."""
 POSITIONS = ("q", "motor_position")
 VELOCITIES = ("dq", "motor_velocity")
 EFFORTS = ("torque", "link_torque", "motor_torque", "current")
@@ -83,7 +83,7 @@ _DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
     "voltage": ("voltages", "voltage", "voltage"),
     "flag": ("flags", "flag", "flag"),
 }
-"""Plural, and dimension of a turning and of a sliding joint."""
+"""Plural, and dimension for a turning and for a sliding joint."""
 _COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
 _PLACEHOLDERS = ("joint", "number", "index")
 _OPTIONAL = ("version", "time", "csv", "defaults", "drive", "control", "joint", "log")
@@ -96,19 +96,19 @@ _UNKNOWN = float("nan")
 
 
 def units_of(kind: Kind, *, slides: bool) -> tuple[str, ...]:
-    """Units that a kind of column may come in, for a joint that slides or turns."""
+    """Return the units allowed for a kind of column of a sliding or turning joint."""
     return units.units_of(_DIMENSIONS[kind][1 + slides])
 
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """How the robot is commanded, as far as it is known; unknown numbers are NaN.
+    """How the robot is commanded; unknown numbers are NaN.
 
     Attributes:
-        command: what the log's commands are.
+        command: quantity of the log's commands.
         position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,).
-        gain_of: what gains make of an error.
-        limit: most that the loop gives, in ``gain_of``, shape (J,).
+        gain_of: quantity that the gains produce from an error.
+        limit: largest output of the loop, in the quantity of ``gain_of``, shape (J,).
         supply_V: nominal supply voltage, or None.
     """
 
@@ -125,20 +125,20 @@ Channels = dict[tuple[str, str], ChannelMap]
 
 @dataclass(frozen=True, eq=False)
 class JointMap:
-    """A map: strict, complete, joints in the model's order.
+    """A complete, checked map with joints in the model's order.
 
     Attributes:
-        name: what messages call it.
+        name: name of the map in messages.
         joints: names of the J joints in the model.
-        time: where time is.
+        time: location of the time.
         rate_hz: rate of the grid [Hz], or None for the log's own.
-        csv: how a text table is written.
-        channels: by quantity and joint; the joint is "" for what the robot has one of.
-        turns: motor positions from joint positions, gears and coupled drives, shape (J, J).
-        zero: added to positions behind the gear [rad or m], shape (J,).
-        torque_constant: [N m/A], NaN where it is free, shape (J,).
+        csv: form of a text table.
+        channels: by quantity and joint; the joint is "" for a quantity of the whole robot.
+        turns: matrix from joint to motor positions, with gears and coupled drives, shape (J, J).
+        zero: added to positions on the joint's side of the gear [rad or m], shape (J,).
+        torque_constant: torque constants [N m/A], NaN where free, shape (J,).
         control: how the robot is commanded.
-        overrides: patterns of file names, and the entries of ``control`` that differ there; later ones override.
+        overrides: file name patterns with the entries of ``control`` that they change; later ones override.
     """
 
     name: str
@@ -154,7 +154,7 @@ class JointMap:
     overrides: tuple[tuple[str, Mapping[str, Any]], ...] = ()
 
     def control_of(self, file_name: str) -> Control:
-        """How the robot is commanded in a log of some name."""
+        """Return how the robot is commanded in the log with that file name."""
         control = self.control
         for pattern, differs in self.overrides:
             if fnmatchcase(file_name, pattern):
@@ -162,21 +162,26 @@ class JointMap:
         return control
 
     def of_source(self) -> LogMap:
-        """The map as readers of logs take it: one robot, one channel after the other."""
+        """Return the map in the form that readers of logs use: one robot with all channels in order."""
         mapped = {label(*key): channel for key, channel in self.channels.items()}
         return LogMap(self.name, "joint", 1, None, self.time, self.csv, mapped, required=tuple(mapped))
 
 
 def label(quantity: str, joint: str) -> str:
-    """What messages call a channel."""
+    """Return the name of a channel in messages."""
     return f"{quantity} of {joint}" if joint else quantity
 
 
 def read_joint_map(path: Path | str, joints: Sequence[str], slides: Sequence[bool]) -> JointMap:
-    """A map from its file, for a model's joints, of which some slide.
+    """Read a map from its file for a model's joints.
+
+    Args:
+        path: TOML file.
+        joints: names of the model's joints.
+        slides: whether each joint slides.
 
     Raises:
-        InputError: there is no such file, it is not TOML, or not such a map.
+        InputError: there is no such file, it is not TOML, or it is not a valid map.
     """
     return parse_joint_map(read_toml_map(Path(path)), str(path), joints, slides)
 
@@ -184,16 +189,16 @@ def read_joint_map(path: Path | str, joints: Sequence[str], slides: Sequence[boo
 def parse_joint_map(
     values: Mapping[str, Any], name: str, joints: Sequence[str], slides: Sequence[bool]
 ) -> JointMap:
-    """Check a map and bring it into shape.
+    """Check and parse the TOML values of a map.
 
     Args:
         values: the parsed TOML.
-        name: what to call the map in messages.
-        joints: the model's joints.
-        slides: whether each of them slides.
+        name: name of the map in messages.
+        joints: names of the model's joints.
+        slides: whether each joint slides.
 
     Raises:
-        InputError: a key is unknown or missing, a value is not allowed, or the joints are not the model's.
+        InputError: a key is unknown or missing, a value is not allowed, or the joints differ from the model's.
     """
     where = f"map {name}"
     check_version(values, where)
@@ -235,7 +240,7 @@ def parse_joint_map(
 
 
 def _joint_names(top: Fields, model: Sequence[str]) -> tuple[str, ...]:
-    """Names in the order of the log."""
+    """Return the joint names in the map's order."""
     names = top.list("joints")
     if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
         top.refuse("joints", "a list of distinct names of the model's joints")
@@ -255,7 +260,7 @@ def _joint_names(top: Fields, model: Sequence[str]) -> tuple[str, ...]:
 def _channels(
     values: Mapping[str, Any], joints: _PerJoint, slides: Mapping[str, bool], command: str
 ) -> Channels:
-    """Every channel of every joint in the map's order, then what the robot has one of."""
+    """Return every channel of every joint in the map's order, then the channels of the whole robot."""
     where = joints.where
     defaults = table_of(values, "defaults", where)
     check_known(defaults, KEYS, f"{where}: defaults")
@@ -295,7 +300,7 @@ def _channels(
 
 
 def _channel_tables(tables: Mapping[str, Any], where: str) -> dict[str, dict[str, Any] | None]:
-    """Tables by quantity; None for what is switched off with ``false``."""
+    """Return the tables by quantity; None for a quantity set to ``false``."""
     check_known(tables, tuple(QUANTITIES), where, "channel")
     for name, table in tables.items():
         if isinstance(table, dict):
@@ -320,7 +325,7 @@ def _joint_channel(
         raise InputError(
             f"{fields.where}: missing key 'unit'; it is one of {', '.join(units_of(kind, slides=slides))}"
         )
-    # A motor turns or slides, whatever its joint does.
+    # A motor may turn although its joint slides.
     slides = slides and not (quantity.motor and fields.text("unit") in units_of(kind, slides=False))
     plural, *dimensions = _DIMENSIONS[kind]
     is_of = f" of a {'sliding' if slides else 'turning'} joint" if dimensions[0] != dimensions[1] else ""
@@ -333,7 +338,7 @@ def _joint_channel(
 
 
 def _check_joint(names: Sequence[str], joint: str, where: str) -> None:
-    """One position at least, and one of all else at most."""
+    """Check that a joint has a position and at most one torque, velocity, command and duty."""
     groups = {"torque": EFFORTS, "velocity": VELOCITIES, "command": COMMANDS, "duty": DUTIES}
     for what, group in groups.items():
         given = [name for name in names if name in group]
@@ -349,7 +354,7 @@ def _check_joint(names: Sequence[str], joint: str, where: str) -> None:
 
 
 def _check_together(channels: Channels, control: Control, where: str) -> None:
-    """What only makes sense with something else."""
+    """Check the channels against each other and against the control."""
     names = {name for name, _ in channels}
     commands = names & set(COMMANDS)
     if commands and control.command == "none":
@@ -403,17 +408,17 @@ _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
     "torque_constant": (1.0, _constant, 'a positive number of newton metres per ampere, or "free"'),
     **dict.fromkeys(_GAIN, (_UNKNOWN, _positive, "a positive number")),
 }
-"""Numbers of a joint: default, what takes a value or refuses it by None, and what is allowed."""
+"""By key of a joint: default, converter (None refuses the value), and description of allowed values."""
 
 
 @dataclass(frozen=True)
 class _PerJoint:
-    """Reads numbers of the joints.
+    """Reads the numbers of the joints.
 
     Attributes:
-        where: what messages call the map.
-        named: the joints in the map's order.
-        model: the joints in the model's order.
+        where: name of the map in messages.
+        named: joints in the map's order.
+        model: joints in the model's order.
         own: tables of single joints.
     """
 
@@ -423,7 +428,10 @@ class _PerJoint:
     own: Mapping[str, Mapping[str, Any]]
 
     def read(self, table: Mapping[str, Any], key: str, inside: str) -> Array:
-        """One number for all joints, or a list in the map's order; single joints may have their own. Shape (J,)."""
+        """Return a value per joint in the model's order, shape (J,).
+
+        A table gives one number for all joints or a list in the map's order; tables of single joints override it.
+        """
         default, convert, allowed = _RULES[key]
         given = table.get(key, default)
         count = len(self.named)
@@ -445,7 +453,7 @@ class _PerJoint:
 
 
 def _gears(values: Mapping[str, Any], joints: _PerJoint) -> tuple[Array, Array, Array]:
-    """Motor positions from joint positions (J, J), zeros [rad or m] (J,), torque constants [N m/A] (J,)."""
+    """Return motor from joint positions (J, J), zeros [rad or m] (J,) and torque constants [N m/A] (J,)."""
     inside = f"{joints.where}: drive"
     drive = table_of(values, "drive", joints.where)
     check_known(drive, (*_DRIVE, "coupling"), inside)
@@ -469,7 +477,7 @@ def _gears(values: Mapping[str, Any], joints: _PerJoint) -> tuple[Array, Array, 
 
 
 def _coupled(coupling: Any, joints: _PerJoint, where: str) -> Array:
-    """Motor turns per turn of other joints than their own, in the model's order, shape (J, J)."""
+    """Return the off-diagonal motor turns per joint turn, in the model's order, shape (J, J)."""
     if not isinstance(coupling, dict):
         raise InputError(
             f"{where} is {coupling!r:.40}; it must be a matrix (motors by joints) or tables such as "
@@ -494,7 +502,7 @@ def _coupled(coupling: Any, joints: _PerJoint, where: str) -> Array:
 def _control(
     values: Mapping[str, Any], joints: _PerJoint
 ) -> tuple[Control, tuple[tuple[str, Mapping[str, Any]], ...]]:
-    """How the robot is commanded, and what differs in single logs."""
+    """Return how the robot is commanded, and the overrides of single logs."""
     inside = f"{joints.where}: control"
     table = table_of(values, "control", joints.where)
     fields = Fields(table, (), inside, ("command", "gain_of", "supply_V", *_GAIN))

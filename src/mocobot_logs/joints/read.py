@@ -1,9 +1,8 @@
-"""Logs of one robot's joints, of any format, by a map: on an even grid, in the units and order of the model's joints.
+"""Read one robot's joint log of any format by its map: uniform grid, SI units, joints in the model's order.
 
-A log is taken at its own rate where its stamps are even, else interpolated and low-passed. The parts between long gaps
-are logs of their own. Stamps that are not even are treated as those of a team (``resample``): gaps are bridged by
-polynomials, a quintic spline leads onto a finer grid, and a known low-pass back to the log's rate, so that noise of
-samples a moment apart is averaged and nothing folds.
+A log with even stamps keeps its own rate; any other log is interpolated and low-passed. Long gaps split a log into
+parts. Uneven stamps are treated as in ``resample``: polynomials bridge short gaps, a quintic spline leads onto a finer
+grid, and a known low-pass leads back to the log's rate. This averages the noise of close samples and avoids aliasing.
 """
 
 from __future__ import annotations
@@ -40,15 +39,20 @@ from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_ro
 MAX_GAP_S = 0.05
 """Longest time without samples, beyond one period, that is bridged [s]."""
 SHORTEST_S, LEAST_ROWS = 1.0, 32
-"""Parts between gaps that are shorter are left out."""
+"""Shortest part between gaps [s] and its least number of rows; shorter parts are left out."""
 LEAST_HZ, MOST_HZ = 20.0, 20e3
-_BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; of the blocks; times the usual one
+_BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; quantile; slower intervals over the median
 _GAP = 1.75  # periods: jitter alone makes no longer intervals
-_INSIDE = 0.1  # of a period: nearer to a sample than that, a bridged gap does not show
+_INSIDE = 0.1  # share of a period: an instant this close to a sample does not count as inside a gap
 
 
 def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = None) -> LogSource:
-    """A log of any format that ``open_log`` knows, as a map reads it; ``episode`` is of a LeRobot dataset.
+    """Open a log of any format that ``open_log`` knows, by a map.
+
+    Args:
+        path: the log.
+        log_map: its map.
+        episode: episode of a LeRobot dataset.
 
     Raises:
         InputError: there is no such log, or the map does not suit it.
@@ -59,7 +63,12 @@ def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = No
 def read_joint_log(
     source: LogSource, log_map: JointMap, advance: Callable[[int], object] = lambda _: None
 ) -> list[JointLog]:
-    """The parts of a log between long gaps, mostly one; ``advance`` takes the progress made, in the source's units.
+    """Read a log and return its parts between long gaps; most logs have one part.
+
+    Args:
+        source: the log.
+        log_map: its map.
+        advance: called with the progress, in the source's units.
 
     Raises:
         InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
@@ -68,12 +77,12 @@ def read_joint_log(
 
 
 def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointLog]:
-    """The parts of a log that is in memory.
+    """Return the parts between long gaps of a log in memory.
 
     Args:
-        name: of the log, whose last part may decide about gains.
-        samples: its rows, channels in the map's order.
-        log_map: its map.
+        name: path of the log; the map may set gains by its last part.
+        samples: rows of the log, channels in the map's order.
+        log_map: map of the log.
 
     Raises:
         InputError: see ``read_joint_log``.
@@ -97,17 +106,17 @@ def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointL
 
 @dataclass(frozen=True, eq=False)
 class _Even:
-    """A part of a log on an even grid.
+    """A part of a log on a uniform grid.
 
     Attributes:
-        start_s: of the first sample, after the log's first stamp [s].
-        rate_hz: of the grid [Hz].
+        start_s: time of the first sample after the log's first stamp [s].
+        rate_hz: rate of the grid [Hz].
         values: channels [SI], shape (Q, C).
         usable: False where a gap was bridged, shape (Q,).
-        native_hz: rate of the samples [Hz].
-        resampled: whether they were interpolated and low-passed.
-        raw: samples as they came, shape (q, C).
-        notes: what was done, in sentences.
+        native_hz: sample rate of the log [Hz].
+        resampled: whether the samples were interpolated or low-passed.
+        raw: samples before resampling, shape (q, C).
+        notes: sentences that say how the samples were processed.
     """
 
     start_s: float
@@ -121,7 +130,7 @@ class _Even:
 
 
 def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz: float | None) -> list[_Even]:
-    """Parts of a log between gaps too long to be bridged, at ``rate_hz`` [Hz] or the log's own rate."""
+    """Split a log at gaps too long to be bridged and resample each part to ``rate_hz`` [Hz] or the log's own rate."""
     _check_values(name, channels, samples.values)
     screen = Screen(name, channels)
     time_ns, values = screen.keep(samples)
@@ -164,7 +173,7 @@ def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz:
 
 
 def _even(time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | None) -> _Even:
-    """One part without long gaps."""
+    """Resample one part without long gaps."""
     first_ns = int(time_ns[0])
     time_ns = time_ns - first_ns
     found = _own_grid(time_ns, period_ns)
@@ -209,7 +218,7 @@ def _even(time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | Non
 
 
 def _between_samples(at_ns: Array, time_ns: Stamps, period_ns: float) -> NDArray[np.bool_]:
-    """Whether instants are not inside a gap."""
+    """Return which instants lie outside all gaps."""
     after = np.clip(np.searchsorted(time_ns, at_ns), 1, len(time_ns) - 1)
     left, right = time_ns[after - 1], time_ns[after]
     margin = _INSIDE * period_ns
@@ -218,9 +227,12 @@ def _between_samples(at_ns: Array, time_ns: Stamps, period_ns: float) -> NDArray
 
 
 def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int64], float] | None:
-    """If stamps are even: spacing [ns], each sample's number, and the step of rounded stamps, 0 for none [ns].
+    """Fit a grid to even stamps; None if they are uneven.
 
-    Stamps rounded to milliseconds or to a tick of a clock are even if no one is further off than the rounding.
+    Stamps rounded to milliseconds or clock ticks count as even if each is off by no more than the rounding.
+
+    Returns:
+        Spacing [ns], index of each sample, and rounding step of the stamps [ns], 0 if they are not rounded.
     """
     interval = np.diff(time_ns)
     step_ns = float(np.gcd.reduce(interval))
@@ -228,7 +240,7 @@ def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int6
     if np.any(np.diff(index) < 1):
         return None
     spacing_ns, offset_ns = period_ns, 0.0
-    for _ in range(3):  # a spacing that is a little off loses count over a long log
+    for _ in range(3):  # a small error of the spacing shifts the indices of a long log
         spacing_ns, offset_ns = np.polyfit(index.astype(float), time_ns.astype(float), 1)
         again = np.rint((time_ns - offset_ns) / spacing_ns).astype(np.int64)
         again -= again[0]
@@ -247,9 +259,9 @@ def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int6
 
 
 def _period_ns(interval: Stamps) -> float:
-    """The usual interval; the slower one where a log's rate changes by less than twice.
+    """Return the usual interval, or the slower one if the log's rate changes by less than a factor of two.
 
-    Such a change shows in the mean of many intervals, in which jitter and single gaps do not.
+    Means over many intervals show such a change; jitter and single gaps do not affect them.
     """
     median = float(np.median(interval))
     blocks = interval[: len(interval) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).mean(axis=1)
@@ -260,7 +272,7 @@ def _period_ns(interval: Stamps) -> float:
 
 
 def _plain(rate_hz: float) -> float:
-    """A rate without what rounding of stamps makes of it."""
+    """Round a rate to a whole number if the difference may come from rounded stamps."""
     whole = round(rate_hz)
     return float(whole) if abs(rate_hz - whole) < 1e-5 * rate_hz else rate_hz
 
@@ -298,13 +310,21 @@ def _notes(screen: Screen) -> list[str]:
 
 TURN = 2.0 * np.pi
 LEAST_JUMP = 0.75
-"""No joint moves by this share of a turn between two samples: at 20 Hz it would be 94 rad/s."""
+"""Share of a turn that no joint moves between two samples: at 20 Hz it would be 94 rad/s."""
 ONE_TURN = 1.01
-"""Turns that the readings of an encoder which starts again cover at most."""
+"""Largest range, in turns, of an encoder that wraps around."""
 
 
 def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
-    """Positions [rad], shape (q, C), NaN where a row lacks one, without jumps by a full turn; and what to say of it."""
+    """Remove jumps by a full turn from positions.
+
+    Args:
+        values: positions [rad], shape (q, C), NaN where a row lacks one.
+        names: names of the C channels.
+
+    Returns:
+        The positions, and a sentence for each channel that changed.
+    """
     out, notes = values, []
     for c, name in enumerate(names):
         known = np.flatnonzero(np.isfinite(values[:, c]))
@@ -323,36 +343,37 @@ def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
 
 
 SUPPLY_HZ = 1.0
-"""Cut-off of a supply's reading. Chosen: batteries and their cables sag in seconds; faster is how a bus rings that is
-switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty of 7.0 to 7.4 V)."""
+"""Cut-off frequency of a supply's reading [Hz]. Chosen: batteries and cables sag within seconds, and faster changes are
+ringing of the switched bus, which a reading samples at random (Measured, XL330: 5.7 to 9.2 V, mean 7.0 to 7.4 V).
+"""
 
 
 def mean_supply(reading: Array, rate_hz: float) -> Array:
-    """A supply's reading of at least 16 even samples, low-passed [V], shape (Q,).
+    """Low-pass a supply's reading of at least 16 uniform samples [V], shape (Q,).
 
-    A bus that a drive switches rings, and a reading meets it at any instant of the drive's period: an XL330 at a steady
-    duty of 0.7 reads 6.2, 7.3 and 8.2 V in turn, with about the mean of its idle supply. The winding has the mean.
+    A drive's switching makes the bus ring, and readings fall at random phases of its period. An XL330 at a steady duty
+    of 0.7 reads 6.2, 7.3 and 8.2 V in turn; their mean is near its idle supply. The winding sees this mean.
     """
-    # A filter goes through the first and the last reading of what it is given: means there are none by chance.
+    # The filter passes through the first and last value of its input: padding with means removes their noise.
     end = round(rate_hz / SUPPLY_HZ)
     wide = np.concatenate([np.full(end, reading[:end].mean()), reading, np.full(end, reading[-end:].mean())])
     return low_pass(wide, rate_hz, SUPPLY_HZ)[end : end + len(reading)]
 
 
 _STEP_ROWS = 1024
-"""Rows of a block in which the step of a reading is looked for."""
+"""Rows per block in which the step of a reading is searched."""
 _STEP_BLOCKS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Channels of one part of a log, by quantity and joint; values have the shape (Q, C), in the map's order."""
+    """Channels of one part of a log by quantity and joint; values have shape (Q, C), in the map's order."""
 
     log_map: JointMap
     values: Array
 
     def of(self, quantity: str) -> Array:
-        """A quantity of all joints, NaN where a joint has none, shape (Q, J)."""
+        """Return a quantity of all joints, NaN where a joint has none, shape (Q, J)."""
         keys, joints = list(self.log_map.channels), self.log_map.joints
         found = np.full((len(self.values), len(joints)), np.nan)
         for k, (name, joint) in enumerate(keys):
@@ -361,23 +382,24 @@ class _Columns:
         return found
 
     def shared(self, quantity: str) -> Array | None:
-        """A quantity that the robot has one of, shape (Q,)."""
+        """Return a quantity of the whole robot, shape (Q,), or None."""
         keys = list(self.log_map.channels)
         return self.values[:, keys.index((quantity, ""))] if (quantity, "") in keys else None
 
     def has(self, *quantities: str) -> bool:
-        """Whether any joint has one of some quantities."""
+        """Return whether any joint has one of the quantities."""
         return any(name in quantities for name, _ in self.log_map.channels)
 
 
 def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, notes: Sequence[str]) -> JointLog:
-    """One part of a log, brought to the joints."""
+    """Convert one part of a log to joint quantities."""
     columns = _Columns(log_map, part.values)
     turns, zero = log_map.turns, log_map.zero
     where = f"map {log_map.name}"
     joint_side = columns.of("q")
     motor_side = columns.of("motor_position")
-    # A joint that is read on both sides of its gear follows the link; the motor's reading is kept beside it.
+    # If a joint is read on both sides of its gear, q is the link's reading, and the motor's reading is kept
+    # separately.
     both = _given(joint_side) & _given(motor_side)
     q = _joints_from_motors(joint_side, np.where(both, np.nan, motor_side), turns, where, "motor_position")
     motor = None
@@ -426,12 +448,13 @@ def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, note
 
 
 def _given(values: Array) -> NDArray[np.bool_]:
-    """Which joints have a column, shape (J,)."""
+    """Return which joints have a column, shape (J,)."""
     return np.asarray(~np.isnan(values).all(axis=0))
 
 
 def _joints_from_motors(joint: Array, motor: Array, turns: Array, where: str, channel: str) -> Array:
-    """Positions or velocities of all joints from those of some joints and the motors of the others, shape (Q, J)."""
+    """Return positions or velocities of all joints, shape (Q, J), from joint readings where given, else from motor
+    readings."""
     at_joint, at_motor = _given(joint), _given(motor)
     out = joint.copy()
     solved = at_motor & ~at_joint
@@ -450,7 +473,7 @@ def _joints_from_motors(joint: Array, motor: Array, turns: Array, where: str, ch
 
 
 def _at_joints(motor: Array, turns: Array, where: str, channel: str) -> Array:
-    """Torques of the joints from those of the motors, NaN where a joint has none, shape (Q, J)."""
+    """Return joint torques from motor torques, NaN where a joint has none, shape (Q, J)."""
     given = _given(motor)
     out = np.full(motor.shape, np.nan)
     for j in np.flatnonzero(given):
@@ -465,7 +488,7 @@ def _at_joints(motor: Array, turns: Array, where: str, channel: str) -> Array:
 
 
 def _constants(columns: _Columns, log_map: JointMap, where: str) -> Array:
-    """Torque constants of the joints that have currents; 1 of the others."""
+    """Return the torque constants of joints with currents, 1 for the others."""
     constants = np.where(_given(columns.of("current")), log_map.torque_constant, 1.0)
     coupled = (log_map.turns - np.diag(np.diag(log_map.turns)) != 0).any(axis=1)
     coupled |= (log_map.turns - np.diag(np.diag(log_map.turns)) != 0).any(axis=0)
@@ -520,7 +543,7 @@ def _duty(columns: _Columns, supply_V: Array | None) -> Array | None:
 
 
 def _position_step(part: _Even, log_map: JointMap, turns: Array) -> Array:
-    """Resolution of the positions [rad or m], shape (J,): noise of rounding adds up through coupled drives."""
+    """Return the resolution of the positions [rad or m], shape (J,); rounding noise adds up through coupled drives."""
     joints = log_map.joints
     at_joint, at_motor = np.zeros(len(joints)), np.zeros(len(joints))
     for k, ((name, joint), channel) in enumerate(log_map.channels.items()):
@@ -533,7 +556,7 @@ def _position_step(part: _Even, log_map: JointMap, turns: Array) -> Array:
 
 
 def _step_of(values: Array) -> float:
-    """Step by which a reading repeats, 0 where none shows."""
+    """Return the rounding step of a reading, 0 if none is found."""
     starts = np.linspace(0, max(len(values) - _STEP_ROWS, 0), _STEP_BLOCKS).astype(int)
     found = [rounding_step(values[first : first + _STEP_ROWS]) for first in dict.fromkeys(starts.tolist())]
     told = [step for step in found if step > 0]

@@ -1,8 +1,11 @@
-"""Tables of arrays, NPZ archives and MATLAB files: headers checked before anything is allocated, then read in step.
+"""Tables of arrays: NPZ archives and MATLAB files.
 
-Never a pickle, never an object. A MATLAB file of level 5 (-v6, -v7) is a header of 128 bytes and elements, each a tag
-(type, number of bytes) and its data; a matrix is an element of elements: flags, sizes, name, numbers ("MAT-File
-Format", The MathWorks, 2024).
+All headers are checked before memory is allocated; then the arrays are read row by row in step. Pickles and objects
+are never loaded.
+
+A MATLAB file of level 5 (-v6, -v7) is a header of 128 bytes followed by elements. Each element is a tag (type, number
+of bytes) and its data. A matrix is an element that contains elements: flags, sizes, name, numbers ("MAT-File Format",
+The MathWorks, 2024).
 """
 
 import io
@@ -29,14 +32,14 @@ from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
 from mocobot_logs.table.text import from_numbers
 
 MAX_WHOLE_BYTES = 1 << 30
-"""Arrays in Fortran order do not come row by row; up to this size they are loaded whole."""
+"""Largest array in Fortran order [bytes]; it is loaded whole, since its rows are not contiguous."""
 METADATA_NAME = "mocobot"
-"""Array of one text: the JSON metadata of a recording (docs/recording.md)."""
+"""Name of a text array with the JSON metadata of a recording (docs/recording.md)."""
 MAX_HEADER_BYTES = 10_000
 MAX_METADATA_BYTES = 1 << 20
 
 Reader = Callable[[int], NDArray]
-"""Reads the next so many rows."""
+"""Function that reads the next rows, given their number."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,9 @@ class Stored:
     """Header of one array in a file.
 
     Attributes:
-        at: where it is: an entry of an archive, or its first byte in the file.
-        dtype, shape, fortran: as numpy has them.
-        start: where its numbers begin there, unpacked [B].
+        at: location: an entry of an archive, or the first byte in the file.
+        dtype, shape, fortran: as in numpy.
+        start: offset of the numbers from there, unpacked [bytes].
     """
 
     at: Any
@@ -57,7 +60,7 @@ class Stored:
 
     @property
     def size(self) -> int:
-        """Bytes of its data."""
+        """Number of bytes of its data."""
         return self.dtype.itemsize * prod(self.shape)
 
     @property
@@ -67,11 +70,11 @@ class Stored:
 
     @property
     def columnwise(self) -> bool:
-        """Whether its numbers do not come row by row."""
+        """Whether its rows are not contiguous."""
         return self.fortran and len(self.shape) > 1
 
     def reader(self, file: IO[bytes]) -> Reader:
-        """What reads rows from a file that is at what is stored, unpacked."""
+        """Return a function that reads rows; ``file`` is unpacked and positioned at ``at``."""
         _read_exactly(file, self.start)
         if self.columnwise:
             whole = np.frombuffer(_read_exactly(file, self.size), self.dtype).reshape(self.shape, order="F")
@@ -90,12 +93,12 @@ class Stored:
 
 
 class ArrayTable(Table):
-    """A table whose columns are arrays: of each, the first axis counts rows.
+    """A table whose columns are arrays; the first axis of each counts rows.
 
     Attributes:
-        noun: what the format calls an array.
-        kind: the format, for messages.
-        arrays: by name.
+        noun: the format's word for an array.
+        kind: name of the format in messages.
+        arrays: headers by name.
         stored_bytes: size of the file.
     """
 
@@ -105,10 +108,10 @@ class ArrayTable(Table):
     stored_bytes: int
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Rows in step, see ``Table.blocks``.
+        """Yield rows of all columns in step, see ``Table.blocks``.
 
         Raises:
-            InputError: the file is damaged, or an array does not hold numbers or has another number of rows.
+            InputError: the file is damaged, or an array holds no numbers or has another number of rows.
         """
         names = list(dict.fromkeys([*wanted.clocks, *wanted.columns]))
         rows = self._rows(names) if names else 0
@@ -129,7 +132,7 @@ class ArrayTable(Table):
 
     @abstractmethod
     def readers(self, names: Sequence[str], stack: ExitStack) -> dict[str, Reader]:
-        """What reads each array, with files that a stack closes."""
+        """Return a function that reads each array; ``stack`` closes the files."""
 
     def _take(self, arrays: dict[str, Stored]) -> None:
         self.arrays = arrays
@@ -171,7 +174,7 @@ class NpzTable(ArrayTable):
         """Read the directory of the archive and the header of every array.
 
         Raises:
-            InputError: the archive is damaged, or a header claims what is not there.
+            InputError: the archive is damaged, or a header disagrees with the size of its entry.
         """
         self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
         with self._opened() as archive:
@@ -219,7 +222,7 @@ class NpzTable(ArrayTable):
 
 
 def _npy_header(member: zipfile.ZipInfo, file: IO[bytes], where: str) -> Stored:
-    """Header of one array, checked against the size of its entry."""
+    """Read the header of one array and check it against the size of its entry."""
     start = _read_exactly(file, 8)
     if start[:6] != b"\x93NUMPY" or start[6] not in (1, 2):
         raise InputError(f"{where} is not in numpy's format 1.0 or 2.0")
@@ -243,18 +246,18 @@ def _npy_header(member: zipfile.ZipInfo, file: IO[bytes], where: str) -> Stored:
 
 
 _MAT_HEADER, _TAG = 128, 8  # bytes
-_MATRIX, _COMPRESSED = 14, 15  # types of elements at a file's top level
+_MATRIX, _COMPRESSED = 14, 15  # types of elements at the top level of a file
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-"""Types of elements that hold numbers, as numpy names them."""
+"""Types of elements with numbers, and their numpy names."""
 _NUMERIC_CLASSES = range(6, 16)
-"""Classes of matrices of numbers, from double to uint64; the others are cells, structs, objects, text, sparse ones."""
+"""Classes of numeric matrices, double to uint64. The others are cells, structs, objects, text and sparse matrices."""
 _COMPLEX = 0x0800
 _MOST_NAME_BYTES, _MOST_DIMENSIONS = 1 << 10, 32
 _PIECE_BYTES = 1 << 16
 
 
 class _Inflated(io.RawIOBase):
-    """What zlib packed, as a file that is read from its beginning."""
+    """A zlib stream as a file that is read from its beginning."""
 
     def __init__(self, file: IO[bytes], size: int) -> None:
         super().__init__()
@@ -279,7 +282,7 @@ class _Inflated(io.RawIOBase):
 
 
 class MatTable(ArrayTable):
-    """A MATLAB file as a ``Table``: a vector is a column; of a matrix, a row is a sample."""
+    """A MATLAB file as a ``Table``: a vector is a column; a row of a matrix is a sample."""
 
     noun, kind = "variable", "MATLAB file"
 
@@ -337,7 +340,7 @@ class MatTable(ArrayTable):
         return arrays
 
     def _content(self, file: IO[bytes], at: int) -> IO[bytes]:
-        """A file that is at the content of the matrix whose element begins at a byte."""
+        """Return a file positioned at the content of the matrix whose element begins at byte ``at``."""
         file.seek(at)
         kind, count = struct.unpack(f"{self._order}II", _read_exactly(file, _TAG))
         if kind == _MATRIX:
@@ -349,7 +352,7 @@ class MatTable(ArrayTable):
         return inside
 
     def _variable(self, at: int, content: IO[bytes]) -> tuple[str, Stored] | None:
-        """Name and place of a matrix; None if it is not one of real numbers."""
+        """Return name and header of a matrix, or None if it holds no real numbers."""
         flags, begun = self._element(content, _TAG)
         (flag,) = struct.unpack(f"{self._order}I4x", flags)
         if flag & 0xFF not in _NUMERIC_CLASSES or flag & _COMPLEX:
@@ -360,7 +363,7 @@ class MatTable(ArrayTable):
         text, length = self._element(content, _MOST_NAME_BYTES)
         begun += length
         name = text.decode("utf-8")
-        if not name:  # what MATLAB keeps for itself
+        if not name:  # reserved by MATLAB
             return None
         kind, count, small = self._tag(content)
         if len(shape) < 2 or min(shape) < 0 or kind not in _NUMBERS:
@@ -377,7 +380,8 @@ class MatTable(ArrayTable):
         return name, found
 
     def _tag(self, content: IO[bytes]) -> tuple[int, int, bool]:
-        """Type and bytes of the next element, and whether they share four bytes; then the data are at once behind."""
+        """Read the tag of the next element: type, number of bytes, and whether the data follow inside the tag's eight
+        bytes."""
         (first,) = struct.unpack(f"{self._order}I", _read_exactly(content, 4))
         if first >> 16:
             return first & 0xFFFF, first >> 16, True
@@ -385,7 +389,7 @@ class MatTable(ArrayTable):
         return first, count, False
 
     def _element(self, content: IO[bytes], most: int) -> tuple[bytes, int]:
-        """Data of the next element, and the bytes that it takes with its tag."""
+        """Return the data of the next element, and its size with tag and padding [bytes]."""
         _, count, small = self._tag(content)
         if count > (4 if small else most):
             raise InputError(f"{self.name}: is damaged: a header has an element of {count} bytes")

@@ -1,10 +1,10 @@
-"""Parquet tables, mocobot's own recordings among them, and LeRobot datasets of version 3.
+"""Parquet tables, including mocobot's recordings, and LeRobot datasets of version 3.
 
-Recordings are read as they are, so that broken ones can be looked at. A LeRobot dataset is a folder with
-``meta/info.json`` and Parquet files under ``data``; one episode of it is a table. Features are columns of lists whose
-numbers ``meta/info.json`` names. Several episodes share a file, and time is ``timestamp``, 32-bit seconds from the
-episode's start, by definition ``frame_index / fps`` (``lerobot/datasets/dataset_writer.py`` lays that down).
-Every refusal is an ``InputError`` that names the file and the column.
+Recordings are read without checks, so that broken ones can be inspected. A LeRobot dataset is a folder with
+``meta/info.json`` and Parquet files under ``data``; one episode is a table. Features are columns of lists whose
+elements ``meta/info.json`` names. Several episodes may share a file. Time is ``timestamp``, 32-bit seconds from the
+episode's start, defined as ``frame_index / fps`` (``lerobot/datasets/dataset_writer.py``). Every error is an
+``InputError`` that names the file and the column.
 """
 
 import json
@@ -38,11 +38,11 @@ Clock = tuple[Stamps, NDArray[np.bool_]]
 class ParquetTable(Table):
     """A Parquet file as a ``Table``.
 
-    Columns may hold numbers or lists of always as many numbers; time may also be a timestamp, whose unit is its own.
+    Columns hold numbers or lists of fixed length. Time may also be a timestamp, which has its own unit.
     """
 
     def __init__(self, path: Path, name: str) -> None:
-        """Look at the file's footer."""
+        """Read the file's footer."""
         self._path = path
         with opened(path, name) as file:
             rows, schema = file.metadata.num_rows, file.schema_arrow
@@ -50,22 +50,22 @@ class ParquetTable(Table):
         self._set_up(name, schema, rows, rows, path.stat().st_size)
 
     def _set_up(self, name: str, schema: pa.Schema, size: int, rows: int, stored_bytes: int) -> None:
-        """Take the columns; to read ``size`` rows, so many ``rows`` have to be gone through."""
+        """Set up the columns; ``size`` rows are wanted among ``rows`` rows that must be read."""
         self.name, self.size = name, size
         self._schema, self._rows, self._stored_bytes = schema, rows, stored_bytes
         text = (schema.metadata or {}).get(METADATA_KEY)
         where = f"{name}: metadata"
         told = None if text is None else RecordingMetadata.from_json(text, where=where)
         self.metadata: RecordingMetadata | None = told
-        # Rows without any value are part of a broken recording, which is to be seen as it is.
+        # Rows without any value belong to a broken recording, which is inspected as it is.
         self.sparse = self.metadata is None
         self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Rows in the order of the file, see ``Table.blocks``.
+        """Yield rows in the order of the file, see ``Table.blocks``.
 
         Raises:
-            InputError: the file is damaged, or holds what is not a number.
+            InputError: the file is damaged, or a column holds no numbers.
         """
         names = list(dict.fromkeys([*wanted.columns, *wanted.clocks]))
         for name in names:
@@ -81,7 +81,7 @@ class ParquetTable(Table):
         pa.default_memory_pool().release_unused()
 
     def _check(self, names: list[str], claimed: int) -> None:
-        """Refuse columns that unpack to too much by another claim, or by what the files say."""
+        """Refuse columns that unpack to too many bytes, by ``claimed`` or by the files' own metadata."""
         with told_in_one_sentence(self.name, KIND):
             told = 0
             for path, schema in self._files():
@@ -114,7 +114,7 @@ class ParquetTable(Table):
             raise InputError(f"{self.name}: column {name!r} holds {kind}; it must hold numbers")
 
     def _row_shapes(self) -> dict[str, tuple[int, ...]]:
-        """Lists whose length the schema does not fix are measured in the first row."""
+        """Return the shape of one row of each column; lists of undeclared length are measured in the first row."""
         shapes = {field.name: _fixed_shape(field.type) for field in self._schema}
         open_names = [
             n for n, s in shapes.items() if s is None and _is_number(_innermost(self._schema.field(n).type))
@@ -128,8 +128,8 @@ class ParquetTable(Table):
 
 @contextmanager
 def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
-    """A Parquet file, whose every failure inside the block becomes one sentence."""
-    # Not pre-buffered: that would hold a whole row group, which may be a whole log.
+    """Open a Parquet file; every failure inside the block becomes one sentence."""
+    # Pre-buffering would hold a whole row group, which may be the whole log.
     with (
         told_in_one_sentence(name, KIND),
         pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False, buffer_size=1 << 20) as file,
@@ -138,7 +138,7 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
 
 
 def check_names(schema: pa.Schema, name: str) -> None:
-    """Every column has a name of its own; they become text here, inside a block that tells damage in one sentence."""
+    """Refuse repeated column names; call it inside a block that reports damage, since names are decoded here."""
     names = schema.names
     repeated = next((n for n in names if names.count(n) > 1), None)
     if repeated is not None:
@@ -146,7 +146,7 @@ def check_names(schema: pa.Schema, name: str) -> None:
 
 
 def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:
-    """A column as an array (q, *shape) of whole numbers or floats, NaN where a row is empty."""
+    """Return a column as an array (q, *shape) of integers or floats, NaN where a row is empty."""
     rows = len(column)
     given = column.is_valid().to_numpy(zero_copy_only=False)
     flat = column if given.all() else column.drop_null()
@@ -184,7 +184,7 @@ def _is_list(kind: pa.DataType) -> bool:
 
 
 def _fixed_shape(kind: pa.DataType) -> tuple[int, ...] | None:
-    """Shape of a row, None where lists may have any length."""
+    """Return the shape of a row, None if lists may have any length."""
     shape: list[int] = []
     while _is_list(kind):
         if not pa.types.is_fixed_size_list(kind):
@@ -198,27 +198,27 @@ MAX_INFO_BYTES = 16 << 20
 EPISODE, FRAME, TIMESTAMP = "episode_index", "frame_index", "timestamp"
 NAME_COLUMNS = (EPISODE, "data/chunk_index", "data/file_index")
 CLOSE_FRAMES = 0.01
-"""Share of a frame by which a timestamp may differ from ``frame_index / fps`` and still be its rounded value."""
+"""Largest difference, in frames, at which a timestamp counts as the rounded value of ``frame_index / fps``."""
 _DATA_PATH = re.compile(r"(?!/)([^{}]|\{(chunk_index|file_index)(:0[36]d)?\})+")
 _SCAN = ds.ParquetFragmentScanOptions(
     use_buffered_stream=True, pre_buffer=False, page_checksum_verification=True
 )
 
 Files = Mapping[Path, set[int] | None]
-"""Data files, each with its episodes where the dataset says."""
+"""Data files with their episodes, or None where the dataset does not list them."""
 
 
 class LeRobotTable(ParquetTable):
     """One episode as a ``Table``.
 
-    Numbers in a feature go by index, ``observation.state[3]``, or by name, ``observation.state.NAME``, or by the name
-    alone where no other feature has it.
+    A number in a feature is named by index, ``observation.state[3]``, or by name, ``observation.state.NAME``. The
+    name alone suffices if no other feature has it.
     """
 
     time_column = TIMESTAMP
 
     def __init__(self, path: Path, name: str, episode: int | None) -> None:
-        """Find the episode, which may be None if there is only one, in a dataset's folder or one of its files."""
+        """Find an episode in a dataset's folder or one of its files; ``episode`` may be None if there is only one."""
         root = dataset_root(path)
         if root is None:
             raise InputError(f"{name}: is not a LeRobot dataset, it has no {DATASET_INFO}")
@@ -237,10 +237,10 @@ class LeRobotTable(ParquetTable):
         self.aliases: Mapping[str, tuple[str, tuple[int, ...]]] = _aliases(info["features"], self.shapes)
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Rows of the episode, see ``Table.blocks``; rounded timestamps are replaced by ``frame_index / fps``.
+        """Yield rows of the episode, see ``Table.blocks``; rounded timestamps are replaced by ``frame_index / fps``.
 
         Raises:
-            InputError: a file is damaged, or holds what is not a number.
+            InputError: a file is damaged, or a column holds no numbers.
         """
         for block in super().blocks(replace(wanted, columns=(*wanted.columns, FRAME)), advance):
             if TIMESTAMP in wanted.clocks:
@@ -287,7 +287,7 @@ def _read_info(root: Path, name: str) -> dict[str, Any]:
 
 
 def _data_files(root: Path, info: dict[str, Any], name: str) -> Files:
-    """Data files and, where ``meta/episodes`` says so, the episodes in each; all under ``data`` otherwise."""
+    """Return the data files with the episodes in each by ``meta/episodes``; without it, all files under ``data``."""
     files: dict[Path, set[int]] = {}
     listings = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
     template = _template(info.get("data_path"), name) if listings else ""
@@ -308,7 +308,7 @@ def _data_files(root: Path, info: dict[str, Any], name: str) -> Files:
 
 
 def _template(data_path: Any, name: str) -> str:
-    """The dataset's own pattern of file names, unless it could lead anywhere else."""
+    """Return the dataset's pattern of file names; refuse one that could lead outside the dataset."""
     if not isinstance(data_path, str) or not _DATA_PATH.fullmatch(data_path) or ".." in Path(data_path).parts:
         raise InputError(
             f"{name}: {DATASET_INFO}: data_path is {data_path!r:.80}; it must be like "
@@ -343,7 +343,7 @@ def _episodes_in(paths: list[Path], name: str) -> set[int]:
 
 
 def _dataset(paths: list[Path], name: str) -> ds.Dataset:
-    """Files of the same columns as one."""
+    """Open files with the same columns as one dataset."""
     with told_in_one_sentence(name, KIND):
         data = ds.dataset(
             [str(path) for path in paths], format=ds.ParquetFileFormat(default_fragment_scan_options=_SCAN)
@@ -357,12 +357,12 @@ def _dataset(paths: list[Path], name: str) -> ds.Dataset:
 
 
 def _extent(data: ds.Dataset) -> tuple[int, int]:
-    """Number of rows and bytes of all files."""
+    """Return the total number of rows and bytes of all files."""
     return data.count_rows(), sum(Path(file).stat().st_size for file in data.files)
 
 
 def _read(data: ds.Dataset, name: str, **what: Any) -> Iterator[pa.RecordBatch]:
-    """Batches in the order of the files, as few as possible in memory; row groups of other episodes are left out."""
+    """Yield batches in the order of the files with little memory; row groups of other episodes are skipped."""
     with told_in_one_sentence(name, KIND):
         yield from data.to_batches(**what, use_threads=False, batch_readahead=0, fragment_readahead=0)
 

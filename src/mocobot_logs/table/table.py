@@ -1,4 +1,4 @@
-"""Tables as logs: columns of any table, by a map, become the robots' channels."""
+"""Tables as logs: a map assigns the columns of any table to the robots' channels."""
 
 import difflib
 import re
@@ -16,9 +16,9 @@ from mocobot_logs.log import REF, Level, Samples, Stamps
 from mocobot_logs.maps import ChannelMap, LogMap
 
 SHOWN_COLUMNS = 12
-"""So many columns are listed in a message."""
+"""Largest number of columns that a message lists."""
 CELLS = 1 << 20
-"""About so many numbers are in memory at a time."""
+"""Approximate number of cells in memory at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +26,8 @@ class Block:
     """Consecutive rows of a table.
 
     Attributes:
-        columns: by name, each of shape (q, ...).
-        clocks: by name, stamps [ns] and whether there is one, each of shape (q,).
+        columns: values by column name, each of shape (q, ...).
+        clocks: by column name, stamps [ns] and whether each is present, shape (q,) each.
     """
 
     columns: Mapping[str, NDArray]
@@ -36,12 +36,12 @@ class Block:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be read of a table.
+    """Columns to read from a table.
 
     Attributes:
-        columns: names to read as numbers.
-        clocks: names to read as time.
-        unit_ns: nanoseconds in one unit of time, None for dates.
+        columns: names of columns read as numbers.
+        clocks: names of columns read as time.
+        unit_ns: nanoseconds per unit of time, None for dates.
     """
 
     columns: tuple[str, ...]
@@ -53,13 +53,13 @@ class Table(ABC):
     """A table that can be read in blocks of rows, any number of times.
 
     Attributes:
-        name: the path as the user gave it.
-        size: all that there is to read, in units of ``advance``.
-        shapes: every column that may be mapped, and the shape of one row of it: () for a number.
-        metadata: what the file says about itself where mocobot wrote it, else None.
+        name: path as the user gave it.
+        size: total amount to read, in units of ``advance``.
+        shapes: shape of one row of every column that may be mapped: () for a number.
+        metadata: metadata of a file that mocobot wrote, else None.
         aliases: other names of single numbers in a row: the column and the index there.
-        time_column: where time is unless a map says so.
-        sparse: whether a row without any value of a robot is no sample of it.
+        time_column: default name of the time column.
+        sparse: whether rows in which a robot has no value are not samples of that robot.
     """
 
     name: str
@@ -72,20 +72,20 @@ class Table(ABC):
 
     @abstractmethod
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Rows in the order of the file.
+        """Yield rows in the order of the file.
 
         Args:
-            wanted: which columns.
-            advance: takes the progress made since the last call.
+            wanted: columns to read.
+            advance: called with the progress since the last call.
 
         Raises:
-            InputError: the file is damaged or holds what is not a number.
+            InputError: the file is damaged, or a column holds no numbers.
         """
 
 
 @dataclass(frozen=True)
 class Place:
-    """One number in every row of a table: a column, and the index in it where it is an array."""
+    """One number in every row of a table: a column, and the index in it if it is an array."""
 
     column: str
     index: tuple[int, ...] = ()
@@ -95,7 +95,7 @@ class TableSource:
     """A table as a ``LogSource``."""
 
     def __init__(self, table: Table, log_map: LogMap) -> None:
-        """Find every channel of every robot."""
+        """Locate every channel of every robot."""
         log_map.require("column", "tables")
         self._table, self._map = table, log_map
         self.name, self.size, self.metadata = table.name, table.size, table.metadata
@@ -108,10 +108,10 @@ class TableSource:
         self._check_shared()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Samples of one robot after the other, see ``LogSource.chunks``.
+        """Yield samples robot by robot, see ``LogSource.chunks``.
 
         Raises:
-            InputError: the table is damaged, or holds what is not a number.
+            InputError: the table is damaged, or a column holds no numbers.
         """
         maps = [self._map.channels(robot) for robot in range(1, self.robots + 1)]
         columns = tuple(dict.fromkeys(place.column for places in self._places for place in places))
@@ -121,7 +121,7 @@ class TableSource:
             for robot, (places, channels) in enumerate(zip(self._places, maps, strict=True)):
                 stamps, given = block.clocks[self._clocks[robot]]
                 values = np.empty((len(stamps), len(self.channels)))
-                # What is beyond floats, and signalling NaN of damaged files, are for the reader of the log to judge.
+                # Values beyond floats and signalling NaN of damaged files are checked later.
                 with np.errstate(invalid="ignore", over="ignore"):
                     for k, (name, place) in enumerate(zip(self.channels, places, strict=True)):
                         raw = np.asarray(block.columns[place.column][(slice(None), *place.index)], float)
@@ -194,7 +194,7 @@ class TableSource:
         )
 
     def _check_shared(self) -> None:
-        """One number of the table is one channel: all else is a slip in the map."""
+        """Refuse a map that reads two channels from one number of the table."""
         seen: dict[Place, str] = {}
         for robot, places in enumerate(self._places, 1):
             for name, place in zip(self.channels, places, strict=True):
@@ -208,5 +208,5 @@ class TableSource:
 
 
 def rows_at_a_time(cells: int) -> int:
-    """Rows in a block of a table that has so many numbers in a row."""
+    """Return the number of rows per block for ``cells`` numbers in a row."""
     return max(CELLS // max(cells, 1), 64)

@@ -1,7 +1,7 @@
-"""Text tables: a header line, then one row per sample, cells of numbers; time may be dates of ISO 8601.
+"""Text tables: a header line, then one row of numbers per sample; time may be ISO 8601 dates.
 
-Time becomes whole nanoseconds: exactly from whole numbers and dates, rounded from floats and decimal text. Every
-refusal is an ``InputError`` that names the file, the column and the row or line.
+Time becomes integer nanoseconds: exact for integers and dates, rounded for floats and decimal text. Every error is an
+``InputError`` that names the file, the column and the row or line.
 """
 
 import contextlib
@@ -27,21 +27,24 @@ from mocobot_logs.table.table import Block, Table, Wanted
 LARGEST_NS = (1 << 63) - 1
 _DIGITS = {10**exponent: exponent for exponent in range(10)}
 _BELOW_NS = 6
-"""Decimals below the nanosecond that are looked at, to round: programs write 32439.999999999996 ms for 32.44 s."""
+"""Decimals below the nanosecond that take part in rounding: programs write 32439.999999999996 ms for 32.44 s."""
 
 Given = NDArray[np.bool_]
 
 
 def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
-    """Stamps from whole numbers or floats, NaN where there is none.
+    """Convert integers or floats to stamps; NaN means no stamp.
 
     Args:
         values: times in any unit, shape (q,).
-        unit_ns: nanoseconds in one unit; None where the map's unit is "iso".
-        where, row: file and column, and row of the first one, for messages.
+        unit_ns: nanoseconds per unit; None if the map's unit is "iso".
+        where, row: file and column, and row of the first value, for error messages.
 
     Returns:
-        Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
+        Stamps [ns], 0 where missing, and which are present; each of shape (q,).
+
+    Raises:
+        InputError: a time is beyond 292 years, or the map's unit is "iso".
     """
     unit_ns = _unit(unit_ns, where)
     if values.dtype.kind in "iu":
@@ -52,19 +55,22 @@ def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0)
     given = ~np.isnan(values)
     with np.errstate(over="ignore"):
         scaled = np.where(given, values, 0.0).astype(np.float64) * unit_ns
-    # One below 2**63: the next float down from it is whole and fits.
+    # This is one below 2**63; the largest smaller float is an integer and fits.
     _refuse(values, np.abs(scaled) >= float(LARGEST_NS), where, row)
     return np.rint(scaled).astype(np.int64), given
 
 
 def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
-    """As ``from_numbers``, of decimal text, null where there is none: exact, where floats resolve 0.24 us only."""
+    """Convert decimal text to stamps as ``from_numbers`` does; null means no stamp.
+
+    Stamps are exact to the nanosecond, where floats would resolve only 0.24 us.
+    """
     digits = _DIGITS[_unit(unit_ns, where)]
     exact = pa.decimal128(38, digits)
     try:
         cut = pc.cast(values, exact, safe=False)
     except pa.ArrowInvalid:
-        # The first count of texts that do not cast ends with the one that is no number.
+        # The shortest prefix that does not cast ends with the faulty text.
         bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
         text = values[bad].as_py()
         or_date = "" if row + bad else " or a date of ISO 8601, such as 2026-03-01T12:00:00.5Z"
@@ -80,8 +86,8 @@ def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -
 
 
 def _in_ns(decimals: pa.Array, values: pa.Array, where: str, row: int) -> pa.Array:
-    """Decimals with nanoseconds as their last digits as these; refused beyond 292 years."""
-    ns = decimals.view(pa.decimal128(38, 0))  # the digits without the point are the nanoseconds
+    """Return decimals whose last digit is a nanosecond as integers; refuse times beyond 292 years."""
+    ns = decimals.view(pa.decimal128(38, 0))  # without the decimal point, the digits count nanoseconds
     size = pc.call_function("abs", [ns])
     beyond = pc.fill_null(pc.call_function("greater", [size, pa.scalar(LARGEST_NS)]), False)
     _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
@@ -122,24 +128,26 @@ _MUST = f"a time must be a date like {EXAMPLE}"
 
 
 def is_date(text: str) -> bool:
-    """Whether a cell holds date and time."""
+    """Return whether a cell holds a date and a time."""
     return _ISO.fullmatch(text.strip()) is not None
 
 
 class TextClock:
-    """A column of time as text, block by block: numbers or dates, but not both.
+    """Reads a text column of time in blocks: either numbers or dates.
 
-    Dates with and without a zone do not mix either: nobody knows what separates them. Dates without one count as UTC;
-    digits beyond nanoseconds are cut off.
+    All dates of a column must have a zone, or none may, since their offset would be unknown. Dates without a zone
+    count as UTC; digits beyond nanoseconds are cut off.
     """
 
     def __init__(self, unit_ns: int | None, where: str) -> None:
-        """Take the unit of numbers [ns], None for dates only, and what messages call the column."""
+        """``unit_ns`` is the unit of numbers [ns], None if only dates are allowed; ``where`` names the column in
+        messages."""
         self._unit_ns, self._where = unit_ns, where
         self._form: str | None = None
 
     def read(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
-        """As ``from_numbers``, of text, null where there is none; ``row`` is that of the first one."""
+        """Convert text to stamps as ``from_numbers`` does; null means no stamp. ``row`` is the row of the first
+        value."""
         values = pc.call_function("utf8_trim_whitespace", [values])
         if self._form is None and values.null_count < len(values):
             first = values.drop_null()[0].as_py()
@@ -171,7 +179,7 @@ class TextClock:
         return np.where(given, seconds * _S + below, 0), given
 
     def _seconds(self, values: pa.Array, number: Stamps, row: int) -> Stamps:
-        """Seconds of UTC from numbers of 14 digits each: year, month, day, hour, minute, second."""
+        """Return seconds of UTC from 14-digit numbers: year, month, day, hour, minute, second."""
         months, days, hours, minutes, seconds = (number // 10**k % 100 for k in (8, 6, 4, 2, 0))
         first = ((number // 10**10 - 1970) * 12 + months - 1).astype("datetime64[M]").astype("datetime64[D]")
         date = first + (days - 1)
@@ -187,7 +195,7 @@ class TextClock:
 
 
 def _form(text: str) -> str:
-    """Whether a time is a number, or a date with or without a zone."""
+    """Return whether a time is a number, or a date with or without a zone."""
     found = _ISO.fullmatch(text.strip())
     return "number" if found is None else "zone" if found["zone"] else "local"
 
@@ -201,7 +209,7 @@ def _is_float(text: str) -> bool:
 
 
 def _part(parts: pa.Array, name: str, default: str) -> pa.Array:
-    """One group of the pattern, the default where there is none."""
+    """Return one group of the pattern, the default where it is missing."""
     return pc.fill_null(pc.call_function("struct_field", [parts], pc.StructFieldOptions([name])), default)
 
 
@@ -211,14 +219,14 @@ def _digits(text: pa.Array) -> pa.Array:
 
 
 def _padded(digits: pa.Array, width: int) -> Stamps:
-    """Digits as numbers, zeros added behind or digits left out there so that each has as many."""
+    """Return digits as numbers, padded with trailing zeros or cut to ``width`` digits."""
     padded = pc.call_function("utf8_rpad", [digits], pc.PadOptions(width, "0"))
     cut = pc.call_function("utf8_slice_codeunits", [padded], pc.SliceOptions(0, width))
     return cut.cast(pa.int64()).to_numpy(zero_copy_only=False)
 
 
 def _zone_s(zone: pa.Array) -> Stamps:
-    """Seconds that clocks of each zone are ahead of UTC."""
+    """Return the offset of each zone from UTC [s]."""
     number = _padded(_digits(zone), 4)
     behind = pc.call_function("starts_with", [zone], pc.MatchSubstringOptions("-"))
     sign = np.where(behind.to_numpy(zero_copy_only=False), -1, 1)
@@ -229,9 +237,9 @@ _COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
 
 
 def line_blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
-    """Blocks of whole lines, about ``size`` bytes each, without those whose first character but blanks is ``#``.
+    """Yield blocks of whole lines, about ``size`` bytes each, without lines that begin with ``#`` after blanks.
 
-    The file is at the beginning of a line; a line of more than twice the size is cut where it is so long.
+    The file must be at the beginning of a line. A line longer than twice the size is split.
     """
     rest = b""
     while block := file.read(size):
@@ -254,22 +262,22 @@ BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 1 << 20
 DELIMITERS = (",", ";", "\t", "|", " ")
 EMPTY = ["", " ", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
-"""Cells that stand for no value."""
+"""Cells that count as missing values."""
 _NUMBER = re.compile(
     r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE
 )
-"""As pyarrow reads them."""
+"""Numbers that pyarrow accepts."""
 
 
 class BrokenRowsError(InputError):
-    """Rows that do not fit the header: nothing can be read, whatever the column."""
+    """Rows do not fit the header, so no column can be read."""
 
 
 class CsvTable(Table):
     """A CSV file as a ``Table``: UTF-8, a header line, any of ``DELIMITERS``.
 
-    Blank lines, and lines that begin with ``#``, are skipped. The header is the first line that is left, or, where
-    that is a row of samples, the last one with ``#`` before it, as numpy writes it.
+    Blank lines and lines that begin with ``#`` are skipped. The header is the first remaining line. If that is a row of
+    samples, the header is the last ``#`` line before it, as numpy writes it.
     """
 
     def __init__(self, path: Path, options: CsvMap, name: str) -> None:
@@ -289,7 +297,7 @@ class CsvTable(Table):
         self.shapes: Mapping[str, tuple[int, ...]] = dict.fromkeys(self._names, ())
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Rows in the order of the file, see ``Table.blocks``.
+        """Yield rows in the order of the file, see ``Table.blocks``.
 
         Raises:
             InputError: a row has too few or too many cells, or a cell is not a number.
@@ -308,7 +316,7 @@ class CsvTable(Table):
         for batch, end in self._batches(types):
             yield Block(
                 {
-                    # A cell without a value is NaN.
+                    # A missing value becomes NaN.
                     name: pc.fill_null(batch.column(f"{index[name]}"), float("nan")).to_numpy(
                         zero_copy_only=False
                     )
@@ -321,7 +329,7 @@ class CsvTable(Table):
             before = end
 
     def _batches(self, types: Mapping[str, pa.DataType]) -> Iterator[tuple[pa.RecordBatch, int]]:
-        """Rows of some columns, and how far in the file they end."""
+        """Yield rows of some columns, and the file position after them."""
         rows = 0
         try:
             with self._path.open("rb") as source:
@@ -336,10 +344,10 @@ class CsvTable(Table):
             raise InputError(f"{self.name}: {_plain(error)}") from error
 
     def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
-        """Some columns of whole lines.
+        """Parse some columns of whole lines.
 
-        Every block is a file to pyarrow. Its streaming reader reads ahead in a thread: left at a fault, or at the rows
-        that are enough, it hangs or aborts the process when this ends (pyarrow 26).
+        Each block is parsed as a separate file. The streaming reader of pyarrow 26 reads ahead in a thread; it hangs
+        or aborts the process if the caller stops early.
         """
         table = pcsv.read_csv(
             pa.BufferReader(lines),
@@ -362,7 +370,7 @@ class CsvTable(Table):
         return pa.RecordBatch.from_arrays(columns, names=table.column_names)
 
     def _refuse_first_fault(self, numbers: list[int], good: int) -> None:
-        """Refuse the first row that does not fit the header or lacks a number, after so many good rows."""
+        """Refuse the first row after ``good`` rows that does not fit the header or holds no number."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
             for line, content in enumerate(iter(lambda: file.readline(BLOCK_BYTES + 1), b""), 1):
                 if len(content) > BLOCK_BYTES:
@@ -395,14 +403,14 @@ class CsvTable(Table):
         return self._names.index(name)
 
     def _point(self, text: pa.Array) -> pa.Array:
-        """Decimal points in the place of commas."""
+        """Replace the decimal mark by a point."""
         if self._decimal == ".":
             return text
         return pc.call_function("replace_substring", [text], pc.ReplaceSubstringOptions(self._decimal, "."))
 
 
 def _first_lines(path: Path, name: str, decimal: str) -> tuple[str, str, int, int]:
-    """The header line, the first row (empty if there is none), and the lines and bytes up to and with the header."""
+    """Return the header line, the first row (or an empty text), and the lines and bytes through the header."""
     header, lines, size = None, 0, 0
     comment, at = None, 0
     try:
@@ -438,7 +446,7 @@ def _first_lines(path: Path, name: str, decimal: str) -> tuple[str, str, int, in
 
 
 def _is_row(text: str, decimal: str) -> bool:
-    """Whether a line holds samples, and no names."""
+    """Return whether a line holds samples rather than names."""
     for delimiter in DELIMITERS:
         cells = _cut(text, delimiter) if delimiter != decimal else []
         if cells and all(_is_cell(cell, decimal) for cell in cells):
@@ -447,9 +455,9 @@ def _is_row(text: str, decimal: str) -> bool:
 
 
 def _find_delimiter(header: str, row: str, decimal: str) -> str:
-    """The delimiter that cuts most numbers out of the first row.
+    """Return the delimiter that splits the first row into the most numbers.
 
-    Where none does, because a row is no row of numbers, the one that cuts the header at all, for what is said then.
+    If no delimiter does, return one that splits the header, so that later errors make sense.
     """
     best, most = "", 1
     for delimiter in DELIMITERS:
