@@ -148,7 +148,7 @@ def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjDat
         close(model, data, np.concatenate([index.knee_dof.ravel(), index.slide_dof.ravel()]), welds=False)
     start = data.qpos.copy()
     _close_arms(model, data, index, arms, start)
-    # Two or three times, because where things yield the loads shift a little.
+    # Iterate, because compliant parts shift the loads.
     for _ in range(3):
         if not _settle(model, data, index, arms, start):
             break

@@ -86,8 +86,8 @@ def simulate(
     """Run one trial and make a recording with each of several sensor presets.
 
     Presets with the same calibration spread can share a trial, because noise and quantisation of the logged channels
-    do not affect the motion. The deviations of the robots depend on the payload and the seed only, so all trials of a
-    team have the same robots.
+    do not affect the motion. The deviations of the robots depend on the seed only, so all trials of a team have the
+    same robots.
 
     Args:
         request: specification of the trial.
