@@ -100,7 +100,7 @@ NEEDS: Mapping[str, str] = {
 POSITIVE = ("sign", "warming", "play", "lag", "second_order")
 """Functions whose ``number`` must be above 0."""
 WIDE = ("hat", "first_hat", "last_hat", "second_order")
-"""Functions whose ``second``, a width or a damping ratio, must be above 0."""
+"""Functions whose ``second`` (a width or a damping ratio) must be above 0."""
 
 
 def check_law(law: Any, is_target: Names, targets: str, is_signal: Names, signals: str) -> None:

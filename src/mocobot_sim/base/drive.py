@@ -48,7 +48,7 @@ class WheelContacts:
     ) -> None:
         self._data, self._index = data, index
         sin, cos = np.sin(design.roller_angle_rad), np.cos(design.roller_angle_rad)
-        self._axle = np.stack([np.full(4, sin), HAND * cos, np.zeros(4)], axis=1)  # in the chassis
+        self._axle = np.stack([np.full(4, sin), HAND * cos, np.zeros(4)], axis=1)  # in the chassis frame
 
     def measure(self) -> tuple[Array, Array, Array]:
         """Slip [m/s], normal force [N] and magnitude of the friction force [N] of every wheel, shapes (N, 4).

@@ -138,7 +138,7 @@ class TeamController:
     ) -> None:
         units = units_of(as_built, index.robots)
         phi_zero = np.array([unit.phi_zero_rad for unit in units])
-        # (N, 4, leg or gimbal axis)
+        # addresses of motors, springs, actuators and gimbals, shape (N, 4, 3)
         address = np.stack([index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1)
         lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
         filters = np.array([lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
@@ -266,7 +266,7 @@ class Stability:
         return hardly if self.damping_ratio < HARDLY_DAMPED else None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able form."""
+        """Convert to JSON values."""
         return {"stable": self.stable, **asdict(self)}
 
 

@@ -68,8 +68,8 @@ class Law(Effect):
     units. Readings are taken as the sensors see them. A weighted sum of signals is also a signal:
     ``0.6*payload_felt_x + -0.8*payload_felt_y``.
 
-    ``number``, ``second`` and ``phase_rad`` are the parameters of the function, such as the knee of a ramp, the
-    periods per turn of a sine, a time constant, or half the width of a backlash (docs/effects.md).
+    ``number``, ``second`` and ``phase_rad`` are the parameters of the function, such as the knee of a ramp, a time
+    constant, or half the width of a backlash (docs/effects.md).
     """
 
     repeats = True

@@ -121,7 +121,7 @@ class SeaHysteresis(Effect):
     presliding_Nm: float = 0.0
 
     def actors(self, trial_number: int | None) -> Sequence[Slider]:
-        """The slider behind its spring."""
+        """The presliding element, if there is Coulomb friction with presliding."""
         if not (self.friction_Nm and self.presliding_Nm):
             return ()
         yield_rad = self.presliding_Nm / omnid_design().sea_stiffness_Nm_per_rad
@@ -158,7 +158,7 @@ class JointFriction(Effect):
     presliding_rad: float = 0.0
 
     def actors(self, trial_number: int | None) -> Sequence[Slider]:
-        """The slider behind its spring."""
+        """The presliding element, if there is Coulomb friction with presliding."""
         if not (self.coulomb_Nm and self.presliding_rad):
             return ()
         return (Slider(self.where, self.robot, self.joint, self.coulomb_Nm, self.presliding_rad),)

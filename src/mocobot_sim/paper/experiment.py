@@ -203,8 +203,8 @@ def run_paper(
     Args:
         plan: options.
         jobs: number of parallel processes.
-        progress: called several times a second from another thread, with the number of tasks done (fractions included),
-            the total number of tasks, and the name of the current stage.
+        progress: called several times a second from another thread. Arguments: tasks done (fractions included), all
+            tasks, name of the current stage.
         store: keeps the outcome of each finished task; stored outcomes are not computed again.
         remote: whether joblib's backend runs processes on other machines.
 

@@ -41,7 +41,7 @@ class PayloadTruth:
     mass: float  # mass [kg]
     p_1c: Array  # centre of mass in {1} [m], shape (3,)
     R_1c: Array  # principal axes in {1}, as columns, shape (3, 3)
-    principal_moments: Array  # about the axes of {c}, ascending [kg m^2], shape (3,)
+    principal_moments: Array  # principal moments of inertia, ascending [kg m^2], shape (3,)
 
     @property
     def inertia(self) -> Array:
@@ -130,7 +130,7 @@ MOMENTS = ("Ixx", "Iyy", "Izz")
 
 
 ENCODER_FRAMES = "encoder_frames"
-"""Key of the errors of grasps and centre of mass in the frames that the encoders define."""
+"""Key of the errors of grasps and centre of mass in the frames defined by the encoders."""
 SPRING_SCALE = "spring_scale"
 """Key of the relative error due to the common stiffness scale of a team's springs, and of the errors beyond it."""
 

@@ -42,7 +42,7 @@ class RobotEffect:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """State of all joints at one step."""
+    """State of all joints at one time step."""
 
     time_s: float  # time
     period_s: float  # time step

@@ -78,7 +78,7 @@ class RobotReadings:
         return -self._stiffness * float(seen[self._spring[joint - 1]])
 
     def set_tau(self, seen: Array, joint: int, value: float) -> None:
-        """Change it, and leave the angle's reading as it is."""
+        """Set the torque reading [N m] without changing the reading of the driven angle."""
         spring, motor = self._spring[joint - 1], self._motor[joint - 1]
         before = float(seen[spring])
         seen[spring] = -value / self._stiffness

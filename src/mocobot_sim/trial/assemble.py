@@ -129,7 +129,7 @@ def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjDat
         Spring torques at rest [N m], positive if they raise the link, shape (N, 3); also written to ``data.ctrl``.
 
     Raises:
-        InputError: no configuration near home closes the loops (a grasp is out of reach), or no spring torques hold
+        InputError: no configuration near home closes the loops (a grasp is out of reach); or no spring torques hold
             the payload at rest (one or two grasps leave it free to swing).
     """
     mujoco.mj_resetData(model, data)

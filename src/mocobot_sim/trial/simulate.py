@@ -43,9 +43,9 @@ class TrialRequest:
     trial: str  # ``random``, ``periodic``, ``static`` or ``free``
     seed: int = 0  # seed of all random numbers, at least 0
     number: int = 0  # index among the trials of that kind, from 0
-    vias: int = 80  # number of vias of a random trial, and of a free one's fast part
+    vias: int = 80  # number of vias of a random trial, or of the fast part of a free trial
     duration_s: float = 60.0  # length of a periodic trial's motion [s]
-    robots: int | None = None  # number of robots of a free trial; None for as many as the payload has grasps
+    robots: int | None = None  # number of robots of a free trial; None for the payload's number of grasps
 
     @property
     def label(self) -> str:

@@ -152,8 +152,8 @@ def sphere_motion(
 ) -> Trajectory:
     """Periodic motion of all wrists on the sphere whose great circle passes through the grasps (paper, section IV.C.3).
 
-    The payload turns about the centre of the circle through its three grasps, with a different frequency about each
-    axis, so every wrist stays on the sphere. With other than three grasps the payload turns about their centroid.
+    The payload turns about the centre of the circle through its three grasps, so every wrist stays on the sphere. The
+    frequency differs for each axis. With other than three grasps the payload turns about their centroid.
 
     Args:
         wrist_home_b: home wrist positions [m], shape (N, 3).

@@ -102,8 +102,8 @@ def run_trial(
     Raises:
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
             leaves its range.
-        InputError: the team cannot be assembled, the trajectory is for another number of robots or leaves
-            the workspace, or rates and time step are not whole multiples of each other.
+        InputError: the team cannot be assembled; the trajectory is for another number of robots or leaves
+            the workspace; or rates and time step are not whole multiples of each other.
     """
     _check_commands(scene, trajectory)
     gains = gains or ControlGains()
