@@ -75,6 +75,7 @@ class WheelContacts:
         return slip.reshape(shape), load.reshape(shape), np.linalg.norm(grip, axis=1).reshape(shape)
 
 
+# Default of the gain k on the pose error by odometry [1/s]. Chosen.
 POSITION_GAIN_PER_S = 2.0
 
 

@@ -26,6 +26,7 @@ JOINTS = 3
 WHOLE = {"robot": 1, "joint": 1, "trial": 1, "last_trial": 0}
 """Parameters that are whole numbers, each with its smallest allowed value."""
 
+# Solver tolerances: MuJoCo's default, and that for scenes with dry friction, limits or soft rows. Chosen.
 _DEFAULT_TOLERANCE, _WITH_KINKS = 1e-8, 1e-12
 
 

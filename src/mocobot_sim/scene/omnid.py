@@ -23,6 +23,7 @@ from mocobot_sim.scene.models import models_dir
 from mocobot_sim.scene.pymjcf import mjcf
 
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
+# Half width of the drawn hub of a wheel [m]. Chosen: for display only.
 HUB_HALF_WIDTH_M = 0.018
 # Stiffness of friction relative to the normal contact. Chosen: MuJoCo's friction creeps under load, with this ratio by
 # micrometres per second (docs/base.md).

@@ -23,6 +23,7 @@ from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.soft import STIFF, SoftRow, tune
 
 TIMESTEP_S = 0.001
+"""Default integration step [s]. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -223,6 +224,7 @@ def _check_tilts(tilts: Array, limit_rad: float, where: str) -> None:
 SPACING_M = 1.2
 """Distance between neighbouring robots in the row [m]. Chosen: arms cannot touch."""
 MOST_ROBOTS = 100
+"""Largest number of robots without payload. Chosen."""
 
 
 def build_free_team(

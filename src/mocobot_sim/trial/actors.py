@@ -27,9 +27,8 @@ class Stage:
     rate_hz: float  # control rate [Hz]
     ticks: int  # control ticks per logged sample
     duration: int  # control ticks of the whole trial
-    shared: dict[str, object] = field(
-        default_factory=dict
-    )  # objects that several actors of the trial share, by name
+    # objects that several actors of the trial share, by name
+    shared: dict[str, object] = field(default_factory=dict)
 
 
 class Actor(Protocol):
@@ -40,7 +39,7 @@ class Actor(Protocol):
     """
 
     def start(self, stage: Stage) -> None:
-        """Get ready; called once."""
+        """Prepare for a trial; called once before the first tick."""
 
     def act(self, tick: int) -> None:
         """Write ``ctrl`` of its own actuators; add to ``xfrc_applied`` of the payload or to ``qfrc_applied``.
@@ -53,7 +52,7 @@ class Reader(Protocol):
     """A faulty sensor: it changes the readings that controllers and logs use."""
 
     def start(self, stage: Stage) -> None:
-        """Get ready; called once."""
+        """Prepare for a trial; called once before the first tick."""
 
     def read(self, tick: int, seen: Array) -> None:
         """Change in place the positions from which readings are computed.

@@ -110,6 +110,7 @@ def turn_free_directions(
 # Largest displacement of a wrist and rotation of a gimbal that closing the loops may cause. Chosen.
 LARGEST_SHIFT_M = 0.06
 LARGEST_TURN_RAD = 0.2
+# Largest unbalanced generalised force of a static equilibrium [N or N m]. Chosen.
 UNHELD_NM = 1e-6
 SWINGS = (
     "the payload cannot rest in the home pose: {:.2g} N m stay unbalanced; with one or two grasps its centre of mass "

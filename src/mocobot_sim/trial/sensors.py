@@ -38,6 +38,7 @@ class SensorPreset:
         return self.spread == CalibrationSpread()
 
 
+# Sensor presets by name, from ideal sensors to robots without calibration. Chosen.
 PRESETS = {
     preset.name: preset
     for preset in (

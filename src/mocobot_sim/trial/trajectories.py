@@ -16,10 +16,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from estimator.arrays import Array
 from estimator.errors import InputError
 
-RATE_HZ = 100.0
+RATE_HZ = 100.0  # sampling rate of commands and recordings [Hz]
 LONGEST_S = 3600.0  # longest trial [s]; chosen: a trial and its log stay in memory
 SETTLE_S = (
-    2.5  # rest before the motion (load take-up) and after it [s]; chosen: the estimator trims 2 s at each end
+    2.5  # rest before (load take-up) and after the motion [s]; chosen: the estimator trims 2 s at each end
 )
 
 

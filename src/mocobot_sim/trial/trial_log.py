@@ -105,6 +105,7 @@ class TrialLog:
         return (Rotation.from_matrix(self.R_W1[0]).inv() * Rotation.from_matrix(self.R_W1)).as_rotvec()
 
 
+# Largest gap of a rod, and largest gap and angle of a weld, in a valid trial. Chosen.
 ROD_LIMIT_M = 0.02e-3
 WELD_LIMIT_M = 0.01e-3
 WELD_LIMIT_RAD = np.deg2rad(0.001)
