@@ -235,9 +235,8 @@ def lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, f
 
 STEP = 1e-6  # step of all finite differences, in SI units; chosen
 HARDLY_DAMPED = 0.02  # damping ratio below which a warning is given; chosen: resonance amplifies 25 times
-AT_REST_PER_S = (
-    0.05  # slower modes are ignored [1/s]; chosen: nothing holds them, such as a gimbal without load
-)
+# Slower modes are ignored [1/s]. Chosen: nothing holds them, such as a gimbal without load.
+AT_REST_PER_S = 0.05
 
 
 @dataclass(frozen=True)

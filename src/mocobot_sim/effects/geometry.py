@@ -226,7 +226,7 @@ class _LateCreep:
 
 @dataclass(frozen=True)
 class BaseCompliance(Effect):
-    """A base on horizontal springs with the compliance ``compliance_m_per_N`` in x and y [m/N].
+    """A base on horizontal springs with equal compliance in x and y, ``compliance_m_per_N`` [m/N].
 
     Implemented as two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``).
     They follow the force with the time constant ``relaxation_s`` [s]. Below 5 ms they are critically damped, and their

@@ -55,14 +55,14 @@ Value = Callable[[], float]
 
 @dataclass(frozen=True)
 class Law(Effect):
-    """Add ``amplitude`` times a function of the signal ``of`` to a target; ``times`` names an optional second factor.
+    """A formula added to a target: ``amplitude`` times a function of one signal, optionally times a second signal.
 
     ``target`` is one of: a reading (``tau_2_1`` of robot 2, joint 1; ``phi_2_1``, ``theta_2_1``); a torque
     (``driven_torque_2_1``, ``gimbal_torque_2_1``); a displacement (``base_position_2_x``, ``grasp_position_2_x``); a
     quantity of the payload (``payload_force_x`` and ``payload_moment_x`` in the axes of robot 1's {b};
     ``payload_mass``, ``payload_first_moment_x`` and ``payload_spin_x`` in {1}).
 
-    ``of`` and ``times`` are signals: ``time``, ``phi_2_1``, ``phi_rate_2_1``, ``phi_acceleration_2_1``, the same for
+    ``of`` and ``times`` name the two signals: ``time``, ``phi_2_1``, ``phi_rate_2_1``, ``phi_acceleration_2_1``, the same for
     ``theta``, ``tau_2_1``, ``payload_position_x``. Other payload signals are ``velocity``, ``acceleration``, ``felt``
     (acceleration minus gravity), ``rate`` (angular velocity), ``turn`` (angular acceleration) and ``up``. All are in SI
     units. If the target is a reading, angles and torques are those that the sensors see; otherwise they are true

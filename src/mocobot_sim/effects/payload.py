@@ -299,7 +299,7 @@ LEAST_RATIO = 1e-6
 
 @dataclass(frozen=True)
 class PayloadMass(Effect):
-    """Mass that is added to the payload (removed, if negative) during some trials, or that changes at a constant rate.
+    """A change of the payload's mass: constant during some trials (negative for removal), or at a constant rate.
 
     ``mass_kg`` is present from ``trial`` to ``last_trial``, both included; 0 means until the last trial. Within each of
     these trials the mass also changes by ``rate_kgps``. The centre of the added mass is a point of the payload in {1}

@@ -57,7 +57,7 @@ class TorqueSkew(Effect):
 
 @dataclass(frozen=True)
 class TorqueLag(Effect):
-    """A first-order lag with the time constant ``time_constant_s`` in all torque sensors of one robot [s].
+    """A first-order lag of all torque sensors of one robot; its time constant is ``time_constant_s`` [s].
 
     It affects log and controller.
     """
@@ -83,7 +83,7 @@ class ClockDelay(Effect):
 
 @dataclass(frozen=True)
 class SensorLag(Effect):
-    """A first-order lag with the time constant ``time_constant_s`` in one torque sensor [s].
+    """A first-order lag of one torque sensor; its time constant is ``time_constant_s`` [s].
 
     It affects log and controller.
     """

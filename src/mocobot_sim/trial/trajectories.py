@@ -18,9 +18,8 @@ from estimator.errors import InputError
 
 RATE_HZ = 100.0  # sampling rate of commands and recordings [Hz]
 LONGEST_S = 3600.0  # longest trial [s]; chosen: a trial and its log stay in memory
-SETTLE_S = (
-    2.5  # rest before (load take-up) and after the motion [s]; chosen: the estimator trims 2 s at each end
-)
+# Rest before the motion (load take-up) and after it [s]. Chosen: the estimator trims 2 s at each end.
+SETTLE_S = 2.5
 
 
 @dataclass(frozen=True)
