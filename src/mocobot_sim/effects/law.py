@@ -62,8 +62,8 @@ class Law(Effect):
     quantity of the payload (``payload_force_x`` and ``payload_moment_x`` in the axes of robot 1's {b};
     ``payload_mass``, ``payload_first_moment_x`` and ``payload_spin_x`` in {1}).
 
-    ``of`` and ``times`` name the two signals: ``time``, ``phi_2_1``, ``phi_rate_2_1``, ``phi_acceleration_2_1``, the same for
-    ``theta``, ``tau_2_1``, ``payload_position_x``. Other payload signals are ``velocity``, ``acceleration``, ``felt``
+    ``of`` and ``times`` name the two signals: ``time``, ``phi_2_1``, ``phi_rate_2_1``, ``phi_acceleration_2_1``, the
+    same for ``theta``, ``tau_2_1``, ``payload_position_x``. Other payload signals are ``velocity``, ``acceleration``, ``felt``
     (acceleration minus gravity), ``rate`` (angular velocity), ``turn`` (angular acceleration) and ``up``. All are in SI
     units. If the target is a reading, angles and torques are those that the sensors see; otherwise they are true
     values. A weighted sum of signals is also a signal: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
