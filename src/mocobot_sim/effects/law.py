@@ -65,8 +65,8 @@ class Law(Effect):
     ``of`` and ``times`` name the two signals: ``time``, ``phi_2_1``, ``phi_rate_2_1``, ``phi_acceleration_2_1``, the
     same for ``theta``, ``tau_2_1``, ``payload_position_x``. Other payload signals are ``velocity``, ``acceleration``,
     ``felt`` (acceleration minus gravity), ``rate`` (angular velocity), ``turn`` (angular acceleration) and ``up``. All
-    are in SI units. If the target is a reading, angles and torques are those that the sensors see; otherwise they are true
-    values. A weighted sum of signals is also a signal: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
+    are in SI units. If the target is a reading, angles and torques are those that the sensors see; otherwise they are
+    true values. A weighted sum of signals is also a signal: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
 
     ``number``, ``second`` and ``phase_rad`` are the parameters of the function, such as the knee of a ramp, a time
     constant, or half the width of a backlash (docs/effects.md).
