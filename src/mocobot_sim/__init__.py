@@ -1,1 +1,1 @@
-"""The Omnid team in MuJoCo: scene, control, trajectories, sensors, trials."""
+"""Simulation of a team of Omnids in MuJoCo: scenes, control, trajectories, sensors, effects, trials."""

@@ -1,4 +1,4 @@
-"""Names of the effects: to refuse a wrong one takes neither MuJoCo nor the effects themselves."""
+"""Names of all effects, so that a wrong name can be rejected without loading MuJoCo."""
 
 import difflib
 
@@ -31,14 +31,14 @@ NAMES = (
     "payload_mass",
     "law",
 )
-"""A class of ``mocobot_sim.effects`` each, in the order in which they are listed."""
+"""Names of the effects in the order in which they are listed; each is a class in ``mocobot_sim.effects``."""
 
 
 def check_effect_name(name: str) -> None:
-    """Find out that there is no such effect.
+    """Check the name of an effect.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such effect.
     """
     if name not in NAMES:
         close = difflib.get_close_matches(name, NAMES, n=1)

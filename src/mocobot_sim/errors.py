@@ -1,5 +1,5 @@
-"""What a trial can fail with; apart, so that whoever catches it need not load MuJoCo."""
+"""Error of a failed trial, in a separate module so that callers can catch it without loading MuJoCo."""
 
 
 class TrialError(RuntimeError):
-    """The physics of a trial cannot be trusted; the sentence says what broke, where and when."""
+    """A trial failed a check of the simulation; the message says what failed, where and when."""

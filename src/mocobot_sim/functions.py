@@ -1,4 +1,4 @@
-"""Functions of one signal, one value after the other, as a trial runs: what formulas at a place are made of."""
+"""Functions of one signal for laws (``effects.law``, ``serial.effects``), evaluated sample by sample."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Any
 from estimator.errors import InputError
 
 Step = Callable[[float], float]
-"""The next value of the function from the next value of the signal."""
+"""Function that maps the next sample of the signal to the next value; it can have a state."""
 Names = Callable[[str], object]
-"""Whether a name is known."""
+"""Function whose result is true for valid names."""
 
 
 @dataclass(frozen=True)
 class Inside:
-    """Numbers inside a function."""
+    """Parameters of a function."""
 
-    number: float  # its first and its second number
-    second: float  # its first and its second number
-    phase_rad: float  # of a sine
-    dt: float  # time from one value to the next [s]
+    number: float  # first parameter; ``NEEDS`` gives its meaning
+    second: float  # second parameter
+    phase_rad: float  # phase of a sine
+    dt: float  # time between samples [s]
 
 
 def _plain(of: Callable[[float, Inside], float]) -> Callable[[Inside], Step]:
@@ -53,7 +53,7 @@ class _Lag:
 
 
 class _SecondOrder:
-    """Semi-implicit Euler steps of y'' = omega^2 (x - y) - 2 zeta omega y'."""
+    """Low-pass filter y'' = omega^2 (x - y) - 2 zeta omega y', integrated by semi-implicit Euler steps."""
 
     def __init__(self, inside: Inside) -> None:
         self._omega, self._zeta, self._dt = 2.0 * math.pi * inside.number, inside.second, inside.dt
@@ -89,30 +89,30 @@ FUNCTIONS: Mapping[str, Callable[[Inside], Step]] = {
     "first_hat": _plain(lambda x, i: min(1.0, max(0.0, 1.0 - (x - i.number) / i.second))),
     "last_hat": _plain(lambda x, i: min(1.0, max(0.0, 1.0 + (x - i.number) / i.second))),
 }
-"""By name; a curve is a sum of hats, one at each knot."""
+"""Functions by name. A piecewise linear curve is a sum of hats, one at each knot."""
 
 NEEDS: Mapping[str, str] = {
     "sign": "slow, above 0", "sine": "times", "hum": "frequency_hz", "warming": "time_s, above 0",
     "play": "half_width, above 0", "lag": "time_s, above 0", "second_order": "frequency_hz, above 0",
     "hat": "centre", "first_hat": "centre", "last_hat": "centre",
 }  # fmt: skip
-"""What ``number`` is, of functions that cannot do without."""
+"""Meaning of ``number`` for the functions that need it."""
 POSITIVE = ("sign", "warming", "play", "lag", "second_order")
 """Functions whose ``number`` must be above 0."""
 WIDE = ("hat", "first_hat", "last_hat", "second_order")
-"""Functions whose ``second``, a width or a damping ratio, must be above 0."""
+"""Functions whose ``second`` (a width or a damping ratio) must be above 0."""
 
 
 def check_law(law: Any, is_target: Names, targets: str, is_signal: Names, signals: str) -> None:
-    """Refuse a formula with a name that is not known, or numbers that its function cannot have inside.
+    """Check the names and parameters of a law.
 
     Args:
-        law: with ``target``, ``function``, ``of``, ``times``, ``number`` and ``second``.
-        is_target, is_signal: whether a name is one.
-        targets, signals: what such names look like, in words.
+        law: object with ``target``, ``function``, ``of``, ``times``, ``number`` and ``second``.
+        is_target, is_signal: whether a name is a valid target or signal.
+        targets, signals: examples of valid names for the error message.
 
     Raises:
-        InputError: it has.
+        InputError: a name is unknown, or a parameter is not allowed for the function.
     """
     names = (
         ("target", is_target, targets), ("function", FUNCTIONS.__contains__, ", ".join(FUNCTIONS)),

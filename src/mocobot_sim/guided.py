@@ -1,4 +1,4 @@
-"""A person guides the payload by hand; the arms carry its weight and are otherwise soft."""
+"""Hand guidance: the arms carry the weight of the payload with zero stiffness while a person moves it."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from mocobot_sim.trial.truth import GroundTruth
 
 @dataclass(frozen=True)
 class Payload:
-    """What is believed of a payload.
+    """Parameters of a payload that weight compensation needs.
 
     Attributes:
-        mass_kg: mass; 0 if its weight is not to be carried.
+        mass_kg: mass [kg]; 0 to carry no weight.
         p_1c: centre of mass in {1} [m], shape (3,).
         p_1i: grasps in {1} [m], shape (N, 3).
         R_1i: grasp orientations in {1}, shape (N, 3, 3).
@@ -40,10 +40,10 @@ class Payload:
 
     @classmethod
     def of_estimate(cls, estimate: PayloadEstimate) -> Payload:
-        """What an estimate says.
+        """Take the parameters from an estimate.
 
         Raises:
-            InputError: it does not determine grasps, mass and centre of mass.
+            InputError: the estimate does not determine grasps, mass and centre of mass.
         """
         if estimate.grasps is None or estimate.mass is None or estimate.p_1c is None:
             known = {"grasps": estimate.grasps, "mass": estimate.mass, "centre of mass": estimate.p_1c}
@@ -53,20 +53,24 @@ class Payload:
 
     @classmethod
     def of_truth(cls, truth: GroundTruth) -> Payload:
-        """What is so."""
+        """Take the parameters from the ground truth."""
         return cls(truth.mass_kg, truth.p_1c, truth.p_1i, truth.R_1i)
 
 
 def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Array:
-    """Upward forces at the grasps that carry the payload's weight without turning it [N], shape (N,).
+    """Vertical forces at the grasps that balance the payload's weight without a moment [N], shape (N,).
 
-    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique,
-    with more the smallest are taken; with one or two a moment stays that cannot be balanced. ``up_1`` is the direction
-    away from the ground in {1}, unit length, shape (3,).
+    They add up to the weight, and their moment about the centre of mass is zero. With three grasps they are unique;
+    with more, the solution of least norm is used. With one or two grasps, a moment can remain unbalanced.
+
+    Args:
+        payload: parameters of the payload.
+        up_1: upward unit vector in {1}, shape (3,).
+        gravity_mps2: gravitational acceleration [m/s^2].
     """
     up = np.asarray(up_1, dtype=float)
     arms = payload.p_1i - payload.p_1c
-    # Forces along ``up`` balance only the moment across it: two directions.
+    # Vertical forces have moments about horizontal axes only: two rows.
     across = np.linalg.svd(up[None])[2][1:]
     scale = max(np.linalg.norm(arms, axis=1).max(), 1e-9)
     rows = np.vstack([np.ones(len(arms)), across @ np.cross(arms, up).T / scale])
@@ -75,29 +79,31 @@ def weight_shares(payload: Payload, up_1: ArrayLike, gravity_mps2: float) -> Arr
 
 
 def up_in_payload(theta: Array, R_1i: Array) -> Array:
-    """Up, in {1}, as a level robot sees it through its own gimbal, shape (..., 3).
+    """Upward direction in {1} by the gimbal of a robot on a level base, shape (..., 3).
 
-    ``theta`` are its gimbal angles (z, y, x) [rad], shape (..., 3), ``R_1i`` its grasp's orientation, (..., 3, 3).
+    Args:
+        theta: gimbal angles (z, y, x) of the robot [rad], shape (..., 3).
+        R_1i: orientation of its grasp in {1}, shape (..., 3, 3).
     """
     up_i = gimbal.rotation(theta)[..., 2, :]  # the third row of R_bi is z of {b} in {i}
     return (R_1i @ up_i[..., None])[..., 0]
 
 
-# No stiffness. The SEA torque loop lags behind the changing lever arms, which takes about 1.4 N s/m of damping away
-# per arm (measured with payload (a)); a little more than that brings a payload that nobody holds to rest.
+# Zero stiffness. The lag of the SEA torque loop acts as a damping of about -1.4 N s/m per arm (measured with payload
+# (a)). The damping is chosen a little larger, so that a payload that nobody holds comes to rest.
 FLOAT_GAINS = ControlGains(stiffness_N_per_m=0.0, damping_Ns_per_m=2.0)
 
 
 class FloatArms:
-    """Sets every arm's feed-forward force to its share of the weight, at the payload's present tilt.
+    """Actor that sets the feed-forward force of every arm to its share of the weight at the current tilt.
 
-    A trial starts at rest with the payload held. From ``start_s`` on, within ``fade_s``, the forces that hold it then
-    give way to those that ``payload`` asks for; the gains do not change (``FLOAT_GAINS``, or softer arms' own).
+    A trial starts at rest. From ``start_s`` on, the forces measured at the start fade within ``fade_s`` to those
+    computed from ``payload``. The control gains do not change; use soft ones such as ``FLOAT_GAINS``.
 
     Args:
-        payload: whose weight the robots believe they carry, or None for the forces that they start with, for ever.
-        as_built: sensor zeros of every unit; empty for robots as designed.
-        start_s, fade_s: when and how fast [s].
+        payload: assumed parameters of the payload; None to keep the initial forces.
+        as_built: sensor zeros of every robot; empty for robots as designed.
+        start_s, fade_s: start and duration of the transition [s].
     """
 
     def __init__(
@@ -113,10 +119,10 @@ class FloatArms:
         self._start_s, self._fade_s = start_s, fade_s
 
     def start(self, stage: Stage) -> None:
-        """Get ready.
+        """Prepare for a trial.
 
         Raises:
-            InputError: the payload has another number of grasps than there are robots.
+            InputError: the number of grasps differs from the number of robots.
         """
         robots = stage.index.robots
         if self._payload is not None and len(self._payload.p_1i) != robots:
@@ -129,33 +135,33 @@ class FloatArms:
         self._held = np.zeros((robots, 3))
 
     def act(self, tick: int) -> None:
-        """Every sample, set the forces; the payload turns slowly."""
+        """Update the forces once per sample."""
         stage = self._stage
         if tick == 1:
-            self._held = stage.controller.feed_forward  # measured by the arms in their first tick
+            self._held = stage.controller.feed_forward  # measured by the controller in the first tick
             stage.controller.feed_forward = self._held
         if tick and tick % stage.ticks == 0 and self._payload is not None:
             share = minimum_jerk(np.array((tick / stage.rate_hz - self._start_s) / self._fade_s))
             stage.controller.feed_forward = (1.0 - share) * self._held + share * self.forces()
 
     def forces(self) -> Array:
-        """What the payload asks for now: force of every wrist in its {b} [N], shape (N, 3)."""
+        """Compute the forces that balance the weight now: one per wrist, in its {b} [N], shape (N, 3)."""
         payload, force = self._payload, np.zeros_like(self._held)
         if payload is not None and payload.mass_kg > 0:
             theta = self._stage.data.qpos[self._stage.index.gimbal_qpos] + self._theta_zero
             for i, up in enumerate(up_in_payload(theta, payload.R_1i)):
-                # Every robot sees the tilt by its own gimbal, and takes its own share.
+                # Each robot measures the tilt with its own gimbal and applies its own share.
                 force[i, 2] = weight_shares(payload, up, self._gravity)[i]
         return force
 
 
 @dataclass(frozen=True)
 class Grip:
-    """Two hands that hold a payload firmly: stiffness and damping, isotropic.
+    """Impedance of two hands that hold a payload; isotropic.
 
     Attributes:
-        stiffness_N_per_m, damping_Ns_per_m: of the position.
-        stiffness_Nm_per_rad, damping_Nms_per_rad: of the orientation.
+        stiffness_N_per_m, damping_Ns_per_m: translational stiffness and damping.
+        stiffness_Nm_per_rad, damping_Nms_per_rad: rotational stiffness and damping.
     """
 
     stiffness_N_per_m: float = 1000.0
@@ -166,13 +172,13 @@ class Grip:
 
 @dataclass(frozen=True)
 class Move:
-    """One piece of a hand's path, with minimum jerk from rest to rest.
+    """One segment of a hand's path, with minimum jerk from rest to rest.
 
     Attributes:
-        by_m: displacement from where the hand began, at its end, in the world [m], shape (3,).
-        turn_rad: rotation vector from how it began, at its end, in the world [rad], shape (3,).
-        duration_s: time to get there, greater than 0 [s].
-        rest_s: time at rest there [s].
+        by_m: displacement at the end, relative to the start of the path, in the world [m].
+        turn_rad: rotation vector at the end, relative to the start of the path, in the world [rad].
+        duration_s: duration of the motion, greater than 0 [s].
+        rest_s: rest at the end [s].
     """
 
     by_m: tuple[float, float, float]
@@ -183,16 +189,16 @@ class Move:
 
 @dataclass(frozen=True)
 class HandLog:
-    """What a hand did, one row per sample; in the axes of the world.
+    """Log of a hand, one row per sample, in world axes.
 
     Attributes:
         time: [s], shape (Q,).
-        force: on the payload [N], shape (Q, 3).
-        moment: on the payload about the grip [N m], shape (Q, 3).
-        intended: position of the grip that the person wants [m], shape (Q, 3).
-        position: where it is [m], shape (Q, 3).
-        tilt: rotation vector from the wanted orientation to the present one [rad], shape (Q, 3).
-        power: of the hand, into the payload [W], shape (Q,).
+        force: force on the payload [N], shape (Q, 3).
+        moment: moment on the payload about the grip [N m], shape (Q, 3).
+        intended: desired position of the grip [m], shape (Q, 3).
+        position: actual position of the grip [m], shape (Q, 3).
+        tilt: rotation vector from the desired to the actual orientation [rad], shape (Q, 3).
+        power: power that the hand supplies to the payload [W], shape (Q,).
     """
 
     time: Array
@@ -205,7 +211,7 @@ class HandLog:
 
 
 class _OnPayload:
-    """A wrench on the payload at a point of it."""
+    """Base class of actors that apply a wrench at a point of the payload."""
 
     def __init__(self, point_1: ArrayLike) -> None:
         self._point_1 = np.asarray(point_1, dtype=float)
@@ -215,10 +221,10 @@ class _OnPayload:
             )
 
     def start(self, stage: Stage) -> None:
-        """Get ready.
+        """Prepare for a trial.
 
         Raises:
-            InputError: the robots hold nothing.
+            InputError: there is no payload.
         """
         if stage.index.payload_body < 0:
             raise InputError("the robots hold nothing; a hand needs a payload")
@@ -227,7 +233,7 @@ class _OnPayload:
         self._velocity = np.zeros(6)
 
     def _at(self) -> tuple[Array, Array, Array, Array]:
-        """Position, orientation, velocity and angular velocity of the point, in the world, one time step ago."""
+        """Position, orientation, velocity and angular velocity of the point in the world, one time step ago."""
         model, data = self._stage.model, self._stage.data
         R = data.xmat[self._body].reshape(3, 3).copy()
         arm = R @ self._point_1
@@ -242,19 +248,19 @@ class _OnPayload:
         applied[3:] += moment + _cross(at - self._stage.data.xipos[self._body], force)
 
     def log(self) -> HandLog:
-        """What has happened."""
+        """Log since the start of the trial."""
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
         return HandLog(np.arange(len(self._rows)) * self._stage.ticks / self._stage.rate_hz, *columns)
 
 
 class GuidingHand(_OnPayload):
-    """A spring-damper between the payload and a grip that moves as the person wants: an actor of a trial.
+    """Actor that pulls the payload along a desired path by a spring-damper.
 
     Args:
-        point_1: where it holds the payload, in {1} [m], shape (3,).
-        moves: the path of the grip, relative to where the trial starts.
-        start_s: when it begins to move [s].
-        grip: how firmly it holds.
+        point_1: point of the payload that the hand holds, in {1} [m], shape (3,).
+        moves: desired path of the grip, relative to its initial pose.
+        start_s: time at which the motion starts [s].
+        grip: impedance of the hand; None for the default.
     """
 
     def __init__(
@@ -267,11 +273,11 @@ class GuidingHand(_OnPayload):
 
     @property
     def duration_s(self) -> float:
-        """From the start of the trial to the end of the last rest [s]."""
+        """Time from the start of the trial to the end of the last rest [s]."""
         return self._start_s + sum(move.duration_s + move.rest_s for move in self._moves)
 
     def start(self, stage: Stage) -> None:
-        """Take hold."""
+        """Prepare for a trial: compute the desired path."""
         super().start(stage)
         position, R, _, _ = self._at()
         by, turn = hand_path(self._moves, self._start_s, stage.duration, stage.rate_hz)
@@ -282,8 +288,8 @@ class GuidingHand(_OnPayload):
         self._turning = np.vstack([step, step[-1:]])
 
     def act(self, tick: int) -> None:
-        """Pull the payload toward the grip."""
-        # What MuJoCo knows of the payload's pose is one step old, so the path is read there too.
+        """Apply the spring-damper wrench and record it once per sample."""
+        # The pose of the payload is one step old, so use the desired pose of that step.
         was = max(tick - 1, 0)
         position, R, moving, turning = self._at()
         tilt = _rotvec(R @ self._R[was].T)
@@ -299,14 +305,14 @@ class GuidingHand(_OnPayload):
 
 
 class PushingHand(_OnPayload):
-    """A given force at a point of the payload: an actor of a trial.
+    """Actor that applies a force pulse at a point of the payload.
 
-    The force rises and falls as (1 - cos) / 2 over its duration, so its impulse is half of peak times duration.
+    The pulse has the shape (1 - cos) / 2, so its impulse is half of peak times duration.
 
     Args:
-        point_1: where it pushes, in {1} [m], shape (3,).
-        peak_N: largest force, in the world, shape (3,).
-        start_s, duration_s: when [s].
+        point_1: point of the payload at which the force acts, in {1} [m], shape (3,).
+        peak_N: peak force in the world [N], shape (3,).
+        start_s, duration_s: start and duration [s].
     """
 
     def __init__(self, point_1: ArrayLike, peak_N: ArrayLike, start_s: float, duration_s: float) -> None:
@@ -317,7 +323,7 @@ class PushingHand(_OnPayload):
             raise InputError("a push needs three finite forces and a duration greater than 0 s")
 
     def act(self, tick: int) -> None:
-        """Push."""
+        """Apply the force and record it once per sample."""
         s = (tick / self._stage.rate_hz - self._start_s) / self._duration_s
         force = self._peak * (0.5 - 0.5 * np.cos(2.0 * np.pi * s) if 0.0 < s < 1.0 else 0.0)
         position, _, moving, _ = self._at()
@@ -328,7 +334,7 @@ class PushingHand(_OnPayload):
 
 
 def hand_path(moves: Sequence[Move], start_s: float, ticks: int, rate_hz: float) -> tuple[Array, Array]:
-    """Displacement [m] and rotation vector [rad] of a hand at every tick, shapes (T, 3)."""
+    """Desired displacement [m] and rotation vector [rad] of a hand at every tick, shapes (T, 3)."""
     time = np.arange(ticks) / rate_hz
     path, before = np.zeros((ticks, 6)), np.zeros(6)
     begin = start_s
@@ -340,7 +346,7 @@ def hand_path(moves: Sequence[Move], start_s: float, ticks: int, rate_hz: float)
     return path[:, :3], path[:, 3:]
 
 
-# MuJoCo's small-vector functions: numpy's and scipy's cost more than a step of the physics.
+# MuJoCo's functions for small vectors are faster than those of numpy and scipy.
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -1,12 +1,11 @@
-"""Arithmetic that runs every control tick, compiled where numba is installed.
+"""Computations of every control tick, compiled with numba if it is installed.
 
-numba keeps the machine code for the next process in the folder ``NUMBA_CACHE_DIR`` if that is set, else beside the
-source, else, where an installation cannot be written, in the user's cache folder. Where none of them can be written,
-every process compiles again.
+numba caches the machine code in the folder ``NUMBA_CACHE_DIR`` if set, else beside the source, else in the user's cache
+folder. If none of them is writable, every process compiles again.
 
-Without numba (``pip install 'mocobot[fast]'`` brings it) Python itself does the same arithmetic, to the same bits. It
-reads arrays through memoryviews: those give plain floats, with which Python is faster than with numpy's. A function
-that is compiled here therefore indexes arrays to the last axis (``a[i, k]``, never ``a[i]``).
+Without numba (installed by ``pip install 'mocobot[fast]'``), plain Python gives bit-identical results. It reads arrays
+through memoryviews, because plain floats are faster than numpy scalars. Functions in this module must therefore index
+arrays to the last axis (``a[i, k]``, never ``a[i]``).
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ except ImportError:
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a function when it is first called, without Python's lock while it runs; nothing without numba."""
+    """Compile a function at its first call and let it run without the GIL; without numba, return it unchanged."""
     if njit is None:
         return function
     try:
         return njit(cache=True, nogil=True)(function)
-    except RuntimeError:  # no folder can be written
+    except RuntimeError:  # no cache folder is writable
         return njit(nogil=True)(function)
 
 
 def entry(function: Callable[..., Any]) -> Callable[..., Any]:
-    """``compiled``, for what is called with arrays; they are changed in place."""
+    """Like ``compiled``, for functions called with numpy arrays, which they change in place."""
     if njit is not None:
         return compiled(function)
 
@@ -45,7 +44,7 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
     return called
 
 
-# The kernel works on tuples of three floats: an array per vector would cost more than the arithmetic.
+# Vectors are tuples of three floats, because creating arrays would take longer than the arithmetic.
 
 _COS = (1.0, -0.5, -0.5)
 _SIN = (0.0, sqrt(0.75), -sqrt(0.75))
@@ -53,10 +52,10 @@ _SIN = (0.0, sqrt(0.75), -sqrt(0.75))
 
 @entry
 def update_team(qpos, ctrl, address, units, constants, state, commands, sensed, tick):
-    """One control tick of all robots: what ``TeamController`` says, in place.
+    """Run one control tick of all robots in place; ``TeamController`` documents control law and arrays.
 
-    Few arrays, for each costs as much as a tenth of the arithmetic to hand over; all are explained in ``control``.
-    Commands and what is sensed have a row for every tick, or one.
+    ``commands`` and ``sensed`` have one row per tick, or a single row. The data are packed into few arrays, because
+    passing an array takes about a tenth of the time of the arithmetic.
     """
     reach, proximal, rod, stiffness = constants[0], constants[1], constants[2], constants[3]
     link_gravity, wrist_weight = constants[4], constants[5]
@@ -109,21 +108,25 @@ def update_team(qpos, ctrl, address, units, constants, state, commands, sensed, 
 
 @compiled
 def wrist(phi, reach, proximal, rod):
-    """Forward kinematics of one Delta from three driven angles [rad].
+    """Compute the forward kinematics of one Delta robot.
 
-    c_k is the knee moved inward by the platform radius, so |h - c_k| = rod for every leg, and with
-    s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot. ``reach`` is the base radius
-    minus the platform radius [m].
+    c_k is the knee of leg k moved inward by the platform radius, so |h - c_k| = rod. With s_k = h - c_k and
+    lever_k = s_k . dc_k/dphi_k, the velocities satisfy S h_dot = lever * phi_dot.
+
+    Args:
+        phi: driven angles [rad].
+        reach: base radius minus platform radius [m].
+        proximal, rod: lengths of the proximal links and rods [m].
 
     Returns:
-        h [m], (s_1, s_2, s_3) [m], lever [m^2/rad], cos(phi): tuples of three.
+        Tuples of three: wrist position h [m], (s_1, s_2, s_3) [m], lever [m^2/rad], cos(phi).
     """
     cos_phi = (cos(phi[0]), cos(phi[1]), cos(phi[2]))
     sin_phi = (sin(phi[0]), sin(phi[1]), sin(phi[2]))
     c0 = _knee(cos_phi[0], sin_phi[0], 0, reach, proximal)
     c1 = _knee(cos_phi[1], sin_phi[1], 1, reach, proximal)
     c2 = _knee(cos_phi[2], sin_phi[2], 2, reach, proximal)
-    # From the circumcentre of the three c_k up along their normal.
+    # h lies above the circumcentre of the three c_k, along the normal of their plane.
     a, b = _minus(c1, c0), _minus(c2, c0)
     n = _cross(a, b)
     nn, aa, bb = _dot(n, n), _dot(a, a), _dot(b, b)
@@ -134,7 +137,7 @@ def wrist(phi, reach, proximal, rod):
         half * (aa * bn[1] + bb * na[1]),
         half * (aa * bn[2] + bb * na[2]),
     )
-    # The normal points up for every phi in range. Out of reach there is no root; the trial's checks report it.
+    # The normal points up for every phi in range. Out of reach there is no solution; the checks of a trial report it.
     rise = sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
     h = (c0[0] + centre[0] + rise * n[0], c0[1] + centre[1] + rise * n[1], c0[2] + centre[2] + rise * n[2])
     s = (_minus(h, c0), _minus(h, c1), _minus(h, c2))
@@ -169,7 +172,7 @@ def _cross(a, b):
 
 @compiled
 def _solve(m, y):
-    """Solve the 3x3 system m x = y by Cramer's rule (LAPACK's call costs more than the work)."""
+    """Solve the 3x3 system m x = y by Cramer's rule, which is faster here than a call of LAPACK."""
     c0, c1, c2 = _cross(m[1], m[2]), _cross(m[2], m[0]), _cross(m[0], m[1])
     scale = 1.0 / _dot(m[0], c0)
     return (
@@ -183,12 +186,19 @@ def _solve(m, y):
 def update_drives(
     qpos, qvel, ctrl, wheel_qpos, wheel_dof, drive, matrix, inverse, constants, pose, twist, odometry, angle, lag, speed
 ):  # fmt: skip
-    """One control tick of all bases, in place.
+    """Run one control tick of all bases in place.
 
-    Addresses have shape (N, 4), the kinematics' matrices (4, 3) and (3, 4). ``constants`` are the position gain [1/s],
-    speed gain, integral gain, torque limit and period [s]; ``pose`` and ``twist`` are planned for this tick, (N, 3).
-    Brought up to date: ``odometry``, the pose by it, (N, 3); ``angle`` of the wheels at the last tick and ``lag``, by
-    how much they lag their commanded angles [rad], (N, 4). Written: ``ctrl`` and the commanded ``speed``, (N, 4).
+    Args:
+        qpos, qvel: state of the physics.
+        ctrl: written: motor torques [N m].
+        wheel_qpos, wheel_dof, drive: addresses of wheels and motors, shape (N, 4).
+        matrix, inverse: wheel kinematics, shapes (4, 3) and (3, 4).
+        constants: position gain [1/s], speed gain, integral gain, torque limit [N m], control period [s].
+        pose, twist: planned for this tick, shape (N, 3).
+        odometry: updated: pose by odometry, shape (N, 3).
+        angle: updated: wheel angles at the last tick [rad], shape (N, 4).
+        lag: updated: integral of the speed error [rad], shape (N, 4).
+        speed: written: commanded wheel speeds [rad/s], shape (N, 4).
     """
     position_gain, gain, integral, limit, period = constants
     for i in range(wheel_qpos.shape[0]):
@@ -199,7 +209,7 @@ def update_drives(
             turn += inverse[0, k] * step
             along += inverse[1, k] * step
             across += inverse[2, k] * step
-        # As planar.moved: the chord of the arc.
+        # Chord of the arc, as in ``trajectories.moved``.
         half = 0.5 * turn
         chord = math.sin(half) / half if abs(half) > 1e-9 else 1.0
         cos, sin = math.cos(odometry[i, 2] + half), math.sin(odometry[i, 2] + half)
@@ -210,7 +220,7 @@ def update_drives(
         ahead, aside = pose[i, 0] - odometry[i, 0], pose[i, 1] - odometry[i, 1]
         cos, sin = math.cos(odometry[i, 2]), math.sin(odometry[i, 2])
         rest = pose[i, 2] - odometry[i, 2]
-        # The planned twist is in the planned frame, which the base has not quite reached.
+        # Rotate the planned twist from the planned frame into the frame by odometry.
         cos_rest, sin_rest = math.cos(rest), math.sin(rest)
         v_x = cos_rest * twist[i, 1] - sin_rest * twist[i, 2] + position_gain * (cos * ahead + sin * aside)
         v_y = sin_rest * twist[i, 1] + cos_rest * twist[i, 2] + position_gain * (cos * aside - sin * ahead)
@@ -219,7 +229,7 @@ def update_drives(
             command = matrix[k, 0] * w + matrix[k, 1] * v_x + matrix[k, 2] * v_y
             error = command - qvel[wheel_dof[i, k]]
             torque = gain * error + integral * lag[i, k]
-            # No wind-up: a drive at its limit does not add to what it owes.
+            # Anti-windup: at the torque limit the integral must not grow.
             if abs(torque) < limit or torque * error < 0.0:
                 lag[i, k] += error * period
             ctrl[drive[i, k]] = min(max(torque, -limit), limit)

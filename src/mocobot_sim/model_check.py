@@ -1,4 +1,4 @@
-"""Files of a model: what they would make MuJoCo read and hold, and which of them leave with a copy of the model."""
+"""Safety checks of model files before MuJoCo reads them, and of the files that a copy of a model includes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from estimator.errors import InputError
 from estimator.inputs import JSON_BYTES, open_input, printable, read_input
 
 MOST_ELEMENTS, MOST_POINTS = 100_000, 1 << 24
-"""Most elements of a model, copies included; most points of one height field or texture."""
+"""Largest number of elements of a model, copies included, and of points of one height field or texture. Chosen."""
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def check_model(path: Path) -> None:
-    """Find out that a model is boundless, or that a file it names is a pipe or a device.
+    """Check that a model has a bounded size and that the files it names are regular files.
 
     Raises:
-        InputError: it is, it cannot be read, or it is not well-formed XML.
+        InputError: a check fails, a file cannot be read, or the model is not well-formed XML.
     """
     _Check(path).run()
 
@@ -88,7 +88,7 @@ class _Check:
             raise InputError(f"{printable(what)} {count:,} {of}; at most {most:,} are read")
 
     def _places(self) -> set[Path]:
-        """What is there under the names of files."""
+        """Existing files that the model may refer to, in all of its asset folders."""
         named = {form for name in self._named for form in (name, name.rpartition("/")[2]) if form}
         places = (self._path.parent / folder / name for folder in self._folders for name in named)
         return {place for place in places if "\0" not in str(place) and place.exists() and not place.is_dir()}
@@ -101,15 +101,20 @@ def _whole(text: str) -> int:
 
 MODELS = (".xml", ".mjcf", ".urdf")
 ASSETS = (".stl", ".obj", ".msh", ".skn", ".png", ".ktx")
-"""Meshes, skins, textures and height fields."""
+"""Suffixes of meshes, skins, textures and height fields."""
 _DIRECTORIES = ("assetdir", "meshdir", "texturedir")
 
 
 def owned(named: Path, folder: Path, types: tuple[str, ...]) -> Path:
-    """The file that a model names, links resolved.
+    """Resolve a file that a model names and check that it may be copied.
+
+    Args:
+        named: path of the file.
+        folder: folder of the model.
+        types: allowed suffixes.
 
     Raises:
-        InputError: it is not at or below the model's folder, or of another type.
+        InputError: the file is not in or below the model's folder, or its suffix is not allowed.
     """
     source = named.resolve()
     if not source.is_relative_to(folder.resolve()):
@@ -124,16 +129,18 @@ def owned(named: Path, folder: Path, types: tuple[str, ...]) -> Path:
 
 
 def check_named(path: Path, *, assets: bool) -> None:
-    """Refuse a readable model if files would go into a copy of it that are not its own.
+    """Check that all files named by a model, which a copy would include, are in or below its folder.
 
-    Looks at further models, and with ``assets`` at meshes, skins, textures and height fields, too.
+    Args:
+        path: path of the model; models that it includes are checked too.
+        assets: whether to check meshes, skins, textures and height fields as well.
 
     Raises:
-        InputError: it names such a file, or what it names cannot be told.
+        InputError: a file lies outside the folder or has a wrong type, or a model cannot be parsed.
     """
     folder, models, places = path.parent, [path], {""}
     named: list[str] = []
-    for model in models:  # grows
+    for model in models:  # the loop appends included models
         for element in _elements(model):
             places |= {element.get(kind, "") for kind in _DIRECTORIES}
             files = [value for key, value in element.items() if key.startswith("file")]

@@ -1,4 +1,4 @@
-"""Pictures whose words are shown as they are: names that users give may look like formulas to matplotlib."""
+"""Plots with literal text: matplotlib would otherwise parse some names given by users as formulas."""
 
 import warnings
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from matplotlib.ticker import LogFormatter
 
 @contextmanager
 def plain_words() -> Iterator[None]:
-    """A block, or a function that this decorates, that draws without formulas and quietly without rare letters."""
+    """Context manager or decorator that draws text literally and suppresses warnings about missing glyphs."""
     with rc_context({"text.parse_math": False}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
@@ -19,11 +19,11 @@ def plain_words() -> Iterator[None]:
 
 class _Plain(LogFormatter):
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """The number, where LogFormatter has one."""
+        """Plain number where LogFormatter would label the axis, else an empty string."""
         return f"{x:g}" if super().__call__(x, pos) else ""
 
 
 def plain_numbers(axis: Axis) -> None:
-    """Label a logarithmic axis with numbers in place of formulas."""
+    """Label a logarithmic axis with plain numbers instead of powers of ten."""
     axis.set_major_formatter(_Plain())
     axis.set_minor_formatter(_Plain())

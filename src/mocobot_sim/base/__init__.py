@@ -1,1 +1,1 @@
-"""The mecanum base: rollers on the floor, wheel speeds, odometry, and paths that bases follow."""
+"""The mecanum base: rollers on the floor, wheel speeds, odometry and path following."""

@@ -1,19 +1,20 @@
-"""Design numbers of the mecanum base, and its kinematics: wheel speeds from a body twist, and back.
+"""Design parameters of the mecanum base and its kinematics: wheel speeds from a body twist and back.
 
-A roller turns freely about its axle and rolls on the floor, so it can slide without force along one horizontal
-direction only, across its axle; along its axle e its contact sticks. The contact of wheel k, at (x, y) on the chassis,
-moves with v + w z x (x, y), minus R u along x where u is the wheel's speed, so
+A roller turns freely about its axle, so its contact moves freely across the axle and does not slip along the axle e.
+The contact of wheel k, at (x, y) on the chassis, has the velocity v + w z x (x, y), minus R u along x, where u is the
+wheel speed. The no-slip condition gives
 
     e . (v_x - w y - R u, v_y + w x) = 0,    e = (sin a, s cos a)
     u = (v_x - w y + s cot(a) (v_y + w x)) / R
 
-with a the angle between the axles of roller and wheel and s = +-1 the wheel's hand. With a = 45 deg this is equation
-(13.10) of K. M. Lynch and F. C. Park, "Modern Robotics", Cambridge University Press, 2017.
+where a is the angle between the axles of roller and wheel, and s = +-1 is the hand of the wheel. With a = 45 deg this
+is equation (13.10) of K. M. Lynch and F. C. Park, "Modern Robotics", Cambridge University Press, 2017.
 
-The textbook's roller always touches with its middle. One of n straight axles is turned about the wheel's axle by up to
-pi / n while it carries the wheel; at angle t only sin a cos t of its axle lies along the wheel's motion. A wheel that
-turns evenly passes all t alike, so the mean of cos t, sin(pi / n) / (pi / n), belongs into cot a: 12 rollers go 1.1 %
-less far sideways than the textbook says. ``with_rollers`` has this mean in it.
+The textbook assumes that a roller always touches with its middle. With n rollers on straight axles, an axle is rotated
+about the wheel's axle by up to t = +-pi / n while it carries the wheel. At the angle t only the share sin a cos t of
+the axle lies along the wheel's motion. At constant wheel speed all t are equally likely, so cot a is divided by the
+mean of cos t, sin(pi / n) / (pi / n). With 12 rollers the base moves 1.1 % less far sideways than the textbook
+predicts. ``with_rollers`` includes this mean.
 """
 
 from __future__ import annotations
@@ -31,18 +32,18 @@ from estimator.errors import InputError
 from estimator.strict import Fields, is_number, read_toml
 from mocobot_sim.scene.models import models_dir
 
-# Order of the wheels everywhere; x forward, y left.
+# Order of the wheels in all arrays; x points forward, y left.
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
 ALONG_X = np.array([1.0, 1.0, -1.0, -1.0])
 ALONG_Y = np.array([1.0, -1.0, 1.0, -1.0])
-# Which way the roller on the floor points: its axle is along (sin, hand cos) of the roller angle in the chassis' x, y.
-# The four axles form a diamond on the floor, and an X seen from above.
+# Hand of each wheel: the axle of the roller on the floor points along (sin a, hand cos a) in the chassis' x, y, where a
+# is the roller angle. The axles form a diamond on the floor, and an X seen from above.
 HAND = np.array([-1.0, 1.0, 1.0, -1.0])
 
 
 @dataclass(frozen=True)
 class BaseDesign:
-    """Geometry, contact and drives of one mecanum base; SI units, named in each field's suffix.
+    """Geometry, contact and drives of one mecanum base; the suffix of each field gives its SI unit.
 
     The fields are the keys of ``models/omnid/base.toml``.
     """
@@ -66,7 +67,7 @@ class BaseDesign:
         """Check every number.
 
         Raises:
-            InputError: a value is not a finite number of the allowed range.
+            InputError: a value is not a finite number within its range.
         """
         for entry in dataclasses.fields(self):
             value = getattr(self, entry.name)
@@ -86,15 +87,15 @@ class BaseDesign:
 
     @property
     def wheel_positions(self) -> Array:
-        """Middle of every wheel in the chassis' x, y [m], shape (4, 2)."""
+        """Centre of every wheel in the chassis' x, y [m], shape (4, 2)."""
         return np.stack([self.half_wheelbase_m * ALONG_X, self.half_track_m * ALONG_Y], axis=1)
 
 
 def load_base_design(path: Path) -> BaseDesign:
-    """Read a design file.
+    """Read the design of a base from a TOML file.
 
     Raises:
-        InputError: the file cannot be read, is not TOML, or its keys are not the documented ones.
+        InputError: the file cannot be read, is not TOML, or has wrong keys or values.
     """
     values = read_toml(path, "design file")
     Fields(values, [entry.name for entry in dataclasses.fields(BaseDesign)], str(path))
@@ -106,7 +107,7 @@ def load_base_design(path: Path) -> BaseDesign:
 
 @cache
 def base_design() -> BaseDesign:
-    """Design numbers of the shipped base."""
+    """Design of the shipped base."""
     return load_base_design(models_dir() / "omnid" / "base.toml")
 
 
@@ -115,8 +116,8 @@ class MecanumKinematics:
     """Linear map between planar body twists (w_z, v_x, v_y) and wheel speeds, wheels in the order of ``WHEELS``.
 
     Attributes:
-        matrix: wheel speeds per twist, shape (4, 3); columns [1, 1/m, 1/m].
-        inverse: its pseudo-inverse, the twist that fits four wheel speeds best, shape (3, 4).
+        matrix: Jacobian H from twist to wheel speeds, shape (4, 3); units of the columns [1, 1/m, 1/m].
+        inverse: pseudo-inverse of ``matrix``, from wheel speeds to the least-squares twist, shape (3, 4).
     """
 
     matrix: Array
@@ -124,12 +125,12 @@ class MecanumKinematics:
 
     @classmethod
     def textbook(cls, design: BaseDesign) -> MecanumKinematics:
-        """Every roller touches with its middle."""
+        """Kinematics under the assumption that every roller touches with its middle."""
         return cls._with(design, 1.0)
 
     @classmethod
     def with_rollers(cls, design: BaseDesign) -> MecanumKinematics:
-        """On average over a turn of wheels with so many straight rollers."""
+        """Kinematics averaged over a turn of wheels with a finite number of straight rollers."""
         return cls._with(design, axle_share(design))
 
     @classmethod
@@ -144,11 +145,11 @@ class MecanumKinematics:
         return np.asarray(twist, dtype=float) @ self.matrix.T
 
     def twist(self, wheel_speeds: ArrayLike) -> Array:
-        """Twists, shape (..., 3), that fit wheel speeds [rad/s], shape (..., 4), in the sense of least squares."""
+        """Least-squares twists, shape (..., 3), for wheel speeds [rad/s], shape (..., 4)."""
         return np.asarray(wheel_speeds, dtype=float) @ self.inverse.T
 
 
 def axle_share(design: BaseDesign) -> float:
-    """Mean of the cosine of the angle by which a roller's axle is turned while the roller carries the wheel."""
+    """Mean cosine of the angle by which a roller's axle is rotated while the roller carries the wheel."""
     half_pitch = np.pi / design.rollers
     return float(np.sin(half_pitch) / half_pitch)

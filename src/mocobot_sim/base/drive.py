@@ -1,4 +1,4 @@
-"""Bases that drive: by a plan, under their own wrists, or one alone on a floor; each on its own odometry.
+"""Driving bases: they follow a plan or their own wrists, in a team or alone, each with its own odometry.
 
 Per base, at the control rate:
 
@@ -6,8 +6,8 @@ Per base, at the control rate:
     u = H V                                                       wheel speeds, ``MecanumKinematics``
     torque = k_u (u - wheel speed) + k_i (integral of the same)    within the drive's limit
 
-Odometry integrates the twist that fits the wheels' angles best. It is all that a base knows: where wheels slip, it is
-off, and the base with it.
+Odometry integrates the twist that fits the measured wheel rotations best (least squares). A base has no other measure
+of its pose, so wheel slip causes errors of odometry and pose.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from mocobot_sim.trial.trajectories import RATE_HZ, PlanarMotion, moved, wrapped
 
 
 class WheelContacts:
-    """Contacts of rollers and floor, as MuJoCo solved them in its last step.
+    """Contacts between rollers and floor in the last step of MuJoCo.
 
-    Slip is taken along the roller's axle (as it lies on the floor while it carries the wheel with its middle): across
-    it, a roller that takes over from the last one slides for some milliseconds until it turns, which costs nothing.
-    While one hands over to the next, both touch: loads and friction forces add up, and the slip is their mean, weighed
-    by load.
+    Slip is measured along the horizontal axle of a roller that touches with its middle. Slip across the axle is
+    ignored: each roller slides that way for some milliseconds after touchdown, until it turns. During the transition
+    between two rollers both touch. Their loads and friction forces are summed, and the slip is their load-weighted
+    mean.
     """
 
     def __init__(
@@ -48,12 +48,12 @@ class WheelContacts:
     ) -> None:
         self._data, self._index = data, index
         sin, cos = np.sin(design.roller_angle_rad), np.cos(design.roller_angle_rad)
-        self._axle = np.stack([np.full(4, sin), HAND * cos, np.zeros(4)], axis=1)  # in the chassis
+        self._axle = np.stack([np.full(4, sin), HAND * cos, np.zeros(4)], axis=1)  # in the chassis frame
 
     def measure(self) -> tuple[Array, Array, Array]:
-        """Slip [m/s] of the contact on the floor, load [N] and friction [N] of every wheel, shapes (N, 4).
+        """Slip [m/s], normal force [N] and magnitude of the friction force [N] of every wheel, shapes (N, 4).
 
-        0 where a wheel is in the air; friction is the size of the force in the floor.
+        All are 0 for a wheel without contact.
         """
         data, robots = self._data, self._index.robots
         slip, load, grip = np.zeros(4 * robots), np.zeros(4 * robots), np.zeros((4 * robots, 3))
@@ -64,7 +64,7 @@ class WheelContacts:
             wheel = self._index.geom_wheel[geoms].max()
             if wheel < 0 or row < 0:
                 continue
-            # Elliptic cone: rows along the normal and two tangents, which are the frame's rows.
+            # With elliptic cones the rows are the normal and two tangents, which are the rows of ``frame``.
             tangents = frame.reshape(3, 3)[1:]
             force = data.efc_force[row]
             slip[wheel] += force * (axle[wheel] @ (data.efc_vel[row + 1 : row + 3] @ tangents))
@@ -75,22 +75,23 @@ class WheelContacts:
         return slip.reshape(shape), load.reshape(shape), np.linalg.norm(grip, axis=1).reshape(shape)
 
 
+# Default of the gain k on the pose error by odometry [1/s]. Chosen.
 POSITION_GAIN_PER_S = 2.0
 
 
 @dataclass(frozen=True)
 class DriveLog:
-    """What the bases did, one row per sample; N robots, wheels in the order of ``WHEELS``.
+    """Log of driving bases, one row per sample; N robots, wheels in the order of ``WHEELS``.
 
     Attributes:
         time: [s], shape (Q,).
-        planned: poses x, y [m], yaw [rad] in the world, shape (Q, N, 3).
-        odometry: poses that the bases believe, shape (Q, N, 3).
-        true: poses of the chassis, yaw not wrapped, shape (Q, N, 3).
-        commanded_speed: of the wheels [rad/s], shape (Q, N, 4).
-        speed: of the wheels [rad/s], shape (Q, N, 4).
-        torque: of the drives [N m], shape (Q, N, 4).
-        slip: velocity at which every wheel's contact slides along its roller's axle [m/s], shape (Q, N, 4).
+        planned: planned poses x, y [m], yaw [rad] in the world, shape (Q, N, 3).
+        odometry: poses by odometry, shape (Q, N, 3).
+        true: true poses of the chassis, yaw not wrapped, shape (Q, N, 3).
+        commanded_speed: commanded wheel speeds [rad/s], shape (Q, N, 4).
+        speed: wheel speeds [rad/s], shape (Q, N, 4).
+        torque: motor torques at the wheels [N m], shape (Q, N, 4).
+        slip: sliding velocity of every wheel's contact along the roller's axle [m/s], shape (Q, N, 4).
         load: normal force of every wheel [N], shape (Q, N, 4).
         grip: friction force of every wheel [N], shape (Q, N, 4).
     """
@@ -108,13 +109,13 @@ class DriveLog:
 
 
 class BaseDrive:
-    """Drives of all bases; an actor of a trial, or on its own by ``begin``, ``act`` and ``log``.
+    """Controller of all bases: an actor of a trial, or used alone through ``begin``, ``act`` and ``log``.
 
     Args:
         motion: plan of every base at the control rate; the last pose is held.
-        kinematics: what the bases believe about their wheels; None for the one with rollers.
-        design: of the bases; None for the shipped one.
-        position_gain_per_s: k [1/s].
+        kinematics: wheel kinematics that the controller uses; None for ``MecanumKinematics.with_rollers``.
+        design: design of the bases; None for the shipped one.
+        position_gain_per_s: gain k [1/s].
     """
 
     def __init__(
@@ -130,16 +131,19 @@ class BaseDrive:
         self._gain = position_gain_per_s
 
     def start(self, stage: Stage) -> None:
-        """Begin as an actor of a trial, as ``begin``."""
+        """Start as an actor of a trial; see ``begin``."""
         self.begin(stage.model, stage.data, stage.rate_hz, stage.ticks)
 
     def begin(self, model: mujoco.MjModel, data: mujoco.MjData, rate_hz: float, ticks: int) -> None:
-        """Take hold of the wheels of released bases that stand at the plan's first poses.
+        """Start to control released bases that stand at the first poses of the plan.
 
-        Control runs at ``rate_hz`` [Hz]; every ``ticks`` of it make a row of the log.
+        Args:
+            model, data: MuJoCo model and data.
+            rate_hz: control rate [Hz].
+            ticks: control ticks per row of the log.
 
         Raises:
-            InputError: a base is parked, or the plan is for another number of bases or another rate.
+            InputError: a base is parked, or the plan has another number of bases or another rate.
         """
         index = BaseIndex.of(model)
         motion, bases = self._motion, self._motion.pose.shape[1]
@@ -162,7 +166,7 @@ class BaseDrive:
         self._update = update_drives
 
     def act(self, tick: int) -> None:
-        """One control tick: read wheel angles and speeds, write torques."""
+        """Run one control tick: read wheel angles and speeds, write torques."""
         data, index = self._data, self._index
         pose, twist = self._planned(tick)
         self._update(
@@ -176,13 +180,13 @@ class BaseDrive:
             self._rows.append((*moved, *wheels))
 
     def _planned(self, tick: int) -> tuple[Array, Array]:
-        """Poses and twists of the plan, shapes (N, 3)."""
+        """Planned poses and twists at a tick, shapes (N, 3)."""
         if tick < len(self._pose):
             return self._pose[tick], self._twist[tick]
         return self._pose[-1], np.zeros_like(self._twist[-1])
 
     def log(self) -> DriveLog:
-        """What has happened since ``begin``."""
+        """Log since ``begin``."""
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
         columns[2][..., 2] = np.unwrap(columns[2][..., 2], axis=0)
         time = np.arange(len(self._rows)) * self._ticks / self._rate_hz
@@ -190,16 +194,16 @@ class BaseDrive:
 
 
 class FollowingDrive(BaseDrive):
-    """Drives of bases whose plan is made as they go: an actor of a trial.
+    """Controller of bases that follow their own wrists; an actor of a trial.
 
-    Every base reads its own arm: by how far the wrist has left the place over the base, and by how far the gimbal has
-    turned about z. It drives at a speed that would undo that in 1 / gain, within limits.
+    Each base measures, with its own joint sensors, how far the wrist and the gimbal's z axis have moved from their
+    initial values. It drives with a velocity proportional to this offset, within limits.
 
     Args:
-        mounts: where the robots stand at the beginning, N transforms.
-        as_built: sensor zeros of every unit; empty for robots as designed.
-        gain_per_s: g [1/s].
-        fastest: limits of turning [rad/s] and of each component of velocity [m/s].
+        mounts: initial floor mounts of the robots, N transforms.
+        as_built: sensor zeros of every robot; empty for robots as designed.
+        gain_per_s: velocity per offset [1/s].
+        fastest: limits of the angular velocity [rad/s] and of each velocity component [m/s].
         rate_hz: control rate [Hz].
     """
 
@@ -219,7 +223,7 @@ class FollowingDrive(BaseDrive):
         self._theta_zero = np.array([unit.theta_zero_rad[0] for unit in units])
 
     def start(self, stage: Stage) -> None:
-        """Begin; the wrists are where they shall stay over their bases."""
+        """Start; the current wrist positions become the reference."""
         super().start(stage)
         self._stage = stage
         self._goal = self._pose[0].copy()
@@ -227,7 +231,7 @@ class FollowingDrive(BaseDrive):
         self._home = self._offsets()
 
     def _offsets(self) -> Array:
-        """Gimbal's turn about z [rad] and wrist's x, y [m] in every {b}, as the sensors have them, shape (N, 3)."""
+        """Measured gimbal angle about z [rad] and wrist position x, y [m] in each {b}, shape (N, 3)."""
         design, index, qpos = omnid_design(), self._stage.index, self._stage.data.qpos
         phi = home_phi(design) + qpos[index.motor_qpos] + qpos[index.spring_qpos] + self._phi_zero
         turn = qpos[index.gimbal_qpos[:, 0]] + self._theta_zero
@@ -243,10 +247,10 @@ class FollowingDrive(BaseDrive):
 
 
 class Snapshots:
-    """Keeps ``qpos`` at given times: an actor of a trial that does nothing.
+    """Actor that records ``qpos`` at given times.
 
     Args:
-        times_s: when [s]; each is kept at the first control tick from then on.
+        times_s: times [s]; each snapshot is taken at the first control tick not before its time.
     """
 
     def __init__(self, times_s: Sequence[float]) -> None:
@@ -254,22 +258,26 @@ class Snapshots:
         self.qpos: list[Array] = []
 
     def start(self, stage: Stage) -> None:
-        """Begin in a trial."""
+        """Start as an actor of a trial."""
         self.begin(stage.data, stage.rate_hz)
 
     def begin(self, data: mujoco.MjData, rate_hz: float) -> None:
-        """The same without a trial."""
+        """Start without a trial."""
         self._data, self._rate_hz, self.qpos = data, rate_hz, []
 
     def act(self, tick: int) -> None:
-        """Look, and keep what is due."""
+        """Record ``qpos`` for every time that is due."""
         for time_s in self.times_s[len(self.qpos) :]:
             if tick >= time_s * self._rate_hz - 1e-6:
                 self.qpos.append(self._data.qpos.copy())
 
 
 def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
-    """One released Omnid at the world's origin, heading along x, its arm rigid; the shipped base if ``design`` is None.
+    """Build a scene with one released Omnid at the world's origin, heading along x, with a rigid arm.
+
+    Args:
+        design: design of the base; None for the shipped one.
+        timestep_s: integration step [s].
 
     Raises:
         InputError: the base cannot be built.
@@ -293,7 +301,7 @@ def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S)
 
 
 def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
-    """Compile what ``build_solo`` returned."""
+    """Compile the scene of ``build_solo``."""
     return compiled(root)
 
 
@@ -304,7 +312,14 @@ def drive_solo(
     rate_hz: float = 1000.0,
     snapshots: Snapshots | None = None,
 ) -> DriveLog:
-    """Let the robot of ``compile_solo`` follow its base's plan for some seconds, with snapshots on the way.
+    """Simulate the robot of ``compile_solo`` while its base follows a plan.
+
+    Args:
+        model: model of ``compile_solo``.
+        drive: controller of the base.
+        duration_s: duration [s].
+        rate_hz: control rate [Hz].
+        snapshots: records ``qpos`` during the run; None for no snapshots.
 
     Raises:
         InputError: the plan does not fit the model.

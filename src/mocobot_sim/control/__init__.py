@@ -1,1 +1,1 @@
-"""Impedance control over SEA torque loops."""
+"""Impedance control of the wrists with inner SEA torque loops."""

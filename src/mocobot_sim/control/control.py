@@ -1,14 +1,14 @@
-"""Wrist impedance control of one Omnid team, with the SEA torque loop inside, and whether it is stable.
+"""Wrist impedance control of a team with an inner SEA torque loop, and the stability of the closed loop.
 
-Each robot sees only its own joints, as read by its own sensors (calibration errors included), and the design
-geometry. Per robot, at the control rate:
+Each robot uses only the readings of its own joint sensors (with their calibration errors) and the design geometry. Per
+robot, at the control rate:
 
     F     = K (ref - h) + D (ref_dot - h_dot) + F_ff               wrist force, in {b}
     tau_d = (dh/dphi)^T F + tau_gravity(phi)                        desired spring torque
     u     = tau_d + k_p (tau_d - tau) - k_d tau_dot                 motor torque
 
-F_ff takes the static load up from the measured wrist force during the first seconds and is then frozen: the
-controller never knows the payload.
+h is the wrist position by forward kinematics. F_ff follows the measured wrist force during the first seconds (load
+take-up) and is then constant, so the controller needs no model of the payload.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 TAKE_UP_TICKS = 15
-"""Place among the controller's constants that is set when a load is given."""
+"""Index of the number of take-up ticks among the constants of the controller."""
 
 
 RANGES = {
@@ -43,23 +43,23 @@ RANGES = {
     "torque_gain": (0.0, 1e3), "torque_rate_gain_s": (0.0, 10.0), "rate_filter_s": (0.0, 10.0),
     "take_up_s": (0.0, 3600.0), "take_up_time_constant_s": (1e-6, 3600.0), "motor_torque_limit_Nm": (1e-3, 1e5),
 }  # fmt: skip
-"""Ranges of gains; ``control_stability`` says whether a team is stable with them."""
+"""Allowed ranges of the gains. Chosen wide; ``control_stability`` tests whether a team is stable with them."""
 
 
 @dataclass(frozen=True)
 class ControlGains:
-    """Gains of the wrist impedance and of the SEA torque loop, each within its ``RANGES``.
+    """Gains of the wrist impedance and of the SEA torque loop, each within its range in ``RANGES``.
 
     Attributes:
         rate_hz: control rate [Hz].
-        stiffness_N_per_m: K, isotropic.
-        damping_Ns_per_m: D, isotropic.
+        stiffness_N_per_m: isotropic stiffness K [N/m].
+        damping_Ns_per_m: isotropic damping D [N s/m].
         torque_gain: k_p [-].
         torque_rate_gain_s: k_d [s].
         rate_filter_s: time constant of the first-order filter on differenced phi and tau [s].
-        take_up_s: how long F_ff follows the measured wrist force [s].
-        take_up_time_constant_s: with which time constant it follows [s].
-        motor_torque_limit_Nm: saturation of u [N m].
+        take_up_s: duration of the load take-up, in which F_ff follows the measured wrist force [s].
+        take_up_time_constant_s: time constant of the load take-up [s].
+        motor_torque_limit_Nm: saturation limit of u [N m].
     """
 
     rate_hz: float = 1000.0
@@ -73,7 +73,11 @@ class ControlGains:
     motor_torque_limit_Nm: float = 40.0
 
     def __post_init__(self) -> None:
-        """Refuse a gain that is no number, or out of its range, with an ``InputError``."""
+        """Check every gain.
+
+        Raises:
+            InputError: a gain is not a number or is out of range.
+        """
         for name, (low, high) in RANGES.items():
             value = getattr(self, name)
             if not is_number(value) or not low <= value <= high:
@@ -82,38 +86,38 @@ class ControlGains:
                 )
 
     def to_dict(self) -> dict[str, float]:
-        """Plain numbers, keyed as documented for a recording's ``control``."""
+        """Convert to plain numbers with the keys of ``control`` in a recording's metadata."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ControlGains:
-        """Read the gains out of a recording's ``control`` (other keys there are left alone).
+        """Read the gains from ``control`` in a recording's metadata; other keys are ignored.
 
         Raises:
-            InputError: a gain is missing, no number or out of its range.
+            InputError: a gain is missing, not a number or out of range.
         """
         gains: dict[str, Any] = {entry.name: values.get(entry.name) for entry in fields(cls)}
         return cls(**{name: float(value) if is_number(value) else value for name, value in gains.items()})
 
 
 class TeamController:
-    """Controller of all robots; holds their filter states and feed-forward forces.
+    """Controllers of all robots, with their filter states and feed-forward forces.
 
     Args:
         index: addresses in the model.
-        design: geometry and masses that the robots believe in.
+        design: nominal geometry and masses that the controllers use.
         gains: control gains.
         data: MuJoCo data of the trial; the controller reads ``qpos`` and writes ``ctrl`` in place.
-        as_built: sensor zeros of every unit; empty for robots as designed.
-        sensors: timing faults; only the torque's lag reaches the controller.
-        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
-        commands: wrist positions [m] and their rates [m/s] in every robot's {b} of one tick per row, shape
-            (T, 2, N, 3), for ``tick``; None where ``update`` is given them.
-        sensed: filled with what the sensors see, (phi, theta, torque) of one tick per row, shape (T, N, 3, 3).
-        qpos: what the sensors see in place of ``data.qpos``, kept up to date by whoever gives it; shape (nq,).
+        as_built: sensor zeros of every robot; empty for robots as designed.
+        sensors: timing faults; only the lag of the torque sensors affects the controller.
+        feed_forward: constant F_ff of every robot in its {b} [N], shape (N, 3); None for load take-up.
+        commands: wrist positions [m] and velocities [m/s] in every robot's {b}, one row per tick, shape
+            (T, 2, N, 3); None if they are passed to ``update``.
+        sensed: output array for the sensor signals phi, theta and torque, one row per tick, shape (T, N, 3, 3).
+        qpos: positions as the sensors see them, instead of ``data.qpos``, shape (nq,); the caller updates the array.
 
     Attributes:
-        state: what the controllers remember, shape (N, 7, 3), to be changed in place.
+        state: state of the controllers, shape (N, 7, 3), changed in place.
 
     Raises:
         InputError: ``as_built`` or ``feed_forward`` does not match the number of robots.
@@ -134,24 +138,24 @@ class TeamController:
     ) -> None:
         units = units_of(as_built, index.robots)
         phi_zero = np.array([unit.phi_zero_rad for unit in units])
-        # (N, 4, leg or gimbal axis)
+        # addresses of motors, springs, actuators and gimbals, shape (N, 4, 3)
         address = np.stack([index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1)
         lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
         filters = np.array([lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
-        # zeros of phi and of tau, and the lag's filter
+        # zeros of phi and tau, and the coefficients of the lag filter
         own = np.stack([home_phi(design) + phi_zero, [unit.tau_zero_Nm for unit in units], filters], axis=1)
         constants = (
             design.base_radius_m - design.platform_radius_m,
             design.proximal_length_m,
             design.rod_length_m,
             design.sea_stiffness_Nm_per_rad,
-            # gravity torque per cos(phi) of a driven link that carries half its rod at the knee [N m]
+            # gravity torque over cos(phi) of a driven link with half the rod's mass at the knee [N m]
             design.gravity_mps2
             * (
                 design.proximal_mass_kg * design.proximal_com_m
                 + 0.5 * design.rod_mass_kg * design.proximal_length_m
             ),
-            # weight that hangs at the wrist [N]
+            # weight at the wrist: platform, gimbal and half of each rod [N]
             design.gravity_mps2 * (design.wrist_mass_kg + 1.5 * design.rod_mass_kg),
             gains.stiffness_N_per_m,
             gains.damping_Ns_per_m,
@@ -162,11 +166,11 @@ class TeamController:
             1.0 / (gains.take_up_time_constant_s * gains.rate_hz),
             gains.motor_torque_limit_Nm,
             home_phi(design),
-            # ticks that take the load up
+            # ticks of the load take-up
             round(gains.take_up_s * gains.rate_hz) if feed_forward is None else 0,
         )
         self._constants = np.array(constants)
-        # phi, tau, their filtered rates, F_ff, torque before and after the sensor's lag
+        # phi, tau, their filtered rates, F_ff, torque before and after the lag of the sensor
         self.state = np.zeros((index.robots, 7, 3))
         if feed_forward is not None:
             if np.shape(feed_forward) != (index.robots, 3) or not np.isfinite(feed_forward).all():
@@ -189,27 +193,27 @@ class TeamController:
 
     @feed_forward.setter
     def feed_forward(self, force: Array) -> None:
-        """Set F_ff, and take up no load from now on."""
+        """Set F_ff and end the load take-up."""
         self.state[:, 4] = force
         self._constants[TAKE_UP_TICKS] = 0
 
     def update(self, ref: Array, ref_dot: Array) -> None:
-        """One control tick by commands [m] and their rates [m/s] in every robot's {b}, shapes (N, 3)."""
+        """Run one control tick with given wrist positions [m] and velocities [m/s] in each {b}, shapes (N, 3)."""
         self._commands[self._tick % len(self._commands)] = ref, ref_dot
         self.tick()
 
     def tick(self) -> None:
-        """One control tick by the commands that are there: read ``qpos``, write ``ctrl``."""
+        """Run one control tick with the stored commands: read ``qpos``, write ``ctrl``."""
         self._update(*self._arrays, self._tick)
         self._tick += 1
 
 
 def home_phi(design: OmnidDesign) -> float:
-    """Driven angle of every leg at the home height [rad]: where ``qpos`` = 0 in the MJCF."""
+    """Driven angle of every leg at the home height [rad], which is ``qpos`` = 0 in the MJCF."""
     reach = design.base_radius_m - design.platform_radius_m
     height = design.home_height_m
     distance = np.hypot(reach, height)
-    # Triangle axis - knee - platform joint; the knee is outside the line from axis to platform joint.
+    # Triangle of motor axis, knee and platform joint; the knee lies on its outer side.
     cosine = (design.proximal_length_m**2 + distance**2 - design.rod_length_m**2) / (
         2.0 * design.proximal_length_m * distance
     )
@@ -217,9 +221,10 @@ def home_phi(design: OmnidDesign) -> float:
 
 
 def lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, float]:
-    """Coefficients of y = a y + b_old x_old + b_new x_new, exact for inputs that are straight between ticks.
+    """Coefficients (a, b_old, b_new) of a first-order lag y = a y + b_old x_old + b_new x_new.
 
-    Without a lag y = x, and all are zero.
+    They are exact for an input that is linear between ticks. With a time constant of zero all are zero, which means
+    no lag (y = x).
     """
     if not time_constant_s:
         return 0.0, 0.0, 0.0
@@ -228,27 +233,28 @@ def lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, f
     return a, held - a, 1.0 - held
 
 
-STEP = 1e-6  # of all differences, in SI units
-HARDLY_DAMPED = 0.02  # damping ratio: a swing is amplified 25 times in resonance
-AT_REST_PER_S = 0.05  # slower modes are none: what nothing holds in place, such as a gimbal without load
+STEP = 1e-6  # step of all finite differences, in SI units; chosen
+HARDLY_DAMPED = 0.02  # damping ratio below which a warning is given; chosen: resonance amplifies 25 times
+# Slower modes are ignored [1/s]. Chosen: nothing holds them, such as a gimbal without load.
+AT_REST_PER_S = 0.05
 
 
 @dataclass(frozen=True)
 class Stability:
     """The least damped mode of the closed loop."""
 
-    damping_ratio: float  # minus growth over undamped angular frequency; below 0 the control is unstable
-    frequency_Hz: float  # how fast it swings
-    growth_per_s: float  # how fast it grows; below 0 if it decays
+    damping_ratio: float  # minus growth rate over undamped angular frequency; below 0 the control is unstable
+    frequency_Hz: float  # frequency of the oscillation
+    growth_per_s: float  # growth rate; below 0 if the mode decays
 
     @property
     def stable(self) -> bool:
-        """Whether every swing decays."""
+        """Whether every mode decays."""
         return self.growth_per_s < 0
 
     @property
     def warning(self) -> str | None:
-        """What is wrong with it in a sentence, if anything."""
+        """A sentence about unstable or weakly damped control; None if the control is well damped."""
         swing = f"a swing of {self.frequency_Hz:.2g} Hz"
         if not self.stable:
             return (
@@ -259,17 +265,23 @@ class Stability:
         return hardly if self.damping_ratio < HARDLY_DAMPED else None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able form."""
+        """Convert to JSON values."""
         return {"stable": self.stable, **asdict(self)}
 
 
 def control_stability(
     scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, gains: ControlGains, ref_b: Array
 ) -> Stability:
-    """Judge the control of a team with parked bases, at rest as ``data`` is, wrists commanded to ``ref_b`` (N, 3).
+    """Compute the least damped mode of the closed loop of a team with parked bases.
 
-    MuJoCo linearises the physics, central differences linearise the controllers; the load is taken up. Left out are dry
-    friction, which stops small swings but no large ones, and actors and sensors that misread.
+    MuJoCo linearises the physics and central differences linearise the controllers, after the load take-up. The
+    linearisation ignores dry friction, which damps only small oscillations, and all actors and readers.
+
+    Args:
+        scene: the team.
+        model, data: its compiled model, and data at the equilibrium.
+        gains: control gains.
+        ref_b: commanded wrist positions in each {b} [m], shape (N, 3).
     """
     import mujoco
 
@@ -290,7 +302,7 @@ def control_stability(
         index, omnid_design(), gains, rest, scene.units, scene.sensors, commands=still
     )
     answer = _linear(controller, rest, np.concatenate([index.motor_qpos.ravel(), index.spring_qpos.ravel()]))
-    # The whole state: physics, then controllers, which read driven angles and springs.
+    # Full state: physics, then controllers. The controllers read motor and spring coordinates.
     read = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
     read = np.concatenate([read, size + np.arange(controller.state.size)])
     loop = np.zeros((size + controller.state.size,) * 2)
@@ -306,7 +318,7 @@ def control_stability(
 
 
 def _linear(controller: TeamController, rest: mujoco.MjData, read: Index) -> Array:
-    """Slopes of (``ctrl``, next state) by (positions ``read``, state) of controllers at rest, the load taken up."""
+    """Jacobian of (``ctrl``, next state) of the controllers with respect to (positions ``read``, state), at rest."""
     controller.tick()
     controller.feed_forward = controller.feed_forward
     controller.tick()

@@ -1,4 +1,4 @@
-"""Physical effects that can be hidden in a simulated team, by subject; ``catalogue`` lists them."""
+"""Physical effects that can be added to a simulated team; ``catalogue`` lists them."""
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import (

@@ -1,7 +1,6 @@
-"""What all effects have in common: checked numbers, a place, and how they enter a scene.
+"""Base class of all effects: checked parameters, a place, and how an effect enters a scene.
 
-What an effect is, takes and allows is known without MuJoCo: it edits the scene that it is given, and loads nothing of
-what made it. So a wrong number is refused at once.
+This module does not load MuJoCo, so that parameters can be checked quickly.
 """
 
 from __future__ import annotations
@@ -25,16 +24,18 @@ if TYPE_CHECKING:
 PLACE = ("robot", "joint")
 JOINTS = 3
 WHOLE = {"robot": 1, "joint": 1, "trial": 1, "last_trial": 0}
-"""Whole numbers, and the least that each may be."""
+"""Parameters that are whole numbers, each with its smallest allowed value."""
 
+# Solver tolerances: MuJoCo's default, and that for scenes with dry friction, limits or soft rows. Chosen.
 _DEFAULT_TOLERANCE, _WITH_KINKS = 1e-8, 1e-12
 
 
 def precise(scene: TeamScene, tolerance: float = _WITH_KINKS) -> None:
-    """Let the constraint solver of a scene stop later.
+    """Tighten the tolerance of the constraint solver of a scene.
 
-    By default it stops at 1e-8 of a cost that scales with the mean inertia. Sliding and sticking, limits and soft rows
-    then end steps early now and then, and rods open by tens of micrometres; with 1e-12 by less than one.
+    The solver stops when its improvement, scaled by the mean inertia, is below the tolerance. With dry friction, limits
+    or soft rows, MuJoCo's default of 1e-8 sometimes stops too early. Rods then open by tens of micrometres; with 1e-12
+    they open by less than one.
     """
     option = scene.root.option
     option.tolerance = min(_DEFAULT_TOLERANCE if option.tolerance is None else option.tolerance, tolerance)
@@ -42,17 +43,18 @@ def precise(scene: TeamScene, tolerance: float = _WITH_KINKS) -> None:
 
 @dataclass(frozen=True)
 class Effect:
-    """One cause at one place; the fields besides ``robot`` and ``joint`` are its parameters.
+    """One cause at one place; all fields except ``robot`` and ``joint`` are its parameters.
 
     Attributes:
-        cause: name of the cause: that of the class, in lower case with underscores.
-        ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
-        inherent: parameters that below so much are not what the simulation has: its bodies' masses decide then.
-        texts: parameters that are names, not numbers.
-        repeats: whether one place takes several.
-        on_payload: whether it needs a payload, or a grasp of one.
-        as_built: parameters that add to an attribute of the joint's ``AsBuilt``.
-        sensors: parameters that add to an attribute of the robot's ``SensorEffects``.
+        cause: name of the cause: the class name in lower case with underscores.
+        ranges: allowed range (low, high) by parameter, both ends included; other parameters may be any finite number.
+        inherent: smallest value by parameter that the simulation reproduces; below it the masses of the simulated
+            bodies determine the behaviour.
+        texts: parameters that are names instead of numbers.
+        repeats: whether several of these effects may act at one place.
+        on_payload: whether the effect needs a payload.
+        as_built: attribute of the robot's ``AsBuilt`` to which each parameter is added, at the effect's joint.
+        sensors: attribute of ``SensorEffects`` to which each parameter is added, for the effect's robot.
     """
 
     cause: ClassVar[str]
@@ -71,7 +73,7 @@ class Effect:
         """Check every number.
 
         Raises:
-            InputError: a value is not a number or out of its range.
+            InputError: a value is not a number or is out of range.
         """
         for entry in fields(self):
             value = getattr(self, entry.name)
@@ -95,21 +97,21 @@ class Effect:
 
     @classmethod
     def place_names(cls) -> tuple[str, ...]:
-        """``robot`` and ``joint``, as far as this cause has them."""
+        """Which of the fields ``robot`` and ``joint`` this cause has."""
         return tuple(entry.name for entry in fields(cls) if entry.name in PLACE)
 
     @classmethod
     def parameter_names(cls) -> tuple[str, ...]:
-        """Names of the parameters, units in their suffixes."""
+        """Names of the parameters; suffixes give their units."""
         return tuple(entry.name for entry in fields(cls) if entry.name not in PLACE)
 
     def apply(self, scene: TeamScene) -> TeamScene:
-        """Put the effect into a scene and return it; the scene's PyMJCF tree is edited in place.
+        """Return the scene with this effect added; the scene's PyMJCF tree is edited in place.
 
-        Soft rows are not set: ``TeamScene.tuned`` does that for the inertias that all effects leave.
+        Call ``TeamScene.tuned`` after the last effect: the parameters of soft rows depend on the final inertias.
 
         Raises:
-            InputError: the scene has no such robot, or cannot be edited.
+            InputError: the scene has no such robot or no payload, or cannot be edited.
         """
         if scene.root is None:
             raise InputError(f"{self.cause}: a scene read from an extended model takes no further effects")
@@ -121,7 +123,7 @@ class Effect:
         return self._edit(self._recorded(scene, robot))
 
     def _recorded(self, scene: TeamScene, robot: int) -> TeamScene:
-        """The scene with what ``as_built`` and ``sensors`` name; the MJCF does not change."""
+        """Return the scene with the parameters listed in ``as_built`` and ``sensors`` added to its records."""
         sensors, unit = scene.sensors, scene.units[robot - 1]
         for parameter, name in self.sensors.items():
             sensors = sensors.added(name, robot, getattr(self, parameter), scene.robots)
@@ -133,21 +135,21 @@ class Effect:
         return replace(scene, sensors=sensors, units=units)
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        """Edit the MJCF."""
+        """Edit the MJCF; overridden by effects that change it."""
         return scene
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
-        """Who acts in a trial, new ones for each: what MJCF cannot express. Trials count from 1; None is any."""
+        """Make the actors of one trial, for effects that MJCF cannot express; trials count from 1, None means any."""
         return ()
 
     def readers(self, trial_number: int | None) -> Sequence[Reader]:
-        """Sensors that misread in a trial, new ones for each."""
+        """Make the readers of one trial, which change the readings of sensors; trials count from 1, None means any."""
         return ()
 
     def carried(self) -> Array:
-        """Inertial parameters (m, m c, J about {1}) that it adds to the payload's in an estimate, shape (10,)."""
+        """Inertial parameters (m, m c, J about {1}) that the effect adds to an estimate of the payload, shape (10,)."""
         return np.zeros(10)
 
     def base_shift(self) -> Array:
-        """By how much it moves the origin of its robot's {b}, in the axes of {b} without it [m], shape (3,)."""
+        """Displacement of the robot's {b} due to the effect, in the axes of the undisplaced {b} [m], shape (3,)."""
         return np.zeros(3)

@@ -1,4 +1,4 @@
-"""All effects by name; effects as plain data, and as one word of a command line."""
+"""The catalogue of all effects: make them by name, convert them to plain data, parse them from a command line."""
 
 from __future__ import annotations
 
@@ -24,18 +24,21 @@ _KINDS: dict[str, type[Effect]] = {
     if isinstance(kind, type) and issubclass(kind, Effect) and kind is not Effect
 }
 EFFECTS: dict[str, type[Effect]] = {name: _KINDS[name] for name in NAMES}
-"""Every effect's class by the name of its cause, which the class gives: ``SeaBias`` is ``sea_bias``."""
+"""Class of each effect by the name of its cause: ``sea_bias`` is ``SeaBias``."""
 
 
 def make_effect(
     cause: str, parameters: Mapping[str, Any], robot: int | None = None, joint: int | None = None
 ) -> Effect:
-    """Make an effect from its cause, a key of ``EFFECTS``, its parameters by name, and its place where it has one.
+    """Make an effect from the name of its cause, its parameters and its place.
 
-    Robots and joints count from 1 (legs 1, 2, 3; gimbal z, y, x).
+    Args:
+        cause: a key of ``EFFECTS``.
+        parameters: values by name; suffixes give the units.
+        robot, joint: place, counted from 1 (legs 1, 2, 3; gimbal axes z, y, x); None where the cause has no such place.
 
     Raises:
-        InputError: no such cause, a parameter or place that is unknown, missing or out of its range.
+        InputError: the cause is unknown, or a parameter or place is unknown, missing or out of range.
     """
     if cause not in EFFECTS:
         raise InputError(f"cause {cause!r} does not exist; the causes are {', '.join(EFFECTS)}")
@@ -61,12 +64,12 @@ def make_effect(
 
 
 def _default(entry: Any) -> float | str | None:
-    """What a field of an effect is if it is left out; None where it must be given."""
+    """Default value of a field of an effect; None if the field has none."""
     return entry.default if isinstance(entry.default, int | float | str) else None
 
 
 def effect_to_dict(effect: Effect) -> dict[str, Any]:
-    """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
+    """Convert an effect to JSON values: ``cause``, ``robot`` and ``joint`` where it has them, ``parameters``."""
     parameters = {name: getattr(effect, name) for name in effect.parameter_names()}
     return {"cause": effect.cause, **_place(effect), "parameters": parameters}
 
@@ -76,10 +79,10 @@ def _place(effect: Effect) -> dict[str, int]:
 
 
 def effect_from_dict(values: Mapping[str, Any]) -> Effect:
-    """The reverse of ``effect_to_dict``.
+    """Make an effect from the output of ``effect_to_dict``.
 
     Raises:
-        InputError: a key is unknown or missing, or its value is not allowed.
+        InputError: a key is unknown or missing, or a value is not allowed.
     """
     Fields(values, ("cause", "parameters"), "effect", PLACE)
     if not isinstance(values["cause"], str) or not isinstance(values["parameters"], Mapping):
@@ -88,10 +91,10 @@ def effect_from_dict(values: Mapping[str, Any]) -> Effect:
 
 
 def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
-    """Put effects into a freshly built scene (its PyMJCF tree is edited in place) and return it.
+    """Return a newly built scene with effects added; its PyMJCF tree is edited in place.
 
     Raises:
-        InputError: a place does not exist, or has the same cause twice (pushes may repeat).
+        InputError: a place does not exist, or has the same cause twice (only pushes and laws may repeat).
     """
     places = [(effect.cause, _place(effect)) for effect in scene.effects]
     for effect in effects:
@@ -103,7 +106,7 @@ def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
             )
         places.append(place)
         scene = effect.apply(scene)
-    # Once for all of them: it compiles the model.
+    # ``tuned`` compiles the model, so call it once for all effects.
     return replace(scene, effects=(*scene.effects, *effects)).tuned()
 
 
@@ -126,23 +129,23 @@ UNITS = {
     "m2": "m^2",
     "s": "s",
 }
-"""Units as they end the names of parameters, and as people write them."""
+"""Unit in readable form by the suffix of a parameter's name."""
 EXAMPLE = "joint_friction:robot=2,joint=1,coulomb=0.05"
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """One number of an effect."""
+    """Description of one field of an effect."""
 
-    name: str  # of the field
-    short: str  # the same without its unit, which will do
-    unit: str  # of the value; empty for whole numbers and ratios
-    range: str  # what it may be
-    default: float | str | None  # where it may be left out; None where it must be given
+    name: str  # name of the field
+    short: str  # name without its unit, also accepted on the command line
+    unit: str  # unit of the value; empty for whole numbers and ratios
+    range: str  # allowed values, in words
+    default: float | str | None  # default value; None if the field is required
 
 
 def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:
-    """The numbers of an effect, its place first."""
+    """Describe all fields of an effect, place first."""
     return tuple(
         Allowed(entry.name, *_without_unit(entry.name), _range(kind, entry.name), _default(entry))
         for entry in fields(kind)
@@ -150,17 +153,17 @@ def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:
 
 
 def paragraphs(kind: type[Effect]) -> list[str]:
-    """What an effect is and how it acts: its own documentation, the first paragraph in a nutshell."""
+    """Paragraphs of the documentation of an effect, each on one line; the first is a summary."""
     return [" ".join(part.replace("``", "").split()) for part in (kind.__doc__ or "").split("\n\n")]
 
 
 def parse_effect(text: str) -> Effect:
-    """An effect of its name and numbers: ``joint_friction:robot=2,joint=1,coulomb=0.05``.
+    """Parse an effect from text such as ``joint_friction:robot=2,joint=1,coulomb=0.05``.
 
-    Parameters may be named with their unit or without; values are in it.
+    Names of parameters may omit the unit; values are always in that unit.
 
     Raises:
-        InputError: no such effect, or a number that is unknown, missing, no number, or out of its range.
+        InputError: the effect is unknown, or a parameter is unknown, missing, not a number or out of range.
     """
     cause, colon, rest = text.partition(":")
     check_effect_name(cause)
@@ -210,7 +213,7 @@ def _range(kind: type[Effect], name: str) -> str:
 
 
 def _without_unit(name: str) -> tuple[str, str]:
-    """Name and unit of a parameter; the longest unit that ends the name is meant."""
+    """Split a parameter's name into stem and readable unit; the longest suffix in ``UNITS`` wins."""
     for suffix in sorted(UNITS, key=len, reverse=True):
         if name.endswith(f"_{suffix}"):
             return name.removesuffix(f"_{suffix}"), UNITS[suffix]

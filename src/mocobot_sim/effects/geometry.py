@@ -1,6 +1,6 @@
-"""Links, bases and grasps that are not where the design has them, or give way.
+"""Effects on geometry: links, bases and grasps that deviate from the design, move or yield.
 
-What gives way is slides or hinges, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``).
+Compliance is implemented as slides or hinges held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``).
 """
 
 from __future__ import annotations
@@ -24,27 +24,28 @@ if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
 
 AXES = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
-# Taken from the flange, so that the gimbal's mass and inertia stay what they are.
+# Mass and inertia of the pad of a grasp. They are subtracted from the flange, so that the gimbal's totals stay.
 PAD_MASS_KG = 0.03
 PAD_INERTIA_KGM2 = 2e-5
-# Inertia of the slides' own, tiny, motion. A weld on a lighter pad would be softer (MuJoCo's constraints are as stiff
-# as the bodies are heavy) and add to the compliance; and two slides along one axis would make the mass matrix singular.
+# Armatures of the slides and hinges. The stiffness of MuJoCo's constraints scales with inertia, so the weld of a
+# lighter pad would add compliance. Without armature, two slides along one axis make the mass matrix singular.
 SPRUNG_ARMATURE_KG = 1.0
 LOOSE_ARMATURE_KG = 0.1
 HINGE_ARMATURE_KGM2 = 0.01
-# A creeping slide is so heavy that the arm's forces move it by less than 1e-9 m/s, and at its velocity within 10 ms.
+# Armature and damping of slides with a prescribed motion. Chosen: forces of the arm change their velocity by less than
+# 1e-9 m/s, and they reach their velocity within 10 ms.
 ARMATURE_KG = 1e9
 DAMPING_NS_PER_M = 1e11
-# That armature raises the mean inertia, which the solver's stopping rule scales with, by eight orders.
+# Solver tolerance with such slides: the stopping rule scales with the mean inertia, which they raise by a factor 1e8.
 TOLERANCE = 1e-20
 LARGEST_FORCE_N = 400.0
-"""More than any grasp carries."""
+"""Upper bound on the force at a grasp [N]. Chosen."""
 IMPACT = [0.002, 1.0]
-"""``solref`` of a loose grasp: stiffer than a weld, so that an impact goes less deep; the shortest at 1 ms."""
+"""``solref`` of the limits of a loose grasp. It has the shortest time constant possible with steps of 1 ms."""
 
 
 def add_slides(body: Any, kind: str, axes: str, **attributes: Any) -> list[Any]:
-    """Add slide joints ``{kind}_{axis}`` along a body's own axes."""
+    """Add slide joints named ``{kind}_{axis}`` along the body's own axes."""
     return [
         body.add("joint", name=f"{kind}_{axis}", type="slide", axis=AXES[axis], group=3, **attributes)
         for axis in axes
@@ -54,7 +55,7 @@ def add_slides(body: Any, kind: str, axes: str, **attributes: Any) -> list[Any]:
 def add_springs(
     scene: TeamScene, joints: list[Any], label: str, compliance_m_per_N: float, relaxation_s: float
 ) -> TeamScene:
-    """Hold slides at zero by springs, as soft equality rows named ``{label}_{joint}``; arguments as of ``SoftRow``."""
+    """Hold joints at zero by springs, as soft equality rows named ``{label}_{joint}``; see ``SoftRow``."""
     for joint in joints:
         name = f"{label}_{joint.name}"
         scene.root.equality.add("joint", name=name, joint1=joint)
@@ -63,10 +64,10 @@ def add_springs(
 
 
 def grasp_body(scene: TeamScene, robot: int) -> Any:
-    """The body whose slides lie between one robot's flange and the payload.
+    """The body that takes the slides between one robot's flange and the payload.
 
-    Robot 1's flange has the payload as its child: the payload itself. The others' welds are moved from the flange to a
-    light pad on it.
+    For robot 1 it is the payload, a child of the flange. For every other robot it is a light pad on the flange, added
+    here, to which the weld of the grasp moves.
     """
     if robot == 1:
         return scene.root.find("body", "omnid1/payload/payload")
@@ -85,7 +86,7 @@ def grasp_body(scene: TeamScene, robot: int) -> Any:
 
 
 def widened(scene: TeamScene, robot: int, slack_m: float, slack_rad: float = 0.0) -> TeamScene:
-    """A scene whose trials allow one grasp to open, and to turn, further."""
+    """Return the scene with a larger allowed gap and angle at one grasp."""
     wider: dict[str, Any] = {}
     for name, slack in (("grasp_slack_m", slack_m), ("grasp_slack_rad", slack_rad)):
         if slack:
@@ -96,7 +97,7 @@ def widened(scene: TeamScene, robot: int, slack_m: float, slack_rad: float = 0.0
 
 
 def base_slides(scene: TeamScene, robot: int, kind: str, **attributes: Any) -> list[Any]:
-    """Horizontal slides under one robot's chassis, along x and y of its {b} without any tilt."""
+    """Add horizontal slides under one robot's chassis, along x and y of its {b} without base tilt."""
     chassis = scene.root.find("body", f"omnid{robot}/chassis")
     slides = add_slides(chassis, kind, "xy", **attributes)
     level_slides(chassis)
@@ -104,7 +105,7 @@ def base_slides(scene: TeamScene, robot: int, kind: str, **attributes: Any) -> l
 
 
 def level_slides(chassis: Any) -> None:
-    """Turn the slides under a chassis so that they stay horizontal when it is tilted."""
+    """Turn the slides under a tilted chassis back to horizontal."""
     if chassis.quat is not None:
         from scipy.spatial.transform import Rotation
 
@@ -114,7 +115,7 @@ def level_slides(chassis: Any) -> None:
 
 
 def robot_mass_kg(scene: TeamScene, robot: int) -> float:
-    """Mass of one robot, without payload."""
+    """Mass of one robot without the payload [kg]."""
     chassis = scene.root.find("body", f"omnid{robot}/chassis")
     bodies = [chassis, *chassis.find_all("body")]
     own = (body.inertial for body in bodies if "payload" not in body.full_identifier)
@@ -123,7 +124,10 @@ def robot_mass_kg(scene: TeamScene, robot: int) -> float:
 
 @dataclass(frozen=True)
 class LinkLength(Effect):
-    """One leg's proximal length, rod length and base radius, true minus design [m]: body and site positions."""
+    """Deviation of one leg's proximal length, rod length and base radius, true minus design [m].
+
+    Implemented by moving bodies and sites.
+    """
 
     as_built: ClassVar = {
         "proximal_m": "proximal_length_m", "rod_m": "rod_length_m", "base_radius_m": "base_radius_m"
@@ -144,9 +148,9 @@ class LinkLength(Effect):
 
 @dataclass(frozen=True)
 class BaseTilt(Effect):
-    """A base turned by the rotation vector (roll, pitch, 0), in its own untilted axes, about its floor mount [rad].
+    """A base tilted about its floor mount by the rotation vector (roll, pitch, 0) in its untilted axes [rad].
 
-    The chassis body's ``quat``.
+    Implemented as the ``quat`` of the chassis body.
     """
 
     ranges: ClassVar = {"roll_rad": (-0.2, 0.2), "pitch_rad": (-0.2, 0.2)}
@@ -156,13 +160,13 @@ class BaseTilt(Effect):
 
     @property
     def tilt(self) -> Rotation:
-        """From the level axes to the tilted ones."""
+        """Orientation of the tilted axes in the untilted ones."""
         from scipy.spatial.transform import Rotation
 
         return Rotation.from_rotvec([self.roll_rad, self.pitch_rad, 0.0])
 
     def base_shift(self) -> Array:
-        """It turns about the mount, below {b}."""
+        """Displacement of {b}, which lies above the floor mount, the centre of the tilt [m], shape (3,)."""
         height = np.array([0.0, 0.0, base_height_m()])
         return np.asarray(self.tilt.apply(height) - height)
 
@@ -177,9 +181,9 @@ class BaseTilt(Effect):
 class BaseCreep(Effect):
     """A base that moves at a constant velocity from ``start_s`` on, along x and y of its {b} [m/s].
 
-    Two slides under the chassis with an immense ``armature`` and ``damping``, each pulled by a spring of 1 N/m whose
-    ``springref`` is so far away that its force is constant: damping times the velocity. MJCF has no time: a base that
-    starts later is pulled by the trial (``qfrc_applied``).
+    Implemented as two slides under the chassis with very large ``armature`` and ``damping``. A spring of 1 N/m with a
+    distant ``springref`` pulls each slide with a constant force, damping times velocity. MJCF has no time, so if
+    ``start_s`` is above zero, the trial applies the force instead (``qfrc_applied``).
     """
 
     ranges: ClassVar = {"x_mps": (-1e-3, 1e-3), "y_mps": (-1e-3, 1e-3), "start_s": (0.0, 1e9)}
@@ -189,7 +193,7 @@ class BaseCreep(Effect):
     start_s: float = 0.0
 
     def actors(self, trial_number: int | None) -> Sequence[_LateCreep]:
-        """What pulls it in a trial, if it starts later."""
+        """The actor that pulls the base, if the motion starts after the trial."""
         return [_LateCreep(self)] if self.start_s else []
 
     def _edit(self, scene: TeamScene) -> TeamScene:
@@ -204,7 +208,7 @@ class BaseCreep(Effect):
 
 
 class _LateCreep:
-    """Pulls the slides as strongly as their damping asks for, from a time on."""
+    """Actor that moves the slides of a creeping base at their velocity from a time on."""
 
     def __init__(self, creep: BaseCreep) -> None:
         self._creep = creep
@@ -222,11 +226,12 @@ class _LateCreep:
 
 @dataclass(frozen=True)
 class BaseCompliance(Effect):
-    """A base on horizontal springs of ``compliance_m_per_N``, the same in x and y [m/N].
+    """A base on horizontal springs with equal compliance in x and y, ``compliance_m_per_N`` [m/N].
 
-    Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``). They follow the
-    force with a time constant of ``relaxation_s`` [s]; below 5 ms, critically damped, as their mass lets them. What
-    moves is the robot; where ``mass_kg`` [kg] is more than that, the rest moves along with the slides.
+    Implemented as two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``).
+    They follow the force with the time constant ``relaxation_s`` [s]. Below 5 ms they are critically damped, and their
+    mass sets the response. ``mass_kg`` [kg] is the mass that moves; what exceeds the robot's mass is added to the
+    slides as armature.
     """
 
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.0, 10.0), "mass_kg": (0.0, 1e4)}
@@ -247,13 +252,15 @@ class BaseCompliance(Effect):
 
 @dataclass(frozen=True)
 class GraspFlex(Effect):
-    """Springs of ``compliance_m_per_N`` between flange and payload, the same in all directions [m/N].
+    """A compliant grasp: springs of ``compliance_m_per_N`` between flange and payload, isotropic [m/N].
 
-    Three slides, on the payload (robot 1) or on a pad between flange and weld (the others), held by soft ``joint``
-    equalities (see ``mocobot_sim.scene.soft``). They follow the force with a time constant of ``relaxation_s`` [s];
-    below 5 ms, critically damped, as their mass lets them. The grasp may turn besides, by ``turning_rad_per_N`` of
-    force across z of {i} [rad/N]: three hinges, held alike, about a point at ``offset_m`` [m] along z from the gimbal's
-    centre. The gimbal passes no moment, so a grasp whose point is the centre does not turn at all.
+    Implemented as three slides held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``), on the payload
+    (robot 1) or on a pad between flange and weld (other robots). They follow the force with the time constant
+    ``relaxation_s`` [s]. Below 5 ms they are critically damped, and their mass sets the response.
+
+    The grasp may also turn, by ``turning_rad_per_N`` per newton of force across the z axis of {i} [rad/N]. Three hinges
+    with the same kind of springs turn it about a point ``offset_m`` [m] along z from the gimbal's centre. The gimbal
+    transmits no moment, so with an offset of zero the grasp does not turn.
     """
 
     on_payload = True
@@ -293,10 +300,10 @@ class GraspFlex(Effect):
 
 @dataclass(frozen=True)
 class GraspPlay(Effect):
-    """The grasp moves freely within +-``play_m`` of its place along each axis of {i} [m], and cannot turn.
+    """A loose grasp: it moves freely within +-``play_m`` along each axis of {i} [m] and cannot turn.
 
-    Three slides with ``range`` limits, on the payload (robot 1) or on a pad between flange and weld (the others). The
-    limits are stiff, or give way by ``contact_m_per_N`` [m/N], critically damped.
+    Implemented as three slides with ``range`` limits, on the payload (robot 1) or on a pad between flange and weld
+    (other robots). The limits are stiff, or have the compliance ``contact_m_per_N`` [m/N] with critical damping.
     """
 
     on_payload = True
@@ -320,6 +327,6 @@ class GraspPlay(Effect):
                 slide.solreflimit, slide.solimplimit = spring_parameters(
                     self.contact_m_per_N, float(model.dof_invweight0[dof])
                 )
-        # The corner of the box, and the softness of the limits.
+        # Largest gap: the corner of the box (1.75 > sqrt(3)) plus the compression of the limits.
         soft = 40e-6 + 1.75 * LARGEST_FORCE_N * self.contact_m_per_N
         return widened(scene, self.robot, 1.75 * self.play_m + soft)

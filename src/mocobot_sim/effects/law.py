@@ -1,4 +1,4 @@
-"""A formula at a place of a team: an effect that the catalogue does not list."""
+"""The effect ``law``: a formula at one place of a team, for errors that no other effect describes."""
 
 from __future__ import annotations
 
@@ -48,25 +48,28 @@ SIGNALS = (
     "a sum of such as 0.6*payload_felt_x + -0.8*payload_felt_y"
 )
 SLACK_M = 0.05
-"""By which a grasp may seem open that is displaced."""
+"""Gap that the trial's checks allow at a grasp displaced by a law [m]. Chosen."""
 GRAVITY_MPS2 = 9.81
 Value = Callable[[], float]
 
 
 @dataclass(frozen=True)
 class Law(Effect):
-    """``amplitude`` times a function of a signal, and times another signal where one is named, added to a target.
+    """A formula added to a target: ``amplitude`` times a function of one signal, optionally times a second signal.
 
-    ``target`` is a reading (``tau_2_1`` of robot 2, joint 1; ``phi_2_1``, ``theta_2_1``), a torque
-    (``driven_torque_2_1``, ``gimbal_torque_2_1``), a displacement (``base_position_2_x``, ``grasp_position_2_x``), or
-    the payload's (``payload_force_x`` in robot 1's {b}, ``payload_moment_x``, ``payload_mass``,
-    ``payload_first_moment_x``, ``payload_spin_x`` in {1}). ``of`` and ``times`` are signals: ``time``, ``phi_2_1``,
-    ``phi_rate_2_1``, ``phi_acceleration_2_1``, the same of ``theta``, ``tau_2_1``, ``payload_position_x`` (and
-    ``velocity``, ``acceleration``, ``felt``, ``rate``, ``turn``, which is an acceleration, ``up``). All in SI; readings
-    are as seen. A sum of signals is one, too: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
+    ``target`` is one of: a reading (``tau_2_1`` of robot 2, joint 1; ``phi_2_1``, ``theta_2_1``); a torque
+    (``driven_torque_2_1``, ``gimbal_torque_2_1``); a displacement (``base_position_2_x``, ``grasp_position_2_x``); a
+    quantity of the payload (``payload_force_x`` and ``payload_moment_x`` in the axes of robot 1's {b};
+    ``payload_mass``, ``payload_first_moment_x`` and ``payload_spin_x`` in {1}).
 
-    ``number``, ``second`` and ``phase_rad`` are what the function has inside: a knee, the periods a turn of a sine, a
-    time constant, half the width of a play (docs/effects.md).
+    ``of`` and ``times`` name the two signals: ``time``, ``phi_2_1``, ``phi_rate_2_1``, ``phi_acceleration_2_1``, the
+    same for ``theta``, ``tau_2_1``, ``payload_position_x``. Other payload signals are ``velocity``, ``acceleration``,
+    ``felt`` (acceleration minus gravity), ``rate`` (angular velocity), ``turn`` (angular acceleration) and ``up``. All
+    are in SI units. If the target is a reading, angles and torques are those that the sensors see; otherwise they are
+    true values. A weighted sum of signals is also a signal: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
+
+    ``number``, ``second`` and ``phase_rad`` are the parameters of the function, such as the knee of a ramp, a time
+    constant, or half the width of a backlash (docs/effects.md).
     """
 
     repeats = True
@@ -90,20 +93,20 @@ class Law(Effect):
         check_law(self, TARGET.fullmatch, TARGETS, parts_of, SIGNALS)
 
     def step(self, dt: float) -> Step:
-        """The function, one value after the other at steps of ``dt`` [s]."""
+        """Make the function for a signal sampled at steps of ``dt`` [s]; call it once for each sample."""
         return FUNCTIONS[self.function](Inside(self.number, self.second, self.phase_rad, dt))
 
     def actors(self, trial_number: int | None) -> Sequence[_Acts]:
-        """Who acts in a trial."""
+        """The actor of a trial, unless the target is a reading."""
         return () if READING.fullmatch(self.target) else (_Acts(self),)
 
     def readers(self, trial_number: int | None) -> Sequence[_Acts]:
-        """Which sensor misreads in it."""
+        """The reader of a trial, if the target is a reading."""
         return (_Acts(self),) if READING.fullmatch(self.target) else ()
 
     @property
     def about_payload(self) -> bool:
-        """Whether target or signals are the payload's."""
+        """Whether the target or a signal belongs to the payload."""
         return any(name.startswith("payload") for name in self._names())
 
     def _names(self) -> Iterator[str]:
@@ -123,7 +126,7 @@ class Law(Effect):
         return self._with_slide(scene)
 
     def _with_slide(self, scene: TeamScene) -> TeamScene:
-        """The scene with the slide that the target needs, if it needs one and has none yet."""
+        """Add the slide joint of a displacement target, unless the scene has it already."""
         match = SLIDE.fullmatch(self.target)
         if match is None or scene.root.find("joint", _slide_name(match)) is not None:
             return scene
@@ -139,7 +142,7 @@ class Law(Effect):
 
 
 def parts_of(name: str) -> list[tuple[float, str]]:
-    """Factors and names of the signals that a name adds up; empty if it is none."""
+    """Split a weighted sum of signals into (factor, name) pairs; empty if ``name`` is not a valid signal."""
     matches = [PART.fullmatch(part) for part in name.split(" + ")]
     parts = [(float(match[1] or 1.0), match[2]) for match in matches if match is not None]
     known = all(
@@ -150,33 +153,33 @@ def parts_of(name: str) -> list[tuple[float, str]]:
 
 
 def _slide_name(match: re.Match[str]) -> str:
-    """Name of the slide that a displaced base or grasp has."""
+    """Full name in the compiled model of the slide joint of a displaced base or grasp."""
     where, robot, axis = match.groups()
     part = f"omnid{robot}/" if where == "base" or robot != "1" else "omnid1/payload/"
     return f"{part}law_{where}_{axis}"
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross product of two vectors; numpy's takes ten times as long for so few numbers."""
+    """Cross product of two vectors, faster than numpy's for single vectors."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 class PayloadMotion:
-    """Motion of the payload, brought up to date once a tick.
+    """Motion of the payload, updated once per control tick.
 
     Attributes:
-        position, velocity: of the origin of {1}, in robot 1's {b} without any tilt [m], [m/s].
-        acceleration: of the same, in {1} [m/s^2].
-        felt: that less gravity: what a scale would feel, in {1} [m/s^2].
+        position, velocity: of the origin of {1}, in robot 1's {b} without base tilt [m], [m/s].
+        acceleration: acceleration of the origin of {1}, in {1} [m/s^2].
+        felt: proper acceleration, which is acceleration minus gravity, as an accelerometer reads it, in {1} [m/s^2].
         omega, alpha: angular velocity and acceleration in {1} [rad/s], [rad/s^2].
-        up: unit vector against gravity in {1}.
-        R: axes of {1} in the world, shape (3, 3).
+        up: unit vector opposite to gravity, in {1}.
+        R: orientation of {1} in the world, shape (3, 3).
         com: centre of mass in {1} [m].
     """
 
     def __init__(self, stage: Stage) -> None:
-        import mujoco  # only where a trial runs: what a law may name is known without
+        import mujoco  # here, so that laws can be checked without loading MuJoCo
 
         self._model, self._data, self._body = stage.model, stage.data, stage.index.payload_body
         mount = stage.model.body_parentid[stage.model.body("omnid1/chassis").id]
@@ -192,13 +195,13 @@ class PayloadMotion:
 
     @classmethod
     def of(cls, stage: Stage) -> PayloadMotion:
-        """The motion in a trial; all that ask for it have the same one."""
+        """The motion shared by all laws of a trial."""
         if "payload motion" not in stage.shared:
             stage.shared["payload motion"] = cls(stage)
         return cast("PayloadMotion", stage.shared["payload motion"])
 
     def at(self, tick: int) -> PayloadMotion:
-        """The motion at a tick."""
+        """Update the motion to a control tick and return it."""
         if tick != self._tick:
             self._tick = tick
             self._update(first=tick == 0)
@@ -208,7 +211,7 @@ class PayloadMotion:
         data, body = self._data, self._body
         self.R = data.xmat[body].reshape(3, 3).copy()
         spin = data.cvel[body, :3]
-        # Velocities of MuJoCo's bodies are given at the centre of mass of the whole tree.
+        # ``cvel`` is the velocity at the centre of mass of the whole kinematic tree.
         away = data.xpos[body] - data.subtree_com[self._model.body_rootid[body]]
         velocity = data.cvel[body, 3:] + _cross(spin, away)
         self.position = self.R_Wb1.T @ (data.xpos[body] - self._p_Wb1)
@@ -221,7 +224,7 @@ class PayloadMotion:
 
 
 class _Signals:
-    """Signals of one trial by the names that laws give them."""
+    """Looks up the signals of one trial by name."""
 
     def __init__(self, stage: Stage, *, carries: bool) -> None:
         self._stage, self._tick = stage, 0
@@ -230,16 +233,16 @@ class _Signals:
 
     @property
     def motion(self) -> PayloadMotion:
-        """The payload's."""
+        """Motion of the payload at the current tick."""
         assert self._motion is not None
         return self._motion.at(self._tick)
 
     def now(self, tick: int, seen: np.ndarray | None = None) -> None:
-        """Go on to a tick; ``seen`` are the positions that the sensors see, else the true ones."""
+        """Set the current tick; ``seen`` are the positions as the sensors see them, or None for the true ones."""
         self._tick, self._seen = tick, self._stage.data.qpos if seen is None else seen
 
     def of(self, name: str) -> Value:
-        """What a signal is at the tick that is now."""
+        """A function that returns the value of a signal at the current tick."""
         each = [(factor, self._one(part)) for factor, part in parts_of(name)]
         if len(each) == 1 and each[0][0] == 1.0:
             return each[0][1]
@@ -272,7 +275,7 @@ class _Signals:
 
 
 class _Acts:
-    """One law in one trial: an actor, or a reader where it is about a reading."""
+    """One law in one trial: a reader if its target is a reading, else an actor."""
 
     def __init__(self, law: Law) -> None:
         self._law = law
@@ -291,7 +294,7 @@ class _Acts:
             self._readings, self._kind = RobotReadings(stage, int(match[2])), match[1]
             self._joint = int(match[3])
         elif match := TORQUE.fullmatch(law.target):
-            # Past the spring of a driven joint, or in a gimbal axis.
+            # A driven torque acts between chassis and link, so it is applied to motor and spring coordinates alike.
             parts, at = ("motor", "spring") if match[1] == "driven" else ("gimbal",), match.groups()
             place = int(at[1]) - 1, int(at[2]) - 1
             self._dofs = [int(getattr(stage.index, f"{part}_dof")[place]) for part in parts]
@@ -302,7 +305,7 @@ class _Acts:
         return out if self._y is None else out * self._y()
 
     def read(self, tick: int, seen: np.ndarray) -> None:
-        """Change a reading."""
+        """Add the law's value to a reading."""
         self._signals.now(tick, seen)
         error = self._value()
         if self._kind == "tau":
@@ -313,7 +316,7 @@ class _Acts:
             self._readings.add_theta(seen, self._joint, error)
 
     def act(self, tick: int) -> None:
-        """Add a torque, a force or a wrench."""
+        """Apply the law's value as a generalised force on joints or as a wrench on the payload."""
         self._signals.now(tick)
         value, data = self._value(), self._stage.data
         if self._slide:
@@ -325,12 +328,12 @@ class _Acts:
             return
         force, moment = self._on_payload(value)
         R, com, body = self._signals.motion.R, self._signals.motion.com, self._stage.index.payload_body
-        # MuJoCo takes them at the centre of mass.
+        # ``xfrc_applied`` acts at the centre of mass.
         data.xfrc_applied[body, :3] += R @ force
         data.xfrc_applied[body, 3:] += R @ (moment - _cross(com, force))
 
     def _on_payload(self, value: float) -> tuple[np.ndarray, np.ndarray]:
-        """Force and moment at the origin of {1}, in {1}."""
+        """Force and moment of a payload target about the origin of {1}, in {1}."""
         motion, kind, none = self._signals.motion, self._law.target.removeprefix("payload_"), np.zeros(3)
         felt = motion.felt
         if kind == "mass":

@@ -1,4 +1,4 @@
-"""What acts on the payload or changes it: springs to the room, pushes, drag, liquid, mass that comes or goes."""
+"""Effects on the payload: springs to the world, pushes, drag, sloshing liquid, mass that changes."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 PAYLOAD = "omnid1/payload/payload"
 SITE_M, WIDTH_M = 0.006, 0.002
-"""Sizes of what is drawn of a spring."""
+"""Size of the drawn sites and width of the drawn tendons [m]. Chosen: for looks only."""
 SPRING_RANGES = {
     "stiffness_N_per_m": (0.0, 1e4),
     "length_m": (0.0, 100.0),
     "stiffening_N_per_m2": (-1e4, 1e6),
 }
-"""What says how strong a spring is."""
+"""Allowed ranges of the parameters of a spring."""
 LEAST_RATIO = 1e-6
-"""Least principal moment of a payload whose mass changes, over the largest: a body needs some."""
+"""Smallest over largest principal moment of a payload whose mass changes. Chosen: MuJoCo needs positive moments."""
 
 
 def add_site(body: Any, name: str, at: Array | list[float]) -> Any:
-    """A point of a body, in its frame [m], shape (3,)."""
+    """Add a site to a body at a point given in the body's frame [m], shape (3,)."""
     return body.add("site", name=name, pos=at, group=4, size=[SITE_M])
 
 
@@ -47,9 +47,10 @@ def tie(
     length_m: float = 0.0,
     stiffening_N_per_m2: float = 0.0,
 ) -> None:
-    """Tie a site to a fixed point of the world [m], shape (3,), by a spatial tendon: slack below its length.
+    """Connect a site and a fixed point of the world [m], shape (3,), by an elastic spatial tendon.
 
-    Stretched by d beyond it, it pulls with k d + s d^2: MuJoCo's stiffness is a polynomial.
+    The tendon is slack below its length. Stretched by d beyond it, it pulls with k d + s d^2, where k is the
+    stiffness and s the stiffening.
     """
     anchor = add_site(scene.root.worldbody, name, anchor_W)
     tendon = scene.root.tendon.add(
@@ -63,12 +64,11 @@ def tie(
 
 @dataclass(frozen=True)
 class Tether(Effect):
-    """A spring from the payload's grasp at one robot to a fixed point; a cable, if it has a length.
+    """A spring between one grasp of the payload and a fixed point; with a length above zero, an elastic cable.
 
-    A spatial tendon with ``stiffness`` between the payload's site ``grasp{i}`` and a site of the world, slack below
-    ``length_m`` and pulling with k d + ``stiffening_N_per_m2`` d^2 if stretched by d beyond it; at a length of zero a
-    spring pulls back on all axes alike. The anchor is given in the robot's {b} as its floor mount has it, without any
-    tilt [m].
+    Implemented as a spatial tendon between the payload's site ``grasp{i}`` and a site of the world. The tendon is
+    slack below ``length_m``. Stretched by d beyond it, it pulls with k d + ``stiffening_N_per_m2`` d^2. With a length
+    of zero the spring is isotropic. The anchor is a point in the robot's {b}, without base tilt [m].
     """
 
     on_payload = True
@@ -92,9 +92,10 @@ class Tether(Effect):
 
 @dataclass(frozen=True)
 class PayloadTether(Effect):
-    """A spring from a point of the payload, given in {1}, to a fixed point; a cable, if it has a length.
+    """A spring between any point of the payload and a fixed point; with a length above zero, an elastic cable.
 
-    A spatial tendon like that of ``Tether``. The anchor is given in robot 1's {b} as its floor mount has it [m].
+    Implemented as a spatial tendon like that of ``Tether``. The point on the payload is given in {1} [m]. The anchor
+    is a point in robot 1's {b}, without base tilt [m].
     """
 
     on_payload = True
@@ -121,10 +122,10 @@ class PayloadTether(Effect):
 
 @dataclass(frozen=True)
 class Push(Effect):
-    """A force during an interval of one trial, constant but for the ``ramp_s`` in which it grows and fades.
+    """A constant force on the payload during one interval of one trial, with linear ramps of ``ramp_s`` at both ends.
 
-    MJCF has no such thing: the trial writes ``xfrc_applied``. The force is given in the axes of robot 1's {b} without
-    any tilt [N], the point where it acts is fixed to the payload and given in {1} [m].
+    MJCF cannot express it: the trial writes ``xfrc_applied``. The force is given in the axes of robot 1's {b}, without
+    base tilt [N]. It acts at a point fixed to the payload and given in {1} [m].
     """
 
     on_payload = True
@@ -142,13 +143,16 @@ class Push(Effect):
     ramp_s: float = 0.0
 
     def acts(self, time: float) -> bool:
-        """Whether a time [s] is in the interval."""
+        """Whether the force acts at a time [s]."""
         return self.start_s <= time + 1e-9 < self.start_s + self.duration_s
 
     def act(self, data: mujoco.MjData, body: int, R_Wb1: Array) -> None:
-        """Add the force to ``data.xfrc_applied`` of the payload's body; ``data`` has kinematics of this instant.
+        """Add the force to the row of ``data.xfrc_applied`` that belongs to the payload.
 
-        ``R_Wb1`` are the axes of robot 1's {b} in the world, shape (3, 3).
+        Args:
+            data: MuJoCo data with the kinematics of this instant.
+            body: id of the payload's body.
+            R_Wb1: orientation of robot 1's {b} in the world, shape (3, 3).
         """
         since, left = data.time - self.start_s, self.start_s + self.duration_s - data.time
         grown = max(0.0, min(1.0, since / self.ramp_s, left / self.ramp_s)) if self.ramp_s else 1.0
@@ -158,17 +162,20 @@ class Push(Effect):
         data.xfrc_applied[body, 3:] += np.cross(data.xpos[body] + arm - data.xipos[body], force)
 
 
-# A fluid so thin that it resists nothing but what has immense coefficients: any other body less than a nanonewton.
+# Fluid density and radius of the drag sphere. Chosen: the fluid is so thin that its force on all other bodies stays
+# below one nanonewton; the sphere compensates with large fluid coefficients.
 DENSITY_KG_PER_M3, RADIUS_M = 1e-6, 0.01
 
 
 @dataclass(frozen=True)
 class Drag(Effect):
-    """A force -c v on the payload at its centre of mass, c in N s/m, and a moment -c_r omega, c_r in N m s/rad.
+    """Drag on the payload: a force -c v at its centre of mass (c in N s/m), a moment -c_r omega (c_r in N m s/rad).
 
-    Six ``general`` actuators with a site transmission relative to a site of the world, affine bias (0, 0, -c) and no
-    use for their control. What goes with the square of the speed, -q |v| v and -q_r |omega| omega, is the drag of
-    MuJoCo's fluid on a sphere (``fluidshape="ellipsoid"``): density times area, or 8/15 pi r^5, times ``fluidcoef``.
+    The linear part is implemented as ``general`` actuators with a site transmission relative to a site of the world
+    and the affine bias (0, 0, -c). Their control input is unused.
+
+    The quadratic part, -q |v| v and -q_r |omega| omega, is the drag of MuJoCo's fluid on a sphere
+    (``fluidshape="ellipsoid"``). Its coefficients are density times area, or 8/15 pi r^5, times ``fluidcoef``.
     """
 
     on_payload = True
@@ -213,14 +220,14 @@ class Drag(Effect):
 
 @dataclass(frozen=True)
 class Slosh(Effect):
-    """A pendulum that hangs from a point of the payload, given in {1} [m]; its mass adds to the payload's.
+    """A pendulum under a point of the payload, given in {1} [m]; its mass adds to the payload's.
 
-    A child body of the payload with two hinges and a point mass ``length_m`` below them; ``damping_ratio`` is that of
-    small swings.
+    Implemented as a child body of the payload with two hinges and a point mass ``length_m`` below them.
+    ``damping_ratio`` is the damping ratio of small swings.
 
-    With ``across_length_m`` it swings on ``length_m`` in the direction ``heading_rad`` from x of {1}, about z, and on
-    the other length across: one hinge is that much nearer to the mass. ``second_share`` of the mass swings on
-    ``second_length_m``, in a second body at the same point.
+    With ``across_length_m`` above zero, the pendulum has two lengths. Along the direction ``heading_rad`` (about z,
+    from the x axis of {1}) it swings with ``length_m``, and across it with ``across_length_m``. A second pendulum at
+    the same point carries the share ``second_share`` of the mass and has the length ``second_length_m``.
     """
 
     on_payload = True
@@ -240,7 +247,10 @@ class Slosh(Effect):
     second_share: float = 0.0
 
     def carried(self) -> Array:
-        """The mass at its pivot, which is where small swings leave it; at the middle of two."""
+        """Inertial parameters of the mass at its pivot, where an estimate sees it during small swings, shape (10,).
+
+        With two lengths, the point is halfway between the two pivots.
+        """
         at = np.array([self.point_x_m, self.point_y_m, self.point_z_m])
         at[2] -= 0.5 * (self.length_m - self._across_m)
         about_1 = inertia_parameters(at @ at * np.eye(3) - np.outer(at, at))
@@ -257,7 +267,7 @@ class Slosh(Effect):
         return scene
 
     def _hang(self, scene: TeamScene, name: str, mass_kg: float, length_m: float, across_m: float) -> None:
-        """A body with a mass ``length_m`` below the point, which swings across on another length."""
+        """Add a pendulum body with its mass ``length_m`` below the point; ``across_m`` is its length across."""
         if not mass_kg:
             return
         payload = scene.root.find("body", PAYLOAD)
@@ -266,7 +276,7 @@ class Slosh(Effect):
             "body", name=name, pos=[self.point_x_m, self.point_y_m, self.point_z_m],
             quat=[np.cos(half), 0.0, 0.0, np.sin(half)],
         )  # fmt: skip
-        # Turning about x it swings along y.
+        # Rotation about x moves the mass along y, so this hinge has the length across.
         for axis, along, own_m in (("x", [1.0, 0.0, 0.0], across_m), ("y", [0.0, 1.0, 0.0], length_m)):
             damping = (
                 2.0 * self.damping_ratio * np.sqrt(omnid_design().gravity_mps2 / own_m) * mass_kg * own_m**2
@@ -284,18 +294,19 @@ class Slosh(Effect):
 
 
 LEAST_RATIO = 1e-6
-"""Least principal moment of what is then carried, over the largest: a body needs some."""
+"""Smallest over largest principal moment of the changed payload. Chosen: MuJoCo needs positive moments."""
 
 
 @dataclass(frozen=True)
 class PayloadMass(Effect):
-    """Something that is put on the payload (taken off, if negative) for some trials, or that leaks out while they last.
+    """A change of the payload's mass: constant during some trials (negative for removal), or at a constant rate.
 
-    ``mass_kg`` is there from the start of ``trial`` to the end of ``last_trial`` (0: of the last of all); in each of
-    these, ``rate_kgps`` comes to it. Its centre is a point of the payload, given in {1} [m]; ``inertia_*_m2`` is its
-    inertia about that centre, in the axes of {1}, per kg of it: 0 of a point.
+    ``mass_kg`` is present from ``trial`` to ``last_trial``, both included; 0 means until the last trial. Within each of
+    these trials the mass also changes by ``rate_kgps``. The centre of the added mass is a point of the payload in {1}
+    [m]. ``inertia_*_m2`` is its inertia per kilogram about that centre, in the axes of {1}; 0 is a point mass.
 
-    MJCF has no such thing: the trial writes the payload's mass, centre and inertia. What leaves does so without recoil.
+    MJCF cannot express it: the trial writes the payload's mass, centre of mass and inertia. Leaving mass exerts no
+    recoil.
     """
 
     on_payload = True
@@ -315,16 +326,16 @@ class PayloadMass(Effect):
     inertia_zz_m2: float = 0.0
 
     def load(self, model: mujoco.MjModel, index: TeamIndex, trial_number: int | None) -> None:
-        """Put it on, so that the trial begins at rest with it.
+        """Add the mass to the model before a trial, so that the trial starts at rest with it.
 
         Raises:
-            InputError: more would be taken off than there is.
+            InputError: the payload would have no mass left.
         """
         if self.mass_kg and self._there(trial_number):
             _Carried(self, model, index.payload_body).change(self.mass_kg)
 
     def actors(self, trial_number: int | None) -> Sequence[_Leak]:
-        """What leaks out in a trial."""
+        """Actors of a trial: one that changes the mass, if the mass has a rate."""
         return (_Leak(self),) if self.rate_kgps and self._there(trial_number) else ()
 
     def _there(self, trial_number: int | None) -> bool:
@@ -333,7 +344,7 @@ class PayloadMass(Effect):
 
 
 class _Leak:
-    """Mass that comes or goes while a trial lasts."""
+    """Actor that changes the payload's mass at a constant rate."""
 
     def __init__(self, effect: PayloadMass) -> None:
         self._effect = effect
@@ -348,7 +359,7 @@ class _Leak:
 
 
 class _Carried:
-    """The payload's body, and what it is with more on it."""
+    """Inertial parameters of the payload's body as a function of the added mass."""
 
     def __init__(self, effect: PayloadMass, model: mujoco.MjModel, body: int) -> None:
         self._model, self._body = model, body
@@ -357,11 +368,11 @@ class _Carried:
         self._inertia = (R * model.body_inertia[body]) @ R.T
         self._point = np.array([effect.point_x_m, effect.point_y_m, effect.point_z_m])
         self._per_kg = inertia_matrix(np.array([getattr(effect, f"inertia_{ij}_m2") for ij in _ENTRIES]))
-        # MuJoCo takes a shortcut where the inertia's frame is the body's.
+        # MuJoCo skips ``body_ipos`` and ``body_iquat`` for bodies flagged as having the inertial frame as their own.
         model.body_sameframe[body] = 0
 
     def check(self, more_kg: float) -> None:
-        """Refuse a payload that would weigh nothing."""
+        """Refuse a change that leaves a mass of zero or less."""
         if not self._mass + more_kg > 0.0:
             raise InputError(
                 f"payload_mass: the payload of {self._mass:.3g} kg would weigh {self._mass + more_kg:.3g} kg; "
@@ -369,7 +380,7 @@ class _Carried:
             )
 
     def change(self, more_kg: float) -> None:
-        """Write mass, centre and inertia with so much more than at first."""
+        """Write mass, centre of mass and inertia for ``more_kg`` above the initial mass."""
         from mocobot_sim.scene.payload import nearest_inertia
 
         self.check(more_kg)
@@ -385,11 +396,11 @@ class _Carried:
 
 
 _ENTRIES = ("xx", "xy", "xz", "yy", "yz", "zz")
-"""Entries of an inertia, as ``inertia_matrix`` takes them."""
+"""Order of the entries of an inertia that ``inertia_matrix`` expects."""
 
 
 def _about(r: Array) -> Array:
-    """Inertia of 1 kg that is at r [m] from where it is taken about, shape (3, 3)."""
+    """Inertia of a point mass of 1 kg about a point at distance ``r`` [m], shape (3, 3)."""
     return np.asarray(r @ r * np.eye(3) - np.outer(r, r))
 
 

@@ -1,4 +1,4 @@
-"""Readings and clocks that are off: sensors and controllers follow the scene's record; the MJCF stays."""
+"""Effects on sensor readings and clocks; they act on the simulated sensors, and the MJCF does not change."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mocobot_sim.trial.actors import Misreading, Reader, RobotReadings
 
 @dataclass(frozen=True)
 class PhiZero(Effect):
-    """One phi encoder, for log and controller, reads ``zero_rad`` more than the truth [rad]; no MJCF edit."""
+    """A phi encoder that reads ``zero_rad`` above the true angle, in the log and in the controller [rad]."""
 
     as_built: ClassVar = {"zero_rad": "phi_zero_rad"}
     robot: int
@@ -24,7 +24,7 @@ class PhiZero(Effect):
 
 @dataclass(frozen=True)
 class ThetaZero(Effect):
-    """One gimbal encoder (joints 1, 2, 3 are z, y, x) reads ``zero_rad`` more than the truth [rad]; no MJCF edit."""
+    """A gimbal encoder (joints 1, 2, 3 are z, y, x) that reads ``zero_rad`` above the true angle [rad]."""
 
     as_built: ClassVar = {"zero_rad": "theta_zero_rad"}
     robot: int
@@ -34,7 +34,7 @@ class ThetaZero(Effect):
 
 @dataclass(frozen=True)
 class SeaBias(Effect):
-    """One torque reading, for log and controller, is ``bias_Nm`` above the truth [N m]; no MJCF edit."""
+    """A torque sensor that reads ``bias_Nm`` above the true torque, in the log and in the controller [N m]."""
 
     as_built: ClassVar = {"bias_Nm": "tau_zero_Nm"}
     robot: int
@@ -44,9 +44,9 @@ class SeaBias(Effect):
 
 @dataclass(frozen=True)
 class TorqueSkew(Effect):
-    """All torques that one robot logs are ``delay_s`` older than the angles beside them [s]; may be negative.
+    """Logged torques of one robot that are ``delay_s`` older than the angles in the same row [s]; may be negative.
 
-    An entry of the scene's ``sensors``; no MJCF edit.
+    The controller is unaffected.
     """
 
     sensors: ClassVar = {"delay_s": "torque_delay_s"}
@@ -57,9 +57,9 @@ class TorqueSkew(Effect):
 
 @dataclass(frozen=True)
 class TorqueLag(Effect):
-    """A first-order lag of ``time_constant_s`` in one robot's torque sensors, seen by log and controller [s].
+    """A first-order lag of all torque sensors of one robot; its time constant is ``time_constant_s`` [s].
 
-    An entry of the scene's ``sensors``; no MJCF edit.
+    It affects log and controller.
     """
 
     sensors: ClassVar = {"time_constant_s": "torque_lag_s"}
@@ -70,9 +70,9 @@ class TorqueLag(Effect):
 
 @dataclass(frozen=True)
 class ClockDelay(Effect):
-    """Everything one robot logs was sampled ``delay_s`` before its time stamp [s]; commands are not shifted.
+    """A clock offset: one robot samples everything it logs ``delay_s`` before the time stamp [s].
 
-    An entry of the scene's ``sensors``; no MJCF edit.
+    Commands are not shifted, and the controller is unaffected.
     """
 
     sensors: ClassVar = {"delay_s": "clock_delay_s"}
@@ -83,9 +83,9 @@ class ClockDelay(Effect):
 
 @dataclass(frozen=True)
 class SensorLag(Effect):
-    """A first-order lag of ``time_constant_s`` in one torque sensor, seen by log and controller [s].
+    """A first-order lag of one torque sensor; its time constant is ``time_constant_s`` [s].
 
-    A reader of the trial; no MJCF edit.
+    It affects log and controller.
     """
 
     ranges: ClassVar = {"time_constant_s": (0.0, 10.0)}
@@ -94,7 +94,7 @@ class SensorLag(Effect):
     time_constant_s: float
 
     def readers(self, trial_number: int | None) -> Sequence[Reader]:
-        """The sensor, at rest when the trial begins."""
+        """The lagging sensor, settled at its first reading when the trial begins."""
         if not self.time_constant_s:
             return ()
         weights: list[float] = []

@@ -1,7 +1,7 @@
-"""Springs and friction of driven joints and gimbals.
+"""Effects on springs and friction of driven joints and gimbals.
 
-MuJoCo's own attributes act: ``stiffness``, ``frictionloss``, soft equalities as dampers (``mocobot_sim.scene.soft``).
-Friction that gives way before it slips is a slider that the trial moves.
+They use MuJoCo's ``stiffness`` and ``frictionloss``, and soft equalities as dampers (``mocobot_sim.scene.soft``).
+Friction with presliding is an actor of the trial (``Slider``).
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 
 
 class Slider:
-    """Dry friction that gives way before it slips (Prandtl's element): an actor of a trial.
+    """Coulomb friction with presliding (Prandtl's element: spring and slider in series); an actor of a trial.
 
-    A slider follows a joint, counted from 1, by a spring of its own until that pulls with the friction's limit, after a
-    way of ``yield_rad``. It acts in a spring, past that of a driven joint, or in a gimbal axis.
+    The torque grows linearly with the displacement up to ``limit_Nm``, reached after ``yield_rad``; then the element
+    slips. It acts on the total angle of a driven joint ("driven"), on its spring alone, or on a gimbal axis. Robots and
+    joints count from 1.
     """
 
     def __init__(
@@ -40,14 +41,14 @@ class Slider:
         self._limit_Nm, self._yield_rad = limit_Nm, yield_rad
 
     def start(self, stage: Stage) -> None:
-        """Find the joint, with the slider's spring unloaded."""
+        """Look up the joint; the element starts unloaded."""
         index, at, self._data = stage.index, self._at, stage.data
         self._qpos = [int(getattr(index, f"{part}_qpos")[at]) for part in self._parts]
         self._dofs = [int(getattr(index, f"{part}_dof")[at]) for part in self._parts]
         self._last_rad, self._bent = self._angle(), 0.0
 
     def act(self, tick: int) -> None:
-        """Add the torque that the slider's spring holds back with."""
+        """Update the element and add its torque."""
         now_rad = self._angle()
         self._bent = max(-1.0, min(1.0, self._bent + (now_rad - self._last_rad) / self._yield_rad))
         self._last_rad = now_rad
@@ -59,16 +60,17 @@ class Slider:
 
 
 def linear_stiffness(scene: TeamScene, robot: int, joint: int) -> float:
-    """Linear part of one spring as built [N m/rad]."""
+    """Linear stiffness of one spring as built [N m/rad]."""
     unit = scene.units[robot - 1]
     return float(omnid_design().sea_stiffness_Nm_per_rad * (1.0 + unit.stiffness_ratio[joint - 1]))
 
 
 @dataclass(frozen=True)
 class SeaScale(Effect):
-    """True stiffness is greater than built so far by ``scale`` times the design: the spring joint's ``stiffness``.
+    """A spring whose stiffness deviates from the design by the relative amount ``scale``.
 
-    The reading is the design stiffness times the deflection, so it is low by 1 / (1 + scale).
+    Implemented as the ``stiffness`` of the spring joint; several deviations add up. The torque reading is the design
+    stiffness times the deflection, so it is the true torque divided by (1 + scale).
     """
 
     as_built: ClassVar = {"scale": "stiffness_ratio"}
@@ -86,9 +88,10 @@ class SeaScale(Effect):
 
 @dataclass(frozen=True)
 class SeaHardening(Effect):
-    """Spring torque -(k d + k3 d^3) at a deflection d: polynomial ``stiffness`` of the spring joint, k3 [N m/rad^3].
+    """A hardening spring: torque -(k d + k3 d^3) at the deflection d, with k3 in N m/rad^3.
 
-    The reading is the design stiffness times the deflection, as of any spring.
+    Implemented as the polynomial ``stiffness`` of the spring joint. The torque reading remains the design stiffness
+    times the deflection.
     """
 
     ranges: ClassVar = {"cubic_Nm_per_rad3": (-500.0, 1e6)}
@@ -104,10 +107,11 @@ class SeaHardening(Effect):
 
 @dataclass(frozen=True)
 class SeaHysteresis(Effect):
-    """Coulomb friction ``friction_Nm`` beside the spring: ``frictionloss`` of the spring joint [N m].
+    """Coulomb friction ``friction_Nm`` in parallel with the spring [N m].
 
-    The link feels spring plus friction; the reading is the deflection's alone. With ``presliding_Nm`` the slider sits
-    behind a spring of its own and gives way before it slips, by the deflection at which the spring reads that torque.
+    Implemented as ``frictionloss`` of the spring joint. Spring and friction both act on the link; the torque reading
+    has the spring's part only. With ``presliding_Nm`` above zero, the friction yields elastically before it slips. It
+    slips after the deflection at which the torque reading would change by ``presliding_Nm``.
     """
 
     ranges: ClassVar = {"friction_Nm": (0.0, 20.0), "presliding_Nm": (0.0, 20.0)}
@@ -117,7 +121,7 @@ class SeaHysteresis(Effect):
     presliding_Nm: float = 0.0
 
     def actors(self, trial_number: int | None) -> Sequence[Slider]:
-        """The slider behind its spring."""
+        """The presliding element, if there is Coulomb friction with presliding."""
         if not (self.friction_Nm and self.presliding_Nm):
             return ()
         yield_rad = self.presliding_Nm / omnid_design().sea_stiffness_Nm_per_rad
@@ -133,11 +137,12 @@ class SeaHysteresis(Effect):
 
 @dataclass(frozen=True)
 class JointFriction(Effect):
-    """Coulomb [N m] and viscous [N m s/rad] friction between a driven link and the chassis, past its spring.
+    """Coulomb [N m] and viscous [N m s/rad] friction between a driven link and the chassis.
 
-    A fixed tendon of motor plus spring (so its length is phi) with ``frictionloss``, and a soft ``tendon`` equality
-    (see ``mocobot_sim.scene.soft``) as its damper. The sensor does not feel it. With
-    ``presliding_rad`` dry friction is a slider behind a spring of its own, which slips after that way.
+    It acts on the link side of the spring, so the torque sensor does not measure it. Implemented as ``frictionloss`` of
+    a fixed tendon along motor and spring, whose length is phi, with a soft ``tendon`` equality as the damper (see
+    ``mocobot_sim.scene.soft``). With ``presliding_rad`` above zero, the Coulomb friction yields elastically and slips
+    after that angle.
     """
 
     where: ClassVar[Literal["driven", "gimbal"]] = "driven"
@@ -153,7 +158,7 @@ class JointFriction(Effect):
     presliding_rad: float = 0.0
 
     def actors(self, trial_number: int | None) -> Sequence[Slider]:
-        """The slider behind its spring."""
+        """The presliding element, if there is Coulomb friction with presliding."""
         if not (self.coulomb_Nm and self.presliding_rad):
             return ()
         return (Slider(self.where, self.robot, self.joint, self.coulomb_Nm, self.presliding_rad),)
@@ -179,13 +184,13 @@ class JointFriction(Effect):
 class GimbalFriction(JointFriction):
     """Coulomb [N m] and viscous [N m s/rad] friction of one gimbal joint (joints 1, 2, 3 are z, y, x).
 
-    ``frictionloss`` of ``rows`` fixed tendons along the joint, and a soft ``joint`` equality (see
-    ``mocobot_sim.scene.soft``) as its damper: damping of the joint itself would pull the welds open. With
-    ``presliding_rad`` dry friction is a slider behind a spring of its own, which slips after that way.
+    Implemented as ``frictionloss`` of several fixed tendons along the joint, with a soft ``joint`` equality as the
+    damper (see ``mocobot_sim.scene.soft``). Damping of the joint itself would open the welds. With ``presliding_rad``
+    above zero, the Coulomb friction yields elastically and slips after that angle.
 
     Attributes:
-        rows: The gimbal is light, so one row would creep (see ``STICK``): stiction would fade within ten seconds.
-            Rows side by side share the torque, and creep by as much less.
+        rows: number of parallel friction tendons. One row would creep on the light gimbal (see ``STICK``), so that
+            stiction fades within ten seconds; several rows share the torque and creep less.
     """
 
     rows: ClassVar[int] = 8

@@ -1,1 +1,1 @@
-"""Extended models: folders that plain MuJoCo loads."""
+"""Extended models of teams: folders that plain MuJoCo can load."""

@@ -1,4 +1,4 @@
-"""Extended models: a team with its effects, or as calibrated, as a folder for plain MuJoCo and for trials."""
+"""Extended models: folders with a team and its effects or calibration, for plain MuJoCo and for trials."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ POSE = ("position_m", "quaternion_wxyz")
 
 
 def poses_to_list(poses: RigidTransform) -> list[dict[str, list[float]]]:
-    """One object per pose."""
+    """Convert poses to JSON objects with position [m] and unit quaternion (w first)."""
     quats = poses.rotation.as_quat(scalar_first=True)
     return [
         dict(zip(POSE, (p.tolist(), q.tolist()), strict=True))
@@ -40,10 +40,15 @@ def poses_to_list(poses: RigidTransform) -> list[dict[str, list[float]]]:
 
 
 def read_poses(read: Fields, key: str, count: int) -> RigidTransform:
-    """Poses as ``poses_to_list`` writes them.
+    """Read poses in the form of ``poses_to_list``.
+
+    Args:
+        read: the object that contains the list.
+        key: key of the list.
+        count: required number of poses.
 
     Raises:
-        InputError: they are not so many, or one of them is no pose.
+        InputError: the number of poses is wrong, or an entry is not a pose.
     """
     positions, quats = [], []
     for i, entry in enumerate(read.list(key, count), start=1):
@@ -56,9 +61,12 @@ def read_poses(read: Fields, key: str, count: int) -> RigidTransform:
 
 
 def readme(effects: Sequence[Mapping[str, Any]], robots: int, healthy: int = 0) -> str:
-    """Markdown for a user who finds the folder; effects as ``effect_to_dict`` gives them.
+    """Write the README of an extended model in Markdown.
 
-    The last ``healthy`` of them are of parts that are off by no more than others.
+    Args:
+        effects: effects in the form of ``effect_to_dict``.
+        robots: number of robots.
+        healthy: how many effects at the end belong to parts whose deviations are within tolerance.
     """
     named = len(effects) - healthy
     table = _table(effects[:named])
@@ -104,7 +112,7 @@ VERSION = 1
 SCENE, NUMBERS, README = "team.xml", "effects.json", "README.md"
 AS_BUILT, SENSORS = (tuple(entry.name for entry in fields(kind)) for kind in (AsBuilt, SensorEffects))
 MASSES = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
-"""What older folders do not say of a unit: that it has the masses of its design."""
+"""Optional keys of a unit: older folders lack them, and the masses are then those of the design."""
 INITIAL = ("phi_rad", "theta_rad")
 KEYS = (
     "format", "version", "robots", "effects", "wrist_home_b_m", "theta_home_rad", "grasps", "mounts", "initial",
@@ -116,18 +124,19 @@ def write_extended(
     scene: TeamScene, effects: Sequence[Effect], folder: Path, extra: dict[str, Any],
     healthy: Sequence[Effect] = (),
 ) -> None:  # fmt: skip
-    """Write a scene, effects applied, as an extended model; the folder appears whole or not at all.
+    """Write a scene with effects as an extended model; the folder appears complete or not at all.
 
     Args:
-        scene: what ``apply_effects`` returned.
-        effects: what was applied.
-        folder: to be created; an extended model that is there already is replaced.
-        extra: plain JSON values to keep with it.
-        healthy: what was applied besides, of parts that are off by no more than others; its README tells them apart.
+        scene: scene returned by ``apply_effects``.
+        effects: effects in the scene that are named as causes.
+        folder: folder to create; an existing extended model is replaced.
+        extra: JSON values to store with the model.
+        healthy: other effects in the scene, of parts whose deviations are within tolerance; the README lists them
+            separately.
 
     Raises:
-        InputError: the folder is something else, or cannot be written, ``extra`` is not plain JSON, or the robots hold
-            nothing.
+        InputError: the folder exists and is not an extended model, it cannot be written, ``extra`` is not plain JSON,
+            or there is no payload.
     """
     if not scene.carries:
         raise InputError(f"{folder}: the robots hold nothing; an extended model carries a payload")
@@ -167,11 +176,11 @@ def write_extended(
 
 
 def load_extended(folder: Path) -> TeamScene:
-    """Read an extended model; the scene runs like the one that was written, but takes no further effects.
+    """Read an extended model; its scene simulates like the original, but accepts no further effects.
 
     Raises:
-        InputError: a file is missing or cannot be read, a key is unknown, missing or has a value that is not
-            allowed, or the MJCF is not the team that the numbers describe.
+        InputError: a file is missing or cannot be read; a key is unknown, missing or has an invalid value; or the
+            MJCF does not match the numbers.
     """
     folder = Path(folder)
     where = str(folder / NUMBERS)
@@ -230,17 +239,17 @@ def load_extended(folder: Path) -> TeamScene:
 
 
 def extra_of(folder: Path) -> dict[str, Any]:
-    """What was kept with an extended model.
+    """Read the extra values that were stored with an extended model.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: the file cannot be read.
     """
     path = Path(folder) / NUMBERS
     return _fields(parse_json(_read(path), str(path)), str(path)).object("extra")
 
 
 def _fields(values: dict[str, Any], where: str) -> Fields:
-    """The numbers; models written before grasps could turn have no ``grasp_slack_rad``."""
+    """Check the keys of the numbers; older models lack ``grasp_slack_rad``, which is then zero."""
     slack_m = values.get("grasp_slack_m")
     if isinstance(slack_m, list):
         values = {"grasp_slack_rad": [0.0] * len(slack_m), **values}
@@ -266,20 +275,24 @@ def _check_model(scene: TeamScene, path: Path) -> None:
 
 
 NOISE = 4.0
-"""Standard errors by which a principal moment may be moved to be that of a body."""
+"""Largest correction of a principal moment, in standard errors, that makes an inertia physical. Chosen."""
 LEAST_MOMENT_RATIO = 1e-3
-"""Least principal moment over the largest."""
+"""Smallest over largest principal moment of a calibrated payload. Chosen."""
 
 
 def calibrated_team(
     calibration: Calibration, payload: int = 0, initial: tuple[Array, Array] | None = None
 ) -> TeamScene:
-    """The team as calibrated, where it stood in the first recording of a payload.
+    """Build the calibrated team with the base poses of the first recording of a payload.
 
-    ``initial`` is the true (phi, theta) near which trials start [rad], two arrays (N, 3); None for home.
+    Args:
+        calibration: result of the calibration.
+        payload: index of the payload, from 0.
+        initial: true (phi, theta) near which trials start [rad], two arrays (N, 3); None for home.
 
     Raises:
-        InputError: the robots are of another design, there is no such payload, or its numbers are none of a rigid body.
+        InputError: the robots have another design, there is no recording of the payload, or no rigid body has its mass
+            and inertia.
     """
     if calibration.design != omnid_design():
         raise InputError("the calibrated robots are of another design than the simulated Omnid")
@@ -295,7 +308,7 @@ def calibrated_team(
         if tilt.any()
     ]
     p = trial.bases.p.copy()
-    for tilt in tilts:  # they turn about the mount, below {b}
+    for tilt in tilts:  # the tilt is about the mount, below {b}
         p[tilt.robot - 1] -= trial.bases.R[tilt.robot - 1] @ tilt.base_shift()
     scene = build_team(
         payload_mjcf(found.mass_kg, found.p_1c, _of_a_body(found), X_1i),
@@ -309,7 +322,10 @@ def calibrated_team(
 
 
 def _of_a_body(found: Carried) -> Array:
-    """The inertia that a body can have where noise made it none, as it does of a flat one; else what was found."""
+    """Replace an inertia by the nearest physical one, if the change is within its uncertainty; else return it as is.
+
+    Noise can make the fitted inertia of a flat body unphysical.
+    """
     inertia = 0.5 * (found.inertia + found.inertia.T)
     nearest = nearest_inertia(inertia, LEAST_MOMENT_RATIO)
     moved = np.abs(np.linalg.eigvalsh(nearest) - found.principal.moments)
@@ -319,10 +335,12 @@ def _of_a_body(found: Carried) -> Array:
 def write_calibrated(
     calibration: Calibration, folder: Path, payload: int = 0, initial: tuple[Array, Array] | None = None
 ) -> None:
-    """Write the calibrated team as an extended model, which ``mocobot simulate --model`` takes.
+    """Write the calibrated team as an extended model for ``mocobot simulate --model``.
+
+    Arguments are as in ``calibrated_team``.
 
     Raises:
-        InputError: as ``calibrated_team``, or the folder cannot be written.
+        InputError: as in ``calibrated_team``, or the folder cannot be written.
     """
     scene = calibrated_team(calibration, payload, initial)
     label = calibration.payloads[payload].label

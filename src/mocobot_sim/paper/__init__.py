@@ -1,1 +1,1 @@
-"""The paper's experiment: trials of its payloads, estimates, and their scores beside its Tables II-V."""
+"""The paper's experiment: simulated trials of its payloads, estimates, and comparison with its Tables II-V."""

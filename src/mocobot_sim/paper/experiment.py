@@ -1,11 +1,12 @@
 """Simulate the paper's trials, estimate from the recordings, score against Table I.
 
-Order as in the paper (section IV.C): random trials first; the grasps estimated from them construct the periodic
-motion and the static orientations; then everything is estimated, staged as in the paper and in one fit beside it.
+The order is that of the paper (section IV.C). Random trials come first. The grasps estimated from them define the
+periodic motion and the static orientations. Then all parameters are estimated twice: in stages as in the paper, and in
+one joint fit.
 
-The fit is one least squares per payload, of closed loops and balance of wrenches of three trials. Robots that are as
-designed are held so. Robots that are not calibrate themselves on the same recordings, or are held as another payload's
-recordings have calibrated them.
+The joint fit is one least-squares problem per payload, with residuals of loop closure and wrench balance over three
+trials. Robots without deviations are held at the design. Robots with deviations are calibrated on the same recordings,
+or held at the calibration from another payload's recordings.
 """
 
 from __future__ import annotations
@@ -39,15 +40,15 @@ ONE_FIT = "nominal, one fit"
 SELF_CALIBRATED = "uncalibrated, self-calibrated"
 TRANSFER = "uncalibrated, transfer"
 COLUMNS = {"nominal": (ONE_FIT,), "uncalibrated": (SELF_CALIBRATED, TRANSFER)}
-"""What stands beside the column of a preset."""
+"""Columns with results of joint fits, by preset."""
 NO_SPREAD = Prior().scaled(0.0)
-"""Robots exactly as designed."""
+"""Prior that holds all robots exactly at the design."""
 
 
 def three_trials(recordings: Sequence[Recording]) -> list[Recording]:
-    """The first recording of every kind of trial: a random, a static and a periodic one.
+    """Select the first recording of each kind of trial: random, static and periodic.
 
-    More of them would cost minutes, and noise is no longer what limits a fit of three.
+    A fit of three recordings is not limited by noise, and more recordings would take minutes longer.
     """
     first: dict[str, Recording] = {}
     for recording in recordings:
@@ -58,12 +59,15 @@ def three_trials(recordings: Sequence[Recording]) -> list[Recording]:
 def estimate_both(
     recordings: Sequence[Recording], fitted: bool
 ) -> tuple[PayloadEstimate, PayloadEstimate | None]:
-    """The staged estimate from one payload's recordings, and where ``fitted`` what a fit of three of them starts from.
+    """Make the staged estimate from one payload's recordings and, if ``fitted``, the initial estimate of a joint fit.
 
-    Recordings, read through one preset, are processed once for both.
+    All recordings must have the same preset. They are processed once for both estimates.
+
+    Returns:
+        The staged estimate, and the initial estimate for a fit of ``three_trials``; None without ``fitted``.
 
     Raises:
-        InputError: nothing can be estimated from them.
+        InputError: nothing can be estimated from the recordings.
     """
     with within_arithmetic([recording.name for recording in recordings]):
         trials = [trial_of(recording) for recording in recordings]
@@ -78,43 +82,48 @@ def fit_trials(
     robots: Calibration | None = None,
     start: PayloadEstimate | None = None,
 ) -> Calibration:
-    """Fit what one payload's recordings, read through one preset, say of it.
+    """Estimate a payload by one joint fit of its recordings.
 
-    Robots of a calibrated preset are held as designed, others calibrate themselves, or are held as ``robots`` came out
-    with another payload. ``start`` is what ``start_estimate`` makes of the recordings, if that is known.
+    Robots of a calibrated preset are held at the design. Other robots are calibrated in the same fit, unless ``robots``
+    is given.
+
+    Args:
+        recordings: recordings of one payload with one preset.
+        preset: name of the preset.
+        robots: calibration from another payload at which the robots are held; None for none.
+        start: result of ``start_estimate`` for these recordings; None to compute it.
 
     Raises:
-        InputError: the recordings do not determine it.
+        InputError: the recordings do not determine the parameters.
     """
     as_designed = robots is None and sensor_preset(preset).calibrated
     starts = None if start is None else {recordings[0].metadata.payload: start}
     return calibrate(recordings, prior=NO_SPREAD if as_designed else None, robots=robots, starts=starts)
 
 
-# Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
+# Positions p_1i and orientations R_1i. Arrays pass between processes unchanged; a RigidTransform is normalised again.
 Grasps = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
 class PaperPlan:
-    """What to run.
+    """Options of the experiment.
 
     Raises:
-        InputError: an unknown payload or preset, or a number out of range.
+        InputError: a payload or preset is unknown or repeated, or a number is out of range.
     """
 
     payloads: tuple[str, ...] = ("a", "b", "c", "d")  # names of shipped payloads
     presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")  # names of sensor presets
-    # random trials per payload; half as many (at least one) are periodic, as in the paper's 6 and 3, and as many
-    # random ones serve the inertia
+    # random trials per payload; half as many trials (at least one) are periodic, as in the paper (6 and 3)
     trials: int = 6
-    seed: int = 0  # seed of everything random
+    seed: int = 0  # seed of all random numbers
     vias: int = 80  # vias of a random trial
     duration_s: float = 60.0  # length of a periodic trial's motion [s]
-    staged_only: bool = False  # whether to leave the fits beside the paper's own method out
+    staged_only: bool = False  # whether to skip the joint fits
 
     def __post_init__(self) -> None:
-        """Check before hours are spent."""
+        """Check the options."""
         for payload in self.payloads:
             payload_path(payload)
         for preset in self.presets:
@@ -130,18 +139,18 @@ class PaperPlan:
 
     @property
     def inertia_trials(self) -> int:
-        """Periodic trials, and random trials that serve the inertia."""
+        """Number of periodic trials, which is also the number of random trials used for the inertia."""
         return max(1, self.trials // 2)
 
     @property
     def steps(self) -> int:
-        """Units of progress: simulated trials, estimates and fits."""
+        """Total number of tasks: simulated trials, estimates and fits."""
         teams = len(self.teams()) * len(self.payloads)
         estimates = len(self.presets) * len(self.payloads) + len(self.fits()) + len(self.transfers())
         return teams * (self.trials + self.inertia_trials + 2) + estimates
 
     def fits(self) -> list[tuple[str, str, str]]:
-        """Column, preset and payload of every fit to a payload's own recordings."""
+        """Column, preset and payload of every joint fit without a given calibration."""
         return [
             (COLUMNS[preset][0], preset, payload)
             for preset in self.presets
@@ -150,7 +159,7 @@ class PaperPlan:
         ]
 
     def transfers(self) -> list[tuple[str, str, str]]:
-        """The same of every fit with the robots as the first payload has calibrated them."""
+        """Column, preset and payload of every joint fit with the robots held at the first payload's calibration."""
         return [
             (TRANSFER, preset, payload)
             for column, preset, payload in self.fits()
@@ -158,7 +167,7 @@ class PaperPlan:
         ]
 
     def teams(self) -> list[list[SensorPreset]]:
-        """Presets that share their robots, and so their trials; the least ideal last, however they were asked for."""
+        """Groups of presets that share robots and trials, each in the order of ``PRESETS`` (worst sensors last)."""
         groups: dict[Any, list[SensorPreset]] = {}
         for name in sorted(self.presets, key=list(PRESETS).index):
             groups.setdefault(sensor_preset(name).spread, []).append(sensor_preset(name))
@@ -167,17 +176,18 @@ class PaperPlan:
 
 @dataclass
 class PaperResult:
-    """What came out, by preset and payload."""
+    """Results of the experiment."""
 
-    # errors against Table I, by preset or column of fits; the content of ``paper.json``. The payload that calibrated
-    # the robots has none (None) in the column of the transfer
+    # errors against Table I by preset or column of fits, then payload; the content of ``paper.json``. In the transfer
+    # column the payload that calibrated the robots has None
     scores: dict[str, dict[str, dict[str, Any] | None]] = field(default_factory=dict)
-    estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)  # the staged estimates
-    # the fits beside them, by column and payload
+    # staged estimates, by preset and payload
+    estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)
+    # joint fits, by column and payload
     fits: dict[str, dict[str, Calibration]] = field(default_factory=dict)
-    # the recordings they came from
+    # recordings, by preset and payload
     recordings: dict[str, dict[str, list[Recording]]] = field(default_factory=dict)
-    trials: list[TrialSummary] = field(default_factory=list)  # a summary of every simulated trial
+    trials: list[TrialSummary] = field(default_factory=list)  # summaries of all simulated trials
 
 
 def run_paper(
@@ -191,20 +201,21 @@ def run_paper(
     """Run the whole experiment; the result does not depend on the number of processes.
 
     Args:
-        plan: what to run.
-        jobs: parallel processes.
-        progress: called several times a second, from another thread, with the steps done, parts of trials counting, all
-            steps, and the name of the stage that runs.
-        store: where outcomes are kept as they end; those that are there already are taken from it.
-        remote: whether joblib's backend has its processes on other machines.
+        plan: options.
+        jobs: number of parallel processes.
+        progress: called several times a second from another thread. Arguments: tasks done (fractions included), all
+            tasks, name of the current stage.
+        store: keeps the outcome of each finished task; stored outcomes are not computed again.
+        remote: whether joblib's backend runs processes on other machines.
 
     Raises:
-        TrialError: the physics of a trial cannot be trusted.
+        InputError: the recordings do not determine an estimate.
+        TrialError: the simulation of a trial failed a check.
     """
     result = PaperResult()
     teams = list(product(plan.payloads, plan.teams()))
-    # Far away all is sent at once: workers may come while it runs. A task's arguments are one tuple (``work``), which
-    # joblib does not put on a worker beforehand, where they would be lost with it.
+    # Remote backends get all tasks at once, because workers may join later. The arguments of a task are one tuple;
+    # joblib does not scatter it to a worker in advance, so a lost worker does not lose it.
     ahead = "all" if remote else "2 * n_jobs"
     with Parallel(
         n_jobs=jobs, return_as="generator_unordered", pre_dispatch=ahead, **ends_with_this()
@@ -217,7 +228,7 @@ def run_paper(
         ]
         recordings = _collect(first, each("random trials", _trial, first), result)
 
-        # Grasps from the random trials, read through the team's last (least ideal) preset.
+        # Estimate the grasps from the random trials with the team's last preset, which has the worst sensors.
         random = [(recordings[payload, team[-1].name],) for payload, team in teams]
         grasps = list(each("grasps", _grasps, random))
         second = [
@@ -256,11 +267,11 @@ def run_paper(
 
 
 def _untold(_done: float, _steps: float, _stage: str) -> None:
-    """Nobody wants to know."""
+    """Default for ``progress``: do nothing."""
 
 
 def _scores(plan: PaperPlan, result: PaperResult) -> dict[str, dict[str, dict[str, Any] | None]]:
-    """Presets in their order, the fits beside each."""
+    """Score all results, in the order of the presets, each followed by its joint fits."""
     scores: dict[str, dict[str, dict[str, Any] | None]] = {}
     for preset in plan.presets:
         units = {payload: draw_units(payload, sensor_preset(preset), plan.seed) for payload in plan.payloads}
@@ -310,7 +321,7 @@ def _collect(
     outcomes: Iterable[tuple[dict[str, Recording], TrialSummary]],
     result: PaperResult,
 ) -> dict[tuple[str, str], list[Recording]]:
-    """Recordings by (payload, preset), in the order of the tasks."""
+    """Collect recordings by (payload, preset), in the order of the tasks, and add summaries to ``result``."""
     recordings: dict[tuple[str, str], list[Recording]] = {}
     for (request, _, _), (measured, summary) in zip(tasks, outcomes, strict=True):
         result.trials.append(summary)

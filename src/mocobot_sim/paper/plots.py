@@ -1,4 +1,4 @@
-"""Pictures of Tables II-V: our errors beside the published ones, on logarithmic axes."""
+"""Plots of Tables II-V: our errors and the published ones on logarithmic axes."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,15 +23,15 @@ MARKERS = {
 HOLLOW = (ONE_FIT, TRANSFER)
 DPI = 130
 SHARE = "springs' common scale"
-"""A line in the plots of mass and inertia: what no carry decides."""
+"""Label of the line in the plots of mass and inertia for the common stiffness scale (see ``spring_share``)."""
 
 
 @plain_words()
 def save_plots(scores: AllScores, folder: Path) -> list[Path]:
-    """Draw one picture per table group and return their paths.
+    """Draw one plot per group of tables and return the paths.
 
     Args:
-        scores: by preset or column of fits, then payload, as in ``paper.json``.
+        scores: scores by preset or column of fits, then payload, as in ``paper.json``.
         folder: existing folder for ``grasps.png``, ``mass_com.png`` and ``inertia.png``.
     """
     tables = {table.number: table for table in paper_tables(scores)}
@@ -45,7 +45,7 @@ def save_plots(scores: AllScores, folder: Path) -> list[Path]:
     def picture(
         name: str, size: tuple[float, float], across: int, *panels: tuple[Sequence[Row], str]
     ) -> Path:
-        # Without pyplot: no display, no global state.
+        # Avoid pyplot, which needs a display and has global state.
         shown = [one for one in panels if one[0]]
         across = min(across, len(shown))
         down = -(-len(shown) // across)
@@ -82,13 +82,16 @@ def save_plots(scores: AllScores, folder: Path) -> list[Path]:
 
 
 def _label(row: Row) -> str:
-    """Payload, and the pair or the moment where there are several."""
+    """Label of a row: payload, and pair or moment where there are several."""
     part = "" if row.quantity in ("m", "p1c") else row.quantity.lstrip("Rp")
     return f"({row.payload}) {part}".rstrip()
 
 
 def _dots(axis: Axes, columns: Sequence[str], rows: Sequence[Row], title: str) -> None:
-    """One dot per column and row; whiskers reach up by one standard deviation (down has no meaning on a log axis)."""
+    """Draw one dot per column and row, with an upward whisker of one standard deviation.
+
+    There is no downward whisker, because the axis is logarithmic.
+    """
     labels = [_label(row) for row in rows]
     for k, name in enumerate(columns):
         x = [i + min(0.13, 0.8 / len(columns)) * (k - (len(columns) - 1) / 2) for i in range(len(rows))]
@@ -119,7 +122,7 @@ def _save(figure: Figure, legend_of: Axes, path: Path) -> Path:
         ncols=len(labels) if len(labels) <= 6 else -(-len(labels) // 2), frameon=False, fontsize=9,
         columnspacing=1.2, handletextpad=0.2,
     )  # fmt: skip
-    # savefig would lay out while it draws once for nobody; laid out before, the picture is drawn once.
+    # Compute the layout here: savefig would draw the figure an extra time for it.
     figure.set_dpi(DPI)
     engine = figure.get_layout_engine()
     if engine is not None:

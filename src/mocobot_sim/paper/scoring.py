@@ -1,13 +1,13 @@
 """The paper's tables as data, and errors of an estimate as the paper defines them (Tables II-V).
 
-Rotation errors are the angle of R_ij^T Rhat_ij, position errors Euclidean norms, percentages relative to the
-norm of the truth. Tables II and III: mean and standard deviation, over the random trials, of each trial's own
-error norm. Table IV: one static set, with the grasps pooled. Table V: magnitude of the mean *signed* error
-and standard deviation of the estimates over trials, so the two say bias and scatter. Standard deviations
-divide by n - 1; one trial has none (null).
+Rotation errors are angles of R_ij^T Rhat_ij, and position errors are Euclidean norms. Percentages are relative to the
+norm of the true value. Tables II and III give mean and standard deviation of the error norm over the random trials.
+Table IV uses one static set and the pooled grasps. Table V gives bias (magnitude of the mean *signed* error) and
+scatter (standard deviation of the estimates over trials). Standard deviations divide by n - 1; for one trial they are
+null.
 
-Sensors see grasp frames turned by the zero of the gimbal's last axis, which nothing that they measure can tell. Errors
-are therefore given in both frames: those of the CAD, as in the paper, and those that the encoders define.
+The zero of the gimbal's last axis turns the grasp frames that the sensors measure, and no measurement can determine
+it. Errors are therefore given in the frames of the CAD model, as in the paper, and in those defined by the encoders.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ from mocobot_sim.scene.as_built import AsBuilt, theta_x_zeros, units_of
 
 @dataclass(frozen=True)
 class PayloadTruth:
-    """What is true of a payload; frames as in ``PayloadEstimate``."""
+    """True parameters of a payload; frames as in ``PayloadEstimate``."""
 
-    name: str  # label of the payload
+    name: str  # name of the payload
     R_1i: Array  # rotations of the grasp frames in {1}, shape (N, 3, 3)
-    p_1i: Array  # their origins in {1} [m], shape (N, 3)
+    p_1i: Array  # origins of the grasp frames in {1} [m], shape (N, 3)
     mass: float  # mass [kg]
     p_1c: Array  # centre of mass in {1} [m], shape (3,)
     R_1c: Array  # principal axes in {1}, as columns, shape (3, 3)
-    principal_moments: Array  # about the axes of {c}, ascending [kg m^2], shape (3,)
+    principal_moments: Array  # principal moments of inertia, ascending [kg m^2], shape (3,)
 
     @property
     def inertia(self) -> Array:
-        """Inertia matrix in {b}: about the centre of mass, axes of {1} [kg m^2], shape (3, 3)."""
+        """Inertia matrix about the centre of mass in the axes of {1} [kg m^2], shape (3, 3)."""
         return self.R_1c @ np.diag(self.principal_moments) @ self.R_1c.T
 
     def seen_by_encoders(self, theta_x_zero: Array) -> PayloadTruth:
-        """The same in the frames that the encoders define: each {i} turned about its x axis by that theta_x's zero.
+        """Express the truth in the frames defined by the encoders: each {i} turned about its x axis by the zero.
 
         Args:
             theta_x_zero: reading minus true theta_x of every robot [rad], shape (N,).
@@ -73,9 +73,9 @@ _TRUTH = (
 
 
 def payload_truth(name: str) -> PayloadTruth:
-    """Table I for payload ``"a"``, ``"b"``, ``"c"`` or ``"d"``.
+    """True parameters of payload ``"a"``, ``"b"``, ``"c"`` or ``"d"`` from Table I.
 
-    T_12 and T_31 are taken as printed; T_13 is the inverse of T_31, and T_23 follows.
+    T_12 and T_31 are taken as printed; T_23 is computed from them.
 
     Raises:
         InputError: there is no such payload.
@@ -97,7 +97,7 @@ def payload_truth(name: str) -> PayloadTruth:
 
 
 def published_errors(name: str) -> dict[str, Any]:
-    """Tables II-V for a payload, keys as of ``mocobot_sim.paper.scoring.score``; inertia under ``"all"`` only.
+    """Published errors of a payload (Tables II-V), with the keys of ``score``; inertia only under ``"all"``.
 
     Raises:
         InputError: there is no such payload.
@@ -106,7 +106,7 @@ def published_errors(name: str) -> dict[str, Any]:
 
 
 def printed_truth(name: str) -> dict[str, Any]:
-    """The row of Table I exactly as printed (degrees, metres), T_23 included.
+    """Values of Table I exactly as printed (degrees, metres), T_23 included.
 
     Raises:
         InputError: there is no such payload.
@@ -130,15 +130,17 @@ MOMENTS = ("Ixx", "Iyy", "Izz")
 
 
 ENCODER_FRAMES = "encoder_frames"
-"""Key of the errors of grasps and centre of mass in the frames that the encoders define."""
+"""Key of the errors of grasps and centre of mass in the frames defined by the encoders."""
 SPRING_SCALE = "spring_scale"
-"""Key of what the team's common spring scale does to a calibrated mass and inertia, and of the errors beyond it."""
+"""Key of the relative error due to the common stiffness scale of a team's springs, and of the errors beyond it."""
 
 
 @dataclass(frozen=True)
 class TrialSummary:
-    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg], and
-    the damping ratio of its control, below 0 if that was unstable."""
+    """Largest payload rotation, SEA torque, rod and weld gaps and weld angle of one trial, and its damping ratio.
+
+    The damping ratio of the control is below 0 if the control was unstable, and None if it is unknown.
+    """
 
     name: str
     rotation_deg: float
@@ -152,17 +154,16 @@ class TrialSummary:
 def score(
     estimate: PayloadEstimate, truth: PayloadTruth, units: Sequence[AsBuilt] | None = None
 ) -> dict[str, Any]:
-    """Errors of one payload's estimate; null where the estimate has no value.
+    """Compute the errors of one payload's staged estimate; None where the estimate has no value.
 
-    Grasps are scored on each recording with trial ``"random"``, inertia on ``"random"`` and ``"periodic"``
-    ones. The paper takes three trials of each kind for the inertia but six random ones for the grasps:
-    ``"all"`` therefore pools the periodic recordings with as many of the first random ones (with all of
-    either kind if the other has none), and ``"random"`` is that same selection.
+    Grasps are scored on random trials, inertia on random and periodic trials. The paper uses six random trials for the
+    grasps, but three trials of each kind for the inertia. Therefore ``"random"`` uses only the first random trials, as
+    many as there are periodic ones (all if there is none). ``"all"`` pools these and the periodic trials.
 
     Args:
-        estimate: of the payload.
-        truth: in the frames of the CAD.
-        units: the robots as built, empty for all as designed; None leaves ``"encoder_frames"`` out.
+        estimate: estimate of the payload.
+        truth: true parameters in the frames of the CAD model.
+        units: deviations of the robots, empty for robots as designed; None omits ``"encoder_frames"``.
 
     Returns:
         ``{"R12_deg": {"mean", "std"}, "p12_m": {"mean", "std"}, "p12_percent": {"mean", "std"}, (23, 31),
@@ -193,19 +194,20 @@ def score(
 
 
 def score_fit(found: CalibratedPayload, truth: PayloadTruth, units: Sequence[AsBuilt]) -> dict[str, Any]:
-    """Errors of a payload that one fit of several recordings gave; means of one, without standard deviations.
+    """Compute the errors of a payload from one joint fit; each mean has one value and no standard deviation.
 
-    A carry does not decide the common scale of all springs, so masses and inertias come out as truth / (1 + mean
-    stiffness ratio) of the team; ``"spring_scale"`` says how much that is, and what the errors are beyond it.
+    Trials with a payload do not determine the common stiffness scale of all springs. Fitted masses and inertias are
+    therefore truth / (1 + mean stiffness ratio of the team). ``"spring_scale"`` gives this relative error and the
+    errors that remain beyond it.
 
     Args:
-        found: of the payload.
-        truth: in the frames of the CAD.
-        units: the robots as built, empty for all as designed.
+        found: fitted payload.
+        truth: true parameters in the frames of the CAD model.
+        units: deviations of the robots, empty for robots as designed.
 
     Returns:
-        The keys of ``score`` but ``"random"`` and ``"periodic"``, and ``"spring_scale"``: ``{"percent", "m_percent",
-        "Ixx_percent", "Iyy_percent", "Izz_percent"}``, the first with its sign.
+        The keys of ``score`` except ``"random"`` and ``"periodic"``, and ``"spring_scale"``: ``{"percent",
+        "m_percent", "Ixx_percent", "Iyy_percent", "Izz_percent"}``. Only the first has a sign.
     """
     numbers = carried(found, 0.0)
     mass, p_1c, moments = numbers.mass_kg, numbers.p_1c, numbers.principal.moments

@@ -1,4 +1,4 @@
-"""Stages of an experiment: many tasks each, in several processes, with progress; outcomes kept on disk as they end."""
+"""Run the stages of an experiment in parallel processes, with progress, and store the outcome of each task on disk."""
 
 from __future__ import annotations
 
@@ -24,25 +24,28 @@ from estimator.recording.model import Recording
 from mocobot_sim.paper.scoring import TrialSummary
 
 FOLDER = "partial"
-"""In the folder of the results, until all is done."""
+"""Subfolder of the results folder that holds the outcomes until the run is complete."""
 OUTCOMES = (Recording, TrialSummary, PayloadEstimate, Calibration)
 WHAT = "an outcome of an interrupted run"
 
 
 class Store:
-    """A folder of outcomes, a file each, that appear whole or not at all.
+    """A folder with one file per outcome; files appear complete or not at all.
 
-    Plain values, arrays and the dataclasses of results: a run that goes on has the same bits as one that was never
-    interrupted, and a file of somebody else's can do no more than be refused.
+    Outcomes consist of plain values, arrays and the dataclasses of results. A resumed run gives results identical to an
+    uninterrupted one. Reading a file never executes code, so a foreign file can only be refused.
     """
 
     def __init__(self, out: Path, key: str, *, force: bool) -> None:
-        """Open the store in a folder of results.
+        """Open the store in a results folder.
 
-        The key is of everything that outcomes depend on; ``force`` drops what a run with another one left there.
+        Args:
+            out: results folder.
+            key: hash of everything that the outcomes depend on.
+            force: whether to delete outcomes of runs with other keys.
 
         Raises:
-            InputError: another run left something there, or it cannot be written.
+            InputError: there are outcomes of a run with another key, or the folder cannot be written.
         """
         self._top = out / FOLDER
         self.folder = self._top / key
@@ -57,14 +60,14 @@ class Store:
         make_folder(self.folder)
 
     def has(self, stage: str, k: int) -> bool:
-        """Whether the outcome of a stage's task is there."""
+        """Whether the outcome of task ``k`` of a stage is stored."""
         return self._file(stage, k).is_file()
 
     def get(self, stage: str, k: int) -> Any:
-        """An outcome.
+        """Read the outcome of task ``k`` of a stage.
 
         Raises:
-            InputError: it cannot be read.
+            InputError: the file cannot be read or is not an outcome.
         """
         path = self._file(stage, k)
         facts, arrays = read_archive(path, WHAT)
@@ -74,10 +77,10 @@ class Store:
             raise InputError(f"{path}: not {WHAT} ({words(error)})") from error
 
     def put(self, stage: str, k: int, outcome: Any) -> None:
-        """Keep an outcome.
+        """Store the outcome of task ``k`` of a stage.
 
         Raises:
-            InputError: it cannot be written.
+            InputError: the file cannot be written.
         """
         arrays: list[NDArray[Any]] = []
         facts = _plain(outcome, arrays)
@@ -85,7 +88,7 @@ class Store:
             write_archive(temporary, facts, {str(k): array for k, array in enumerate(arrays)}, compress=False)
 
     def drop(self) -> None:
-        """Remove everything: the results are written."""
+        """Delete all stored outcomes; call it after the results are written."""
         shutil.rmtree(self._top, ignore_errors=True)
 
     def _file(self, stage: str, k: int) -> Path:
@@ -93,7 +96,7 @@ class Store:
 
 
 def _plain(value: Any, arrays: list[NDArray[Any]]) -> Any:
-    """A value as JSON has it: lists, plain scalars, and pairs of a kind and what it holds; arrays by number."""
+    """Encode a value for JSON: lists, scalars, and objects {kind: content}; arrays are collected and referenced."""
     if isinstance(value, np.ndarray | np.generic):
         arrays.append(np.asarray(value))
         return {"array": len(arrays) - 1}
@@ -115,7 +118,7 @@ def _value(told: Any, arrays: dict[str, NDArray[Any]]) -> Any:
         return told
     ((kind, held),) = told.items()
     if kind == "array":
-        return arrays[str(held)][()]  # a scalar as it was
+        return arrays[str(held)][()]  # turns a 0-d array back into a scalar
     if kind == "tuple":
         return tuple(_value(each, arrays) for each in held)
     values = {key: _value(each, arrays) for key, each in held.items()}
@@ -124,7 +127,7 @@ def _value(told: Any, arrays: dict[str, NDArray[Any]]) -> Any:
 
 @cache
 def _kinds() -> dict[str, type]:
-    """Dataclasses that outcomes are made of, by name."""
+    """Dataclasses that can occur in outcomes, by name."""
     return {kind.__name__: kind for root in OUTCOMES for kind in _within(root)}
 
 
@@ -139,14 +142,15 @@ def _within(kind: Any) -> Iterator[type]:
 
 
 EVERY_S = 0.2
-"""Time between two looks at the shares."""
+"""Interval between two reports of progress [s]. Chosen."""
 
 
 @contextmanager
 def shares(tasks: int, told: Callable[[float], object]) -> Iterator[Array]:
-    """Watch tasks while the block runs; yields the share of each that is done, which they write to in any process.
+    """Context manager that reports the progress of tasks in any process.
 
-    ``told`` is called, from a thread of its own, with how much is done, in tasks; at first with 0.
+    It yields a shared array with one entry per task, to which a task writes the fraction that is done. ``told`` is
+    called with the sum of the entries: first with 0, then regularly from a separate thread.
     """
     with scratch_folder() as folder:
         done = np.memmap(folder / "shares", dtype=float, mode="w+", shape=(tasks,))
@@ -172,26 +176,29 @@ Progress = Callable[[float, float, str], object]
 
 
 class Work:
-    """Runs stage after stage.
+    """Runs the stages of an experiment one after the other.
 
     Attributes:
-        steps: tasks of all stages.
-        progress: called with what is done, ``steps``, and the name of the stage.
-        store: where outcomes are kept; None to keep none.
-        remote: whether the processes are on other machines: they cannot say how much of a task is done.
+        steps: number of tasks of all stages.
+        progress: called with the number of tasks done, ``steps``, and the name of the stage.
+        store: store for outcomes; None to store none.
+        remote: whether the processes run on other machines, where they cannot report fractions of a task.
     """
 
     def __init__(
         self, pool: Parallel, steps: int, progress: Progress, store: Store | None, *, remote: bool
     ) -> None:
-        """Run in an open pool, which returns outcomes as they come (``generator_unordered``)."""
+        """Use an open joblib pool that returns outcomes in order of completion (``generator_unordered``)."""
         self.steps, self.progress, self.store, self.remote = steps, progress, store, remote
         self._pool, self._before = pool, 0
 
     def each(
         self, stage: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]
     ) -> Iterator[Any]:
-        """Outcomes of a function of a share to write to and a task, in the order of the tasks."""
+        """Run all tasks of a stage and yield their outcomes in the order of the tasks.
+
+        ``function`` is called with an array of one entry for its progress, followed by the items of the task.
+        """
         start, self._before = self._before, self._before + len(tasks)
         kept = {k for k in range(len(tasks)) if self.store is not None and self.store.has(stage, k)}
         with shares(len(tasks), lambda now: self.progress(start + now, self.steps, stage)) as done:
@@ -223,5 +230,5 @@ class Work:
 
 
 def _run(share: Array | None, k: int, function: Callable[..., Any], task: tuple[Any, ...]) -> tuple[int, Any]:
-    """One task, with its number: outcomes come as they are done."""
+    """Run one task; return its number with the outcome, because outcomes arrive in any order."""
     return k, function(np.zeros(1) if share is None else share, *task)

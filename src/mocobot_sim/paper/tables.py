@@ -1,7 +1,7 @@
-"""Tables II-V: the paper's columns, then those of every sensor preset, as rows of numbers and as text.
+"""Tables II-V as rows of numbers and as text: a column of the published values, then columns of each sensor preset.
 
-Beside the staged estimate of a preset stands what one fit gives (``mocobot_sim.paper.experiment``). Where the frames
-that the encoders define are known, grasps and centres of mass have rows in these, too.
+Columns of joint fits (``mocobot_sim.paper.experiment``) follow that of the staged estimate. If errors in the frames
+defined by the encoders are available, grasps and centres of mass have additional rows for them.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from mocobot_sim.paper.scoring import ENCODER_FRAMES, MOMENTS, SPRING_SCALE, pub
 
 PAIRS = ("12", "23", "31")
 PAPER = "paper"
-"""Name of the column of published figures."""
+"""Name of the column of published values."""
 Scores = Mapping[str, Any]
 AllScores = Mapping[str, Mapping[str, Scores | None]]
-"""By preset or column of fits, then payload, as in ``paper.json``; None where a column has nothing for a payload."""
+"""Scores by preset or column of fits, then payload, as in ``paper.json``; None if a column has no value."""
 BY_ENCODERS = "encoder frames"
-"""Marks rows in the frames that the encoders define; the others are in those of the CAD."""
+"""Label of rows with errors in the frames defined by the encoders; other rows use the frames of the CAD model."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One number, with its spread where it is a mean of several; None marks what there is not."""
+    """A number and, for a mean, its standard deviation; None if missing."""
 
     value: float | None
     spread: float | None = None
@@ -35,25 +35,25 @@ class Cell:
 class Row:
     """One quantity of one payload."""
 
-    payload: str  # its name; empty in the summary, which is over all payloads
-    quantity: str  # such as ``R12`` or ``mass``
-    unit: str  # of the numbers
+    payload: str  # name of the payload; empty in the summary, which covers all payloads
+    quantity: str  # name of the quantity, such as ``R12`` or ``mass``
+    unit: str  # unit of the numbers
     cells: tuple[Cell, ...]  # one per column of the table
-    frames: str = ""  # ``BY_ENCODERS`` or, for the frames of the CAD, empty
+    frames: str = ""  # ``BY_ENCODERS``; empty for the frames of the CAD model
 
 
 @dataclass(frozen=True)
 class PaperTable:
-    """A table with one column of published figures, then ours."""
+    """A table with one column of published values and columns of our results."""
 
-    number: str  # of the paper's table, such as ``II``; empty for the summary
-    title: str  # what it shows
-    note: str  # what the numbers are
-    columns: tuple[str, ...]  # ``paper``, then the presets and the fits beside them
-    rows: tuple[Row, ...]  # payload by payload
+    number: str  # number of the paper's table, such as ``II``; empty for the summary
+    title: str  # title
+    note: str  # explanation of the numbers
+    columns: tuple[str, ...]  # ``paper``, then each preset followed by its joint fits
+    rows: tuple[Row, ...]  # rows, grouped by payload
 
     def part(self, unit: str, quantity: str | None = None, frames: str = "") -> PaperTable:
-        """The rows of one unit and kind of frames only, or of one quantity in them."""
+        """Keep only the rows with a given unit and kind of frames and, unless None, a given quantity."""
         rows = tuple(
             row
             for row in self.rows
@@ -63,10 +63,10 @@ class PaperTable:
 
 
 def paper_tables(scores: AllScores) -> list[PaperTable]:
-    """Tables II, III, IV and V.
+    """Make Tables II, III, IV and V.
 
     Args:
-        scores: by preset, then payload, as in ``paper.json``.
+        scores: scores by preset, then payload, as in ``paper.json``.
     """
     columns, payloads = _columns(scores)
     frames = ("", BY_ENCODERS) if _entries(scores, ENCODER_FRAMES) else ("",)
@@ -120,7 +120,7 @@ def paper_tables(scores: AllScores) -> list[PaperTable]:
 
 
 def summary_table(scores: AllScores) -> PaperTable:
-    """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
+    """Make a table of the largest mean error of each kind over payloads and pairs or moments."""
     columns, payloads = _columns(scores)
     frames = ("", BY_ENCODERS) if _entries(scores, ENCODER_FRAMES) else ("",)
     grasps = [
@@ -162,23 +162,26 @@ def summary_table(scores: AllScores) -> PaperTable:
 
 
 def spring_share(scores: AllScores) -> float | None:
-    """Size of what the common spring scale of calibrated teams, all of one seed, takes off mass and inertia [%]."""
+    """Largest relative error of mass and inertia due to the common stiffness scale of the springs [%]; None if unknown.
+
+    Calibration with a payload cannot determine this scale.
+    """
     found = [abs(entry["percent"]) for entry in _entries(scores, SPRING_SCALE)]
     return max(found, default=None)
 
 
 _Kind = tuple[str, str, str, str, str]
-"""Quantity, unit, where in the scores its value and its spread are, frames."""
+"""Quantity, unit, paths of its value and standard deviation in the scores, frames."""
 
 
 def _columns(scores: AllScores) -> tuple[dict[str, Mapping[str, Scores | None]], list[str]]:
-    """The columns by name, the published figures first, and the payloads."""
+    """Scores by column, the published values first, and the names of the payloads."""
     payloads = list(next(iter(scores.values())))
     return {PAPER: {p: published_errors(p) for p in payloads}, **scores}, payloads
 
 
 def _entries(scores: AllScores, key: str) -> list[Scores]:
-    """What all columns and payloads have under a key that not all have."""
+    """Collect the values under an optional key from all columns and payloads."""
     return [
         entry[key]
         for column in scores.values()
@@ -192,7 +195,7 @@ def _in_frames(entry: Scores | None, frames: str) -> Scores | None:
 
 
 def _at(entry: Scores, path: str) -> float | None:
-    """The number under keys that dots join."""
+    """Look up a number by a path of keys joined by dots."""
     value: Any = entry
     for key in path.split("."):
         value = value[key]
@@ -214,7 +217,7 @@ def _fits_note(scores: AllScores) -> str:
 
 
 def _scale_note(scores: AllScores, names: Sequence[str]) -> str:
-    """How much of a calibrated mass's or inertia's error is the common spring scale's."""
+    """Sentence on the share of the common spring scale in the errors of mass and inertia; may be empty."""
     found = [entry for entry in _entries(scores, SPRING_SCALE) if entry["percent"]]
     if not found:
         return ""
@@ -227,17 +230,17 @@ def _scale_note(scores: AllScores, names: Sequence[str]) -> str:
 
 
 def number(value: float | None) -> str:
-    """Two significant digits; ``none`` where there is no number."""
+    """Format a number with two significant digits; ``none`` if it is missing."""
     if value is None:
         return "none"
     return f"{value:.2g}" if value >= 1e-4 or value == 0 else f"{value:.1e}"
 
 
 def format_tables(scores: AllScores) -> str:
-    """All four tables.
+    """Format Tables II-V as text.
 
     Args:
-        scores: by preset, then payload, as in ``paper.json``.
+        scores: scores by preset, then payload, as in ``paper.json``.
     """
     blocks = []
     for table in paper_tables(scores):
@@ -253,7 +256,7 @@ def format_tables(scores: AllScores) -> str:
 
 
 def format_summary(scores: AllScores) -> str:
-    """The summary as text."""
+    """Format the summary table as text."""
     table = summary_table(scores)
     rows = [
         [_framed(f"{row.quantity} [{row.unit}]", row), *map(format_cell, row.cells)] for row in table.rows
@@ -263,7 +266,7 @@ def format_summary(scores: AllScores) -> str:
 
 
 def format_cell(cell: Cell) -> str:
-    """``0.94 +- 0.21``, two significant digits; ``none`` where there is no number."""
+    """Format a cell as ``0.94 +- 0.21``; ``none`` if the number is missing."""
     value = number(cell.value)
     return value if cell.spread is None else f"{value} +- {number(cell.spread)}"
 
@@ -273,7 +276,7 @@ def _framed(label: str, row: Row) -> str:
 
 
 def _heads(columns: Sequence[str]) -> list[list[str]]:
-    """Heads in two lines where one has a comma."""
+    """Split the column heads at their commas into two lines, if any has one."""
     if not any(", " in column for column in columns):
         return [list(columns)]
     parts = [column.partition(", ") for column in columns]
@@ -281,7 +284,7 @@ def _heads(columns: Sequence[str]) -> list[list[str]]:
 
 
 def _wrapped(note: str) -> str:
-    held = note.replace(" %", "\0%")  # a number and its unit stay together
+    held = note.replace(" %", "\0%")  # keep numbers and their unit on one line
     return "\n".join(wrap(held, 120)).replace("\0", " ")
 
 

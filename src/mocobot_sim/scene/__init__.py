@@ -1,1 +1,1 @@
-"""The team in MJCF."""
+"""Scenes of a team in MJCF."""

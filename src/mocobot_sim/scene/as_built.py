@@ -1,4 +1,4 @@
-"""How one real unit differs from its design: geometry, springs, masses, zeros and timing of sensors."""
+"""Deviations of real robots from their design: geometry, springs, masses, sensor zeros and sensor timing."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ CALIBRATED = {
     "stiffness_ratio": "stiffness_ratio", "phi_zero_rad": "phi_zero", "theta_zero_rad": "theta_zero",
     "tau_zero_Nm": "tau_zero", "proximal_mass_ratio": "proximal_mass_ratio", "rod_mass_ratio": "rod_mass_ratio",
 }  # fmt: skip
-"""Attributes of ``AsBuilt``, and what a calibration calls them."""
+"""Name in a calibration by attribute of ``AsBuilt``."""
 WRIST_BODIES = ("platform", "yoke", "ring", "flange")
-"""What translates with the wrist."""
+"""Bodies that translate with the wrist."""
 
 
 @dataclass(frozen=True)
 class AsBuilt:
-    """Deviations of one Omnid from its design, one entry per leg 1..3 (or gimbal axis z, y, x).
+    """Deviations of one Omnid from its design, one entry per leg 1..3 or gimbal axis z, y, x.
 
-    Geometry, stiffness and masses change the simulated robot; zeros change what its sensors and its controller read.
-    The estimator and the controller keep using the design.
+    Geometry, stiffness and masses change the simulated robot. Zeros change the readings in the log and in the
+    controller. Estimator and controller use the nominal design.
 
     Attributes:
         base_radius_m: base radius minus design [m], shape (3,).
@@ -47,8 +47,7 @@ class AsBuilt:
         tau_zero_Nm: reading minus true spring torque [N m], shape (3,).
         proximal_mass_ratio: mass and inertia of the driven link over design, minus 1, shape (3,).
         rod_mass_ratio: mass and inertia of the rod over design, minus 1, shape (3,).
-        wrist_mass_ratio: mass and inertia of platform and gimbal, which translate with the wrist, over design,
-            minus 1.
+        wrist_mass_ratio: mass and inertia of platform and gimbal (``WRIST_BODIES``) over design, minus 1.
     """
 
     base_radius_m: Array = field(default_factory=lambda: np.zeros(3))
@@ -64,14 +63,18 @@ class AsBuilt:
     wrist_mass_ratio: float = 0.0
 
     def to_dict(self) -> dict[str, list[float] | float]:
-        """Plain JSON values by the names above."""
+        """Convert to JSON values, by attribute."""
         return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
 
 
 def units_as_built(units: ArmUnit) -> tuple[AsBuilt, ...]:
-    """Calibrated robots, ``x`` of shape (N, ``COUNT``), to be simulated; a tilted base is the mount's, not the arm's.
+    """Convert calibrated robots to deviations for the simulation.
 
-    What the base's radius is off minus the platform's is given to the base, as kinematics cannot part them.
+    Base tilt is not included, because it belongs to the mount. Kinematics determine only the difference of base and
+    platform radius, so the base radius gets all of its deviation.
+
+    Args:
+        units: calibrated parameters of N robots, ``x`` of shape (N, ``COUNT``).
     """
     return tuple(
         AsBuilt(
@@ -83,10 +86,10 @@ def units_as_built(units: ArmUnit) -> tuple[AsBuilt, ...]:
 
 
 def units_of(as_built: Sequence[AsBuilt], robots: int) -> tuple[AsBuilt, ...]:
-    """One unit per robot; none given means all as designed.
+    """Return one ``AsBuilt`` per robot; an empty sequence means that all robots are as designed.
 
     Raises:
-        InputError: units are given, but not one per robot.
+        InputError: the sequence is neither empty nor has one entry per robot.
     """
     if as_built and len(as_built) != robots:
         raise InputError(f"as_built has {len(as_built)} units; the payload has {robots} grasps")
@@ -94,20 +97,20 @@ def units_of(as_built: Sequence[AsBuilt], robots: int) -> tuple[AsBuilt, ...]:
 
 
 def theta_x_zeros(as_built: Sequence[AsBuilt], robots: int) -> Array:
-    """What every robot's theta_x reads too much [rad], shape (N,); see ``units_of``."""
+    """Zero (reading minus true angle) of theta_x of every robot [rad], shape (N,); arguments as in ``units_of``."""
     return np.array([unit.theta_zero_rad[2] for unit in units_of(as_built, robots)])
 
 
 @dataclass(frozen=True)
 class CalibrationSpread:
-    """Standard deviations of as-built deviations, normally distributed and independent.
+    """Standard deviations of independent, normally distributed deviations from the design.
 
     Attributes:
-        encoder_zero_rad: of each phi and theta zero [rad].
-        stiffness_ratio: of each spring's relative stiffness [-].
-        geometry_m: of each base radius, platform radius, proximal and rod length [m].
-        tau_zero_Nm: of each torque zero [N m].
-        arm_mass_ratio: of the relative mass of each driven link, each rod and each wrist [-].
+        encoder_zero_rad: standard deviation of each phi and theta zero [rad].
+        stiffness_ratio: standard deviation of each spring's relative stiffness [-].
+        geometry_m: standard deviation of each base radius, platform radius, proximal and rod length [m].
+        tau_zero_Nm: standard deviation of each torque zero [N m].
+        arm_mass_ratio: standard deviation of the relative mass of each driven link, rod and wrist [-].
     """
 
     encoder_zero_rad: float = 0.0
@@ -117,13 +120,15 @@ class CalibrationSpread:
     arm_mass_ratio: float = 0.0
 
     def draw(self, robots: int, rng: np.random.Generator) -> tuple[AsBuilt, ...]:
-        """Draw one team; robot i's unit does not depend on how many robots follow it."""
+        """Draw the deviations of a team; those of robot i do not depend on the number of robots after it."""
         zeros = (self.encoder_zero_rad, self.encoder_zero_rad, self.tau_zero_Nm)
-        spreads = np.array([*[self.geometry_m] * 4, self.stiffness_ratio, *zeros])  # as the fields of AsBuilt
+        spreads = np.array(
+            [*[self.geometry_m] * 4, self.stiffness_ratio, *zeros]
+        )  # in the order of AsBuilt's fields
         units = tuple(AsBuilt(*(spreads[:, None] * rng.standard_normal((8, 3)))) for _ in range(robots))
         if not self.arm_mass_ratio:
             return units
-        # A stream of their own: the rest of a unit is the same with and without them, and whatever the team's size.
+        # Masses have a separate random stream, so that they do not change the other deviations.
         masses = rng.spawn(1)[0]
         drawn = ((unit, self.arm_mass_ratio * masses.standard_normal(7)) for unit in units)
         return tuple(
@@ -135,16 +140,16 @@ class CalibrationSpread:
 
 
 def deviate(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
-    """Move one unit's geometry, springs and masses off their design values.
+    """Apply deviations of geometry, springs and masses to the MJCF of one Omnid.
 
-    Mass and inertia of a body scale together, as those of denser or thicker parts would.
+    Mass and inertia of a body scale by the same ratio.
     """
     deviate_geometry(omnid, unit)
     ratios = {f"proximal{k + 1}": unit.proximal_mass_ratio[k] for k in range(3)}
     ratios |= {f"rod{k + 1}": unit.rod_mass_ratio[k] for k in range(3)}
     ratios |= dict.fromkeys(WRIST_BODIES, unit.wrist_mass_ratio)
     for body, ratio in ratios.items():
-        if ratio:  # a design's own numbers keep their bits
+        if ratio:  # leave design values bit-identical
             inertial = omnid.find("body", body).inertial
             inertial.mass = inertial.mass * (1.0 + ratio)
             inertial.diaginertia = inertial.diaginertia * (1.0 + ratio)
@@ -154,7 +159,7 @@ def deviate(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
 
 
 def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
-    """Move one unit's geometry by what ``unit`` says, on top of what it is."""
+    """Add the geometric deviations of ``unit`` to the MJCF of one Omnid."""
     for k in range(3):
         azimuth = 2.0 * np.pi * k / 3.0
         u = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -163,7 +168,7 @@ def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
         rod = omnid.find("body", f"rod{k + 1}")
         rod.pos = rod.pos + np.array([unit.proximal_length_m[k], 0.0, 0.0])
         tip = omnid.find("site", f"rod{k + 1}_tip")
-        if unit.rod_length_m[k]:  # a longer rod has its mass along all of it
+        if unit.rod_length_m[k]:  # the mass stays evenly distributed along the changed rod
             grown = 1.0 + unit.rod_length_m[k] / tip.pos[0]
             rod.inertial.pos = rod.inertial.pos * grown
             rod.inertial.diaginertia = rod.inertial.diaginertia * np.array([1.0, grown**2, grown**2])
@@ -175,19 +180,19 @@ def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
 NAMES = tuple(entry.name for entry in fields(AsBuilt))
 WRIST_MASS = "wrist_mass_ratio"
 PAYLOAD = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2", "effects", "control")
-"""What the truth beside a recording says besides; payload, effects and control are chosen anew."""
+"""Keys of the truth beside a recording that ``read_units`` ignores."""
 RANGES = {"_m": (-0.05, 0.05), "_ratio": (-0.9, 10.0)}
-"""Ranges of lengths and ratios, as the effects of that kind have them; zeros may be any number."""
+"""Allowed ranges of lengths and ratios by suffix, equal to those of the effects; zeros may be any number."""
 
 
 def read_units(path: Path) -> tuple[AsBuilt, ...]:
-    """Robots of a JSON file ``{"as_built": [{"phi_zero_rad": [0.01, 0, 0], ...}, ...]}``, one object each.
+    """Read robots from a JSON file ``{"as_built": [{"phi_zero_rad": [0.01, 0, 0], ...}, ...]}``, one object each.
 
-    Names are those of ``AsBuilt``; what is left out is as designed. The truth beside a recording is such a file: its
-    robots have the zeros, lengths and springs that effects gave them; all other effects have to be asked for again.
+    Keys are the attributes of ``AsBuilt``; missing ones are as designed. The truth beside a recording is such a file:
+    its robots include the zeros, lengths and springs of effects. All other effects must be given again.
 
     Raises:
-        InputError: it cannot be read, or a key or a value is not allowed.
+        InputError: the file cannot be read, or a key or value is not allowed.
     """
     read = Fields(read_json(path, "a team's units"), ("as_built",), str(path), PAYLOAD)
     entries = enumerate(read.list("as_built"), start=1)
@@ -195,7 +200,7 @@ def read_units(path: Path) -> tuple[AsBuilt, ...]:
 
 
 def unit_in(read: Fields) -> AsBuilt:
-    """One robot of an object's values; what the object does not have is as designed.
+    """Read one robot from an object's values; missing attributes are as designed.
 
     Raises:
         InputError: a value is not allowed.
@@ -205,7 +210,7 @@ def unit_in(read: Fields) -> AsBuilt:
 
 
 def _checked(read: Fields) -> AsBuilt:
-    """One robot whose numbers are within their ranges."""
+    """Read one robot and check that its numbers are within their ranges."""
     unit = unit_in(read)
     for name in read.values:
         low, high = next((r for end, r in RANGES.items() if name.endswith(end)), (-np.inf, np.inf))
@@ -217,21 +222,21 @@ def _checked(read: Fields) -> AsBuilt:
 
 @dataclass(frozen=True)
 class SensorEffects:
-    """Timing faults, one entry per robot; empty tuples mean none."""
+    """Timing faults of the sensors, one entry per robot; empty tuples mean none."""
 
-    # the logged torque is that much older than the angles beside it [s], N entries
+    # age of the logged torques relative to the angles in the same row [s]
     torque_delay_s: tuple[float, ...] = ()
-    # time constant of a first-order lag in the torque sensor, before log and controller [s]
+    # time constant of a first-order lag in the torque sensors, for log and controller [s]
     torque_lag_s: tuple[float, ...] = ()
-    # everything the robot logs was sampled that much too early [s]; the controller is unaffected
+    # time stamp minus sampling time of everything that the robot logs [s]; the controller is unaffected
     clock_delay_s: tuple[float, ...] = ()
 
     def of(self, name: str, robots: int) -> tuple[float, ...]:
-        """One attribute's values, N entries, zeros where there is no fault [s]."""
+        """Values of one attribute, one per robot, 0 for no fault [s]."""
         return getattr(self, name) or (0.0,) * robots
 
     def added(self, name: str, robot: int, value_s: float, robots: int) -> SensorEffects:
-        """A copy in which one robot's (1-based) value is larger by ``value_s`` [s]."""
+        """Return a copy with ``value_s`` [s] added to one attribute of one robot, counted from 1."""
         values = list(self.of(name, robots))
         values[robot - 1] += value_s
         return replace(self, **{name: tuple(values)})

@@ -1,4 +1,4 @@
-"""Shipped models and their numbers, known without MuJoCo; where the truth beside a recording is."""
+"""Shipped models and their design parameters, without loading MuJoCo; path of the truth beside a recording."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ GIMBAL_AXES = ("z", "y", "x")
 
 @cache
 def models_dir() -> Path:
-    """Folder that holds ``omnid`` and ``payload_*``: in the repository, or inside an installed wheel.
+    """Folder with ``omnid`` and ``payload_*``, in the repository or in an installed wheel.
 
     Raises:
-        FileNotFoundError: the installation carries no models.
+        FileNotFoundError: the installation has no models.
     """
     here = Path(__file__).resolve()
     for folder in (here.parents[1] / "mjcf", here.parents[3] / "models"):
@@ -38,7 +38,7 @@ def payload_names() -> list[str]:
 
 
 def payload_path(name: str) -> Path:
-    """MJCF file of a shipped payload.
+    """Path of the MJCF file of a shipped payload.
 
     Raises:
         InputError: there is no payload of that name.
@@ -50,7 +50,7 @@ def payload_path(name: str) -> Path:
 
 @cache
 def omnid_design() -> OmnidDesign:
-    """Design numbers of the shipped Omnid model."""
+    """Design parameters of the shipped Omnid."""
     from estimator.arm.design import load_design
 
     return load_design(models_dir() / "omnid" / "design.toml")
@@ -58,15 +58,15 @@ def omnid_design() -> OmnidDesign:
 
 @cache
 def base_height_m() -> float:
-    """Height of {b} over the floor mount of an Omnid, whose axes it shares [m]."""
-    import mujoco  # the only number that its model has to be asked for
+    """Height of {b} above the floor mount of an Omnid [m]; the axes of both frames are parallel."""
+    import mujoco  # here, because only this value needs the model
 
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
     return float(posed(model).body("base").xpos[2])
 
 
 def posed(model: mujoco.MjModel, qpos: Array | None = None) -> mujoco.MjData:
-    """Data with the poses of everything at ``qpos``, shape (nq,); None for ``qpos0``."""
+    """Make MuJoCo data with all poses computed at ``qpos``, shape (nq,); None for ``qpos0``."""
     import mujoco
 
     data = mujoco.MjData(model)
@@ -77,5 +77,5 @@ def posed(model: mujoco.MjModel, qpos: Array | None = None) -> mujoco.MjData:
 
 
 def truth_path(recording: Path) -> Path:
-    """Sidecar of a recording: ``rec.parquet`` has ``rec.truth.json``."""
+    """Path of the ground truth of a recording: ``rec.truth.json`` for ``rec.parquet``."""
     return recording.with_suffix(".truth.json")

@@ -1,12 +1,12 @@
-"""One Omnid in MJCF: loaded, parked or released, put where it stands (PyMJCF).
+"""One Omnid in PyMJCF: load it, park or release it, and attach it to a scene.
 
-A released one stands on four mecanum wheels with real rollers: ellipsoids, surfaces of revolution about their axles.
-Seen along the wheel's axle, an ellipsoid of half axes (l, r, r) whose axle is turned away from the floor by t reaches
-below the wheel's centre by
+A released Omnid stands on four mecanum wheels with free rollers, which are ellipsoids of revolution about their axles.
+Seen along the wheel's axle, a roller with half axes (l, r, r) at the angle t from straight down reaches below the
+wheel's centre by
 
     (R - r) cos t + sqrt(r^2 + (l^2 - r^2) sin(a)^2 sin(t)^2)
 
-so twelve of them make a wheel that is round within 0.09 mm.
+where R is the wheel radius and a the roller angle. A wheel with twelve rollers is round within 0.09 mm.
 """
 
 from __future__ import annotations
@@ -23,19 +23,20 @@ from mocobot_sim.scene.models import models_dir
 from mocobot_sim.scene.pymjcf import mjcf
 
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
+# Half width of the drawn hub of a wheel [m]. Chosen: for display only.
 HUB_HALF_WIDTH_M = 0.018
-# MuJoCo's friction yields a little under any load; this many times stiffer than the contact, it creeps by
+# Stiffness of friction relative to the normal contact. Chosen: MuJoCo's friction creeps under load, with this ratio by
 # micrometres per second (docs/base.md).
 FRICTION_RATIO = 100.0
 CONTACT_SOLIMP = [0.9, 0.95, 0.001, 0.5, 2.0]  # MuJoCo's default
-# Only rollers and floor touch each other: a payload's own geoms, whatever they are, have no part in it.
+# Contact bit of floor and rollers, so that they touch only each other, whatever bits the geoms of a payload have.
 FLOOR_BIT = 1 << 10
 
 
 def wheel_reach(design: BaseDesign, angle: ArrayLike) -> Array:
-    """Height of the wheel's centre over a floor that one roller touches [m], shape (...).
+    """Height of the wheel's centre above the floor when a given roller touches it [m], shape (...).
 
-    The roller's middle is away from straight down by ``angle`` about the wheel's axle [rad], shape (...).
+    ``angle`` is the angle of the roller's middle from straight down about the wheel's axle [rad], shape (...).
     """
     t = np.asarray(angle, dtype=float)
     r, half = design.roller_radius_m, design.roller_half_length_m
@@ -44,10 +45,10 @@ def wheel_reach(design: BaseDesign, angle: ArrayLike) -> Array:
 
 
 def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
-    """Put rollers on the wheels of an Omnid, motors on their axles, and take its planar joints away.
+    """Add rollers and motors to the wheels of an Omnid and remove its planar joints.
 
-    Wheels keep their mass and their inertia. The chassis then needs a free joint, which belongs to the frame by which
-    the robot is attached.
+    Mass and inertia of each wheel stay unchanged. The caller must add a free joint to the frame with which the robot is
+    attached.
 
     Raises:
         InputError: the rollers are heavier than the wheel.
@@ -57,7 +58,7 @@ def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
     for wheel, hand in zip(WHEELS, HAND, strict=True):
         name = f"wheel_{wheel}"
         hub = omnid.find("body", name)
-        # What is left of the cylinder is a hub to look at.
+        # Shrink the cylinder to a hub, for display.
         radius = design.wheel_radius_m - 1.8 * design.roller_radius_m
         omnid.find("geom", name).size = [radius, HUB_HALF_WIDTH_M]
         inertia = np.array(hub.inertial.diaginertia)
@@ -78,7 +79,7 @@ def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
 
 
 def rough_floor(root: mjcf.RootElement, design: BaseDesign) -> None:
-    """Let rollers stand on the floor of a scene: contact with elliptic friction cones, as stiff as the other loops."""
+    """Enable contact between rollers and floor, with elliptic friction cones."""
     root.option.flag.contact = "enable"
     root.option.cone, root.option.impratio = "elliptic", FRICTION_RATIO
     floor = root.find("geom", "floor")
@@ -89,13 +90,13 @@ def rough_floor(root: mjcf.RootElement, design: BaseDesign) -> None:
 
 
 def _add_roller(hub: Any, name: str, angle: float, hand: float, design: BaseDesign) -> Array:
-    """Add the roller whose middle is ``angle`` [rad] from straight down; its inertia about the hub's x, y, z axes."""
+    """Add a roller at ``angle`` [rad] from straight down; return its moments of inertia about the hub's axes."""
     mass, r, half = design.roller_mass_kg, design.roller_radius_m, design.roller_half_length_m
     sin, cos = np.sin(design.roller_angle_rad), np.cos(design.roller_angle_rad)
     outward = np.array([-np.sin(angle), 0.0, -np.cos(angle)])
     axle = np.array([sin * np.cos(angle), hand * cos, -sin * np.sin(angle)])
     at = (design.wheel_radius_m - r) * outward
-    # Solid ellipsoid.
+    # Moments of a solid ellipsoid.
     along, across = mass * 2.0 * r**2 / 5.0, mass * (half**2 + r**2) / 5.0
     roller = hub.add("body", name=name, pos=at, zaxis=axle)
     damping = design.roller_damping_Nms_per_rad
@@ -110,19 +111,19 @@ def _add_roller(hub: Any, name: str, angle: float, hand: float, design: BaseDesi
 
 
 def load_omnid(number: int) -> mjcf.RootElement:
-    """The shipped model, its names prefixed with ``omnid{number}/`` when it is attached."""
+    """Load the shipped Omnid; attached to a scene, its names have the prefix ``omnid{number}/``."""
     omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
     omnid.model = f"omnid{number}"
     return omnid
 
 
 def stand(root: mjcf.RootElement, omnid: mjcf.RootElement, place: ArrayLike, quat: ArrayLike) -> Any:
-    """Attach an Omnid to a scene at a place [m], shape (3,), turned by a quaternion, w first; returns its frame."""
+    """Attach an Omnid to a scene at a position [m], shape (3,), and quaternion (w first); return its frame."""
     name = omnid.model.replace("omnid", "mount")
     return root.worldbody.add("site", name=name, group=4, pos=place, quat=quat).attach(omnid)
 
 
 def park(omnid: mjcf.RootElement) -> None:
-    """Lock base and wheels to the floor, exactly and at no cost: a parked joint is one that is not there."""
+    """Fix base and wheels of an Omnid to the floor by removing their joints."""
     for name in (*BASE_JOINTS, *(f"wheel_{wheel}" for wheel in WHEELS)):
         omnid.find("joint", name).remove()

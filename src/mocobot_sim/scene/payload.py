@@ -1,4 +1,4 @@
-"""A payload's MJCF: one rigid body, its frame at the first grasp, a site at every grasp; read from a file or made."""
+"""MJCF of a payload, read from a file or generated: one rigid body with frame {1} and a site at every grasp."""
 
 from __future__ import annotations
 
@@ -18,21 +18,22 @@ from mocobot_sim.scene.models import payload_path, posed
 from mocobot_sim.scene.pymjcf import compiled, mjcf
 
 OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
-# What else a payload's file may hold: the rest of MJCF would act on the robots too, or on the payload from outside.
+# Top-level elements that a payload's file may have. All others would also affect the robots or act on the payload.
 OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbody")
 GRASP = re.compile(r"grasp([0-9]+)")
 
 
 def load_payload(payload: str | Path) -> mjcf.RootElement:
-    """Read a payload's MJCF: a shipped one by its name, or the ``.xml`` file of a path.
+    """Read the MJCF of a payload, given as the name of a shipped payload or the path of an ``.xml`` file.
 
     Raises:
-        InputError: it cannot be read, something in it would act on the robots, or it names files of others.
+        InputError: the file cannot be read, has elements that would affect the robots, or refers to files outside its
+            folder.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
     if path.exists():
         check_model(path)
-    read = mjcf.from_path  # a refusal of its own where dm-control is missing
+    read = mjcf.from_path  # outside the try: a missing dm-control has its own error
     try:
         root = read(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
@@ -40,7 +41,7 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
         raise InputError(f"{path}: not a readable MJCF ({printable(said)})") from error
     check_named(path, assets=True)
     if root.compiler.angle != "radian":
-        # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
+        # The composed scene has one compiler setting for all parts, so degrees would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')
     own = set(root.compiler.get_attributes()) - set(OWN_COMPILER_SETTINGS)
     if own:
@@ -59,15 +60,17 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
 
 
 def _is_set(element: Any) -> bool:
-    """Whether the file says anything in an element; PyMJCF has empty ones for all that it does not."""
+    """Whether an element has any content in the file; PyMJCF also lists elements that the file does not have."""
     return bool(element.get_attributes()) or any(_is_set(child) for child in element.all_children())
 
 
 def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
-    """Grasp frames X_1i, N transforms; from the compiled payload, so every MJCF orientation attribute works.
+    """Grasp frames X_1i of a payload, N transforms.
+
+    They are read from the compiled payload, so all orientation attributes of MJCF are supported.
 
     Raises:
-        InputError: MuJoCo cannot compile it, or it is not one rigid body ``payload`` with sites ``grasp1`` ..
+        InputError: MuJoCo cannot compile the payload, or it is not one rigid body ``payload`` with sites ``grasp1`` ..
             ``graspN``, the first at its origin.
     """
     try:
@@ -99,7 +102,7 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
 
 
 def _check_rigid(model: mujoco.MjModel, where: str) -> None:
-    """The payload is one rigid body ``payload`` with all the mass: the ground truth is read from it."""
+    """Check that one rigid body ``payload`` has all the mass; the ground truth is read from this body."""
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "payload")
     if body < 0:
         raise InputError(f"{where}: the payload has no body 'payload'")
@@ -110,7 +113,7 @@ def _check_rigid(model: mujoco.MjModel, where: str) -> None:
             f"{where}: the payload must be free to move and have its weight: no mocap, no gravcomp"
         )
     if (model.geom_bodyid == 0).any():
-        # It would ride on robot 1's flange with the payload, its mass unseen by the ground truth.
+        # Such a geom would be attached to robot 1's flange, and the ground truth would miss its mass.
         raise InputError(f"{where}: a geom stands in the world; all geoms must be in body 'payload'")
     numbers = [*model.body_mass, *model.body_inertia[body], *model.body_ipos[body]]
     if not np.isfinite(numbers).all():
@@ -123,19 +126,19 @@ def _check_rigid(model: mujoco.MjModel, where: str) -> None:
 
 
 def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTransform) -> mjcf.RootElement:
-    """Make a payload for ``build_team``.
+    """Generate the MJCF of a payload for ``build_team``.
 
     Args:
-        mass_kg: mass, greater than 0.
+        mass_kg: mass, greater than 0 [kg].
         p_1c: centre of mass in {1} [m], shape (3,).
-        inertia_1: inertia about the centre of mass in the axes of {1} [kg m^2], shape (3, 3), symmetric.
-        X_1i: grasp frames in {1}, N transforms; the first is taken as the identity.
+        inertia_1: symmetric inertia about the centre of mass in the axes of {1} [kg m^2], shape (3, 3).
+        X_1i: grasp frames in {1}, N transforms; the first is assumed to be the identity.
 
     Returns:
-        A body ``payload`` at {1} with sites ``grasp1`` .. ``graspN`` and ``com``, and thin bars to look at.
+        A body ``payload`` at {1} with sites ``grasp1`` .. ``graspN`` and ``com``, and thin bars for display.
 
     Raises:
-        InputError: a number is not finite, or mass and inertia are those of no rigid body.
+        InputError: a number is not finite, or no rigid body has this mass and inertia.
     """
     p_1c, inertia_1 = np.asarray(p_1c, dtype=float), np.asarray(inertia_1, dtype=float)
     if not 0 < mass_kg < np.inf:
@@ -164,14 +167,16 @@ def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTrans
 
 
 def nearest_inertia(inertia: Array, least_ratio: float) -> Array:
-    """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum.
+    """Find an inertia of a rigid body close to a given one: positive moments, none above the sum of the others.
 
-    ``inertia`` is symmetric, shape (3, 3) [kg m^2]; ``least_ratio`` is the smallest moment over the largest.
+    Args:
+        inertia: symmetric inertia [kg m^2], shape (3, 3).
+        least_ratio: lower limit of the smallest principal moment over the largest.
     """
     moments, axes = np.linalg.eigh(inertia)
     moments = np.maximum(moments, least_ratio * max(moments[-1], 1e-9))
     excess = moments[2] - moments[0] - moments[1]
-    if excess > 0:  # moved to the sum of the others in equal parts
+    if excess > 0:  # change all moments by equal amounts until the largest is at most the sum of the others
         moments = moments + np.array([1.0, 1.0, -1.0]) * excess / 3.0 * 1.001
     return (axes * moments) @ axes.T
 

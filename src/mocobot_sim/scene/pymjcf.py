@@ -1,7 +1,7 @@
-"""PyMJCF (``dm_control.mjcf``), imported when a scene is first composed, and without a renderer.
+"""Lazy import of PyMJCF (``dm_control.mjcf``), without a renderer.
 
-dm_control loads a renderer when it is imported, and warns or fails without a display; composing needs none. What
-composes nothing works where it is not installed.
+At import, dm_control loads a renderer, which warns or fails without a display; composing scenes needs none. The lazy
+import lets all other functions work without dm_control.
 """
 
 import os
@@ -15,7 +15,7 @@ __all__ = ["compiled", "mjcf", "why_not_composed"]
 
 
 class _PyMjcf:
-    """The module, imported when something of it is asked for."""
+    """Proxy that imports the module at the first attribute access."""
 
     def __getattr__(self, name: str) -> Any:
         renderer = os.environ.get("MUJOCO_GL")
@@ -41,7 +41,7 @@ else:
 
 
 def why_not_composed() -> str | None:
-    """Why no scene can be composed, or None."""
+    """Reason why scenes cannot be composed, such as a missing dm_control; None if they can."""
     try:
         return mjcf.RootElement and None
     except InputError as error:
@@ -49,9 +49,9 @@ def why_not_composed() -> str | None:
 
 
 def compiled(root: "mjcf.RootElement") -> mujoco.MjModel:
-    """A fresh MuJoCo model of a PyMJCF tree.
+    """Compile a PyMJCF tree to a new MuJoCo model.
 
     Raises:
-        ValueError: MuJoCo cannot compile it.
+        ValueError: MuJoCo cannot compile the tree.
     """
     return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())

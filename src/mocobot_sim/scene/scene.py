@@ -1,4 +1,4 @@
-"""Compose a team scene: Omnids under the grasps of a payload, or in a row with nothing to hold (PyMJCF)."""
+"""Compose a team scene with PyMJCF: Omnids under the grasps of a payload, or in a row without payload."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.soft import STIFF, SoftRow, tune
 
 TIMESTEP_S = 0.001
+"""Default integration step [s]. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -30,25 +31,24 @@ class TeamScene:
     """A composed team.
 
     Attributes:
-        root: PyMJCF tree, open to further edits (compile again with ``mujoco.MjModel.from_xml_string``); None for a
-            scene that was read from an extended model.
+        root: PyMJCF tree, which may be edited before ``compile``; None for a scene read from an extended model.
         robots: number of robots N.
         wrist_home_b: wrist position of every robot in its own {b} at home [m], shape (N, 3).
         theta_home: gimbal angles (z, y, x) at home [rad], shape (N, 3).
-        X_1i: grasp frames in {1}, N transforms; flanges without their gimbals' turn where nothing is held.
-        units: how each robot deviates from the design, N entries.
-        mounts: pose of every robot's place on the floor in the world, before any tilt; N transforms.
+        X_1i: grasp frames in {1}, N transforms; without payload, the flanges at zero gimbal angles.
+        units: deviations of each robot from the design, N entries.
+        mounts: floor mount of every robot in the world, without base tilt; N transforms.
         initial: true (phi, theta) near which a trial starts [rad], two arrays (N, 3); None for home.
         sensors: timing faults of the sensors.
-        grasp_slack_m: by how much each grasp may open in a sound trial, beyond a weld's softness [m], N entries;
-            empty for none.
-        grasp_slack_rad: by how much each grasp may turn in it, beyond a weld's softness [rad], N entries; empty for
+        grasp_slack_m: allowed gap of each grasp in a trial, beyond the tolerance of a weld [m], N entries; empty for
             none.
-        soft: springs and dampers that are soft constraints.
-        effects: what was applied to the team (``mocobot_sim.effects.Effect``).
-        xml: the scene's MJCF if ``root`` is None.
-        assets: files that ``xml`` refers to, by name.
-        carries: whether there is a payload; ``build_free_team`` makes teams without.
+        grasp_slack_rad: allowed angle of each grasp in a trial, beyond the tolerance of a weld [rad], N entries; empty
+            for none.
+        soft: springs and dampers implemented as soft constraints.
+        effects: effects of the team (``mocobot_sim.effects.Effect``).
+        xml: MJCF of the scene if ``root`` is None.
+        assets: contents of the files that ``xml`` refers to, by name.
+        carries: whether there is a payload; ``build_free_team`` makes teams without one.
     """
 
     root: mjcf.RootElement | None
@@ -70,18 +70,18 @@ class TeamScene:
 
     @property
     def X_Wb(self) -> RigidTransform:
-        """Every robot's {b} in the world as its floor mount has it, without any tilt; N transforms."""
+        """Frame {b} of every robot in the world without base tilt, N transforms."""
         return self.mounts * RigidTransform.from_translation([0.0, 0.0, base_height_m()])
 
     def to_xml(self) -> str:
-        """The scene as one MJCF document that loads in plain MuJoCo."""
+        """Write the scene as one MJCF document that plain MuJoCo can load."""
         return self.root.to_xml_string() if self.xml is None else self.xml
 
     def compile(self) -> mujoco.MjModel:
         """Compile a fresh MuJoCo model.
 
         Raises:
-            InputError: MuJoCo accepts the payload alone, but not in the team.
+            InputError: MuJoCo cannot compile the scene.
         """
         assets = self.root.get_assets() if self.xml is None else dict(self.assets)
         try:
@@ -90,16 +90,16 @@ class TeamScene:
             raise InputError(f"MuJoCo cannot compile the team ({' '.join(str(error).split())})") from error
 
     def sprung(self, equality: str, compliance: float, relaxation_s: float) -> TeamScene:
-        """The scene with an ``equality`` of its tree as a spring; arguments as of ``SoftRow``."""
+        """Return the scene with a spring at an ``equality`` of its tree; arguments as in ``SoftRow``."""
         row = SoftRow(equality, compliance=compliance, relaxation_s=relaxation_s)
         return replace(self, soft=(*self.soft, row))
 
     def damped(self, equality: str, damping: float) -> TeamScene:
-        """The scene with an ``equality`` of its tree as a damper; arguments as of ``SoftRow``."""
+        """Return the scene with a damper at an ``equality`` of its tree; arguments as in ``SoftRow``."""
         return replace(self, soft=(*self.soft, SoftRow(equality, damping=damping)))
 
     def tuned(self) -> TeamScene:
-        """The scene with every soft row set for the inertias that it has now, in place."""
+        """Set the parameters of all soft rows for the current inertias, in place, and return the scene."""
         if self.root is not None and self.soft:
             tune(self.root, self.compile(), self.soft)
         return self
@@ -113,26 +113,27 @@ def build_team(
     initial: tuple[Array, Array] | None = None,
     released: bool = False,
 ) -> TeamScene:
-    """Park one Omnid under each grasp of a payload and weld the payload to their gimbals.
+    """Build a scene with one Omnid under each grasp of a payload.
 
-    All bases stand on one floor, turned so that their gimbals are at theta_z = 0 in the home pose; where
-    grasps differ in height, the wrists do, around the home height. The payload is a child of robot 1's
-    flange; a weld ties each other flange to its grasp.
+    All bases stand on one floor. Their headings give theta_z = 0 for all gimbals in the home pose. If grasps differ in
+    height, the wrists differ around the home height. The payload is a child of robot 1's flange; welds connect the
+    other flanges to their grasps.
 
     Args:
         payload: name of a shipped payload, or path of an MJCF with a body ``payload`` at {1} and sites
-            ``grasp1`` .. ``graspN``, or such an MJCF as a PyMJCF root (``payload_mjcf`` makes one; it becomes part of
-            the team).
+            ``grasp1`` .. ``graspN``, or such an MJCF as a PyMJCF root (see ``payload_mjcf``), which becomes part of
+            the scene.
         as_built: deviations from the design, one per robot; empty for robots as designed.
         timestep_s: integration step [s].
-        mounts: where the robots stand, floor mounts in the world, N transforms; None to place them under the grasps.
-        initial: true (phi, theta) near which trials start, two arrays (N, 3) [rad]; None for home. With ``mounts`` of
-            one's own, home may not close the loops; a measured posture does nearly.
-        released: robots stand on their wheels and can drive (see docs/base.md), instead of being part of the floor.
+        mounts: floor mounts of the robots in the world, N transforms; None to place them under the grasps.
+        initial: true (phi, theta) near which trials start [rad], two arrays (N, 3); None for home. With given
+            ``mounts`` the home pose may not close the loops, so give a measured posture.
+        released: whether the robots stand on their wheels and can drive (see docs/base.md) instead of being fixed to
+            the floor.
 
     Raises:
-        InputError: the payload cannot be read, has no grasps or one that is tilted beyond the gimbal's range, or
-            ``as_built``, ``mounts`` or ``initial`` do not match their number.
+        InputError: the payload cannot be read, has no grasps, or has a grasp tilted beyond the gimbal's range; or
+            ``as_built``, ``mounts`` or ``initial`` do not match the number of grasps.
     """
     if isinstance(payload, mjcf.RootElement):
         payload_root, label = payload, "payload"
@@ -178,7 +179,7 @@ def build_team(
 
 
 def _home(X_1i: RigidTransform, mounts: RigidTransform | None) -> tuple[Array, Array, RigidTransform, Array]:
-    """Wrists [m] and gimbals [rad] at home, shapes (N, 3); where the robots stand, and its quaternions as MJCF."""
+    """Wrist positions [m] and gimbal angles [rad] at home, shapes (N, 3), mounts, and their quaternions (w first)."""
     height = omnid_design().home_height_m
     grasp_z = X_1i.translation[:, 2]
     if mounts is None:
@@ -192,7 +193,7 @@ def _home(X_1i: RigidTransform, mounts: RigidTransform | None) -> tuple[Array, A
         theta = theta.copy()
         theta[:, 0] = 0.0
         return wrist, theta, mounts, quats
-    # Robot 1 holds its grasp unturned, and the others are where the payload then wants them.
+    # The grasp of robot 1 is parallel to its {b}; this pose of the payload determines the other wrists.
     X_Wb = mounts * RigidTransform.from_translation([0.0, 0.0, base_height_m()])
     X_W1 = X_Wb[0] * RigidTransform.from_translation([0.0, 0.0, height - grasp_z.mean()])
     X_bi = X_Wb.inv() * X_W1 * X_1i
@@ -221,8 +222,9 @@ def _check_tilts(tilts: Array, limit_rad: float, where: str) -> None:
 
 
 SPACING_M = 1.2
-"""Distance of neighbours in the row: no two arms can touch."""
+"""Distance between neighbouring robots in the row [m]. Chosen: arms cannot touch."""
 MOST_ROBOTS = 100
+"""Largest number of robots without payload. Chosen."""
 
 
 def build_free_team(
@@ -231,20 +233,20 @@ def build_free_team(
     theta: ArrayLike | None = None,
     timestep_s: float = TIMESTEP_S,
 ) -> TeamScene:
-    """Park Omnids in a row along x, with nothing on their flanges.
+    """Build a scene with parked Omnids in a row along x, without payload.
 
-    The gimbals are as in every team: passive, without friction or springs, each of their bodies balanced about the
-    wrist. A platform only translates, so neither gravity nor the arm's motion turns them: they stay as they are left,
-    and what they weigh is carried by the wrist.
+    The gimbals are passive, without friction or springs, and each gimbal body is balanced about the wrist. Platforms
+    only translate, so neither gravity nor the motion of the arm turns a gimbal. Gimbals keep their initial angles, and
+    the wrists carry their weight.
 
     Args:
-        robots: how many.
+        robots: number of robots.
         as_built: deviations from the design, one per robot; empty for robots as designed.
-        theta: gimbal angles (z, y, x) as they are left [rad], shape (N, 3); None for zero.
+        theta: initial gimbal angles (z, y, x) [rad], shape (N, 3); None for zero.
         timestep_s: integration step [s].
 
     Raises:
-        InputError: a number of robots out of range, or ``as_built`` or ``theta`` does not match it.
+        InputError: the number of robots is out of range, or ``as_built`` or ``theta`` does not match it.
     """
     check_robots(robots)
     units = units_of(as_built, robots)
@@ -269,10 +271,10 @@ def build_free_team(
 
 
 def check_robots(robots: int) -> None:
-    """Refuse a number of robots before anything of that size is made.
+    """Check the number of robots, to be called before large arrays are allocated.
 
     Raises:
-        InputError: it is out of range.
+        InputError: the number is out of range.
     """
     if not 1 <= robots <= MOST_ROBOTS:
         raise InputError(f"robots is {robots}; it must be at least 1 and at most {MOST_ROBOTS}")

@@ -1,13 +1,14 @@
-"""MuJoCo's constraint rows: stiff parts, stiction, and exact linear springs and dampers.
+"""Parameters of MuJoCo's constraints for rigid parts, stiction, and exact linear springs and dampers.
 
-A passive spring or damper on a light body is unstable at 1 ms, or is integrated implicitly where the constraint
-solver cannot see it and pulls the welds open. A soft ``equality`` row is part of the solver's own problem. MuJoCo
+A passive spring or damper on a light body is unstable with steps of 1 ms. Integrated implicitly, it is unknown to the
+constraint solver and opens the welds. A soft ``equality`` row, in contrast, is part of the constraint problem. MuJoCo
 gives a row that keeps a coordinate x at zero the force
 
     R f = -(B x_dot + K d x + x_ddot),   K = s / d^2,  B = b / d,  R = (1 - d) / d * A
 
-for ``solref = (-s, -b)``, a constant impedance d = ``solimp[0] = solimp[1]`` and A, MuJoCo's inverse inertia of the
-coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, with s = 0, damping b / ((1 - d) A).
+for ``solref = (-s, -b)`` and a constant impedance d = ``solimp[0] = solimp[1]``. A is MuJoCo's inverse inertia of the
+coordinate in the zero pose of the model. Thus x has the stiffness s / ((1 - d) A) or, with s = 0, the damping
+b / ((1 - d) A).
 """
 
 from __future__ import annotations
@@ -25,22 +26,22 @@ if TYPE_CHECKING:
 
 _RIGID = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 STIFF: dict[str, Any] = {"solref": [0.004, 1.0], "solimp": _RIGID}
-"""What holds as a rigid part would: welds, and limits that nothing goes through."""
+"""Parameters of constraints that act as rigid: welds and hard limits."""
 STICK: dict[str, Any] = {"solreffriction": [-1.0, -1000.0], "solimpfriction": _RIGID}
-"""Coulomb friction that sticks, for ``frictionloss``.
+"""Parameters of ``frictionloss`` for Coulomb friction with stiction.
 
-Under its limit, a friction row lets its coordinate creep at -R f / B: with the smallest R and a rate B that stops a
-coordinate within a millisecond, a coordinate of inertia I creeps at 1e-7 f / I [1/s].
+Below its limit, a friction row lets the coordinate creep at the velocity -R f / B. With the smallest possible R and a
+rate B that stops a coordinate within 1 ms, a coordinate with inertia I creeps at 1e-7 f / I [1/s].
 """
 
-# Least d and 1 - d: MuJoCo clips d to this range.
+# Smallest d and 1 - d [-]: MuJoCo clips d to this range.
 _LEAST = 1e-4
-# As stiff as the welds: (4 ms)^-2; a third of it with a small (1 - d) would still be.
+# Largest s of springs [1/s^2]. Derived: (4 ms)^-2, the stiffness of the welds; larger if (1 - d) is at its minimum.
 _STIFFNESS_PER_S2 = 62500.0
 _STIFFEST_PER_S2 = 250000.0
-# A rate that stops a coordinate within one step of 1 ms.
+# Rate b of dampers that stops a coordinate within one step of 1 ms [1/s].
 _DAMPING_PER_S = 1000.0
-# Shortest relaxation: below, the mass that moves would lag as much within steps of 1 ms, and damping is critical.
+# Shortest relaxation time [s]. Below it, the lag of the moving mass would be similar, so damping is critical instead.
 _LEAST_RELAXATION_S = 0.005
 
 
@@ -48,17 +49,19 @@ _LEAST_RELAXATION_S = 0.005
 class SoftRow:
     """An ``equality`` on one joint or fixed tendon that acts as a spring or as a damper."""
 
-    equality: str  # its name in the scene
-    compliance: float | None = None  # of the spring [m/N or rad/(N m)], or None
-    damping: float | None = None  # of the damper [N s/m or N m s/rad], or None
-    # time constant in which the spring follows its load [s]; a critically damped one below 5 ms
+    equality: str  # name of the equality in the scene
+    compliance: float | None = None  # compliance of the spring [m/N or rad/(N m)]; None for a damper
+    damping: float | None = None  # coefficient of the damper [N s/m or N m s/rad]; None for a spring
+    # time constant with which the spring follows its load [s]; below 5 ms the spring is critically damped
     relaxation_s: float = 0.0
 
 
 def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
     """``solref`` and ``solimp`` of a critically damped spring.
 
-    Its compliance is greater than 0 [m/N or rad/(N m)]; the inverse inertia is A as MuJoCo has it [1/kg or 1/(kg m^2)].
+    Args:
+        compliance: compliance, greater than 0 [m/N or rad/(N m)].
+        inverse_inertia: MuJoCo's inverse inertia A of the coordinate [1/kg or 1/(kg m^2)].
     """
     s = min(_STIFFNESS_PER_S2, 0.5 * inverse_inertia / compliance)
     soft = s * compliance / inverse_inertia
@@ -70,9 +73,9 @@ def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[f
 def viscoelastic_parameters(
     compliance: float, relaxation_s: float, inverse_inertia: float
 ) -> tuple[list[float], list[float]]:
-    """``solref`` and ``solimp`` of a spring beside a damper (Kelvin and Voigt): damping is relaxation over compliance.
+    """``solref`` and ``solimp`` of a spring and damper in parallel (Kelvin-Voigt), damping = relaxation / compliance.
 
-    The mass that moves is made to lag forty times less than the damper does, or as little as steps of 1 ms allow.
+    The lag due to the inertia of the row is a fortieth of the relaxation time, or as small as steps of 1 ms allow.
     """
     s = min(40.0 / relaxation_s, 1.3 * _DAMPING_PER_S) / relaxation_s
     soft = min(max(s * compliance / inverse_inertia, _LEAST), 1.0 - _LEAST)
@@ -92,7 +95,7 @@ def _constant_impedance(d: float) -> list[float]:
 
 
 def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
-    """Set soft rows of a PyMJCF tree for the inertias of the model that it compiles to."""
+    """Set the parameters of soft rows in a PyMJCF tree, for the inertias of its compiled model."""
     import mujoco
 
     for row in rows:
@@ -114,7 +117,7 @@ def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow])
 
 
 def row_compliance(model: mujoco.MjModel, joint: int) -> float:
-    """Compliance of the spring row that holds a joint at zero, read back from the model; 0 if there is none."""
+    """Compliance of the spring row of a joint, computed from the compiled model [m/N or rad/(N m)]; 0 if none."""
     import mujoco
 
     for k in range(model.neq):
@@ -125,13 +128,13 @@ def row_compliance(model: mujoco.MjModel, joint: int) -> float:
 
 
 def row_relaxation_s(model: mujoco.MjModel, equality: str) -> float:
-    """Time constant in which the spring of a row follows its load, read back from the model."""
+    """Relaxation time of the spring of a row, computed from the compiled model [s]."""
     stiffness, damping = -model.eq_solref[model.equality(equality).id]
     return float(damping / stiffness)
 
 
 def row_mass_kg(model: mujoco.MjModel, equality: str) -> float:
-    """Mass that the spring of a row on a slide moves besides the bodies', read back from the model: its own inertia."""
+    """Inertia that a spring row adds to the bodies on its slide, computed from the compiled model [kg]."""
     row = model.equality(equality).id
     impedance, dof = float(model.eq_solimp[row, 0]), model.jnt_dofadr[model.eq_obj1id[row]]
     return float(impedance / ((1.0 - impedance) * model.dof_invweight0[dof]))

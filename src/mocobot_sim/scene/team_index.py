@@ -1,4 +1,4 @@
-"""Addresses of joints, sites, constraints and wheels in a compiled model, looked up by name."""
+"""Addresses of joints, sites and wheels in a compiled model, looked up by name."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ PAYLOAD_PREFIX = "omnid1/payload/"
 
 @dataclass(frozen=True)
 class TeamIndex:
-    """Where each robot's coordinates live; every joint here has one coordinate."""
+    """Addresses of a team in a compiled model; every joint here has one coordinate."""
 
-    # positions in ``qpos``, (N, 3); gimbal order z, y, x
+    # addresses in ``qpos``, shape (N, 3); gimbals in the order z, y, x
     motor_qpos: Index
     spring_qpos: Index
     gimbal_qpos: Index
     slide_qpos: Index
-    # positions in ``qvel``; (N, 3), knees (N, 6)
+    # addresses in ``qvel``, shape (N, 3), knees (N, 6)
     motor_dof: Index
     spring_dof: Index
     gimbal_dof: Index
     slide_dof: Index
     knee_dof: Index
-    actuator: Index  # positions in ``ctrl``, shape (N, 3)
-    grasp_site: Index  # the flange's site of every robot, shape (N,)
-    # the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held
+    actuator: Index  # addresses of the motors in ``ctrl``, shape (N, 3)
+    grasp_site: Index  # site id of every robot's flange, shape (N,)
+    # site id of every robot's grasp on the payload, shape (N,); of the flange without payload
     payload_site: Index
-    payload_body: int  # body id of the payload; -1 where nothing is held
-    # slides, and hinges on springs, that effects have added: bases and grasps that yield, are loose or creep
+    payload_body: int  # body id of the payload; -1 without payload
+    # slides and sprung hinges that effects have added: compliant, loose or moving bases and grasps
     yielding_dof: Index
-    hanging_dof: Index  # other hinges that effects have added: what swings in the payload
-    base_dof: Index  # free chassis, wheels and rollers; none in a team that is parked
+    hanging_dof: Index  # other hinges that effects have added: pendulums in the payload
+    base_dof: Index  # free chassis, wheels and rollers; empty for a parked team
 
     @property
     def robots(self) -> int:
@@ -58,7 +58,7 @@ class TeamIndex:
 
     @classmethod
     def of(cls, model: mujoco.MjModel, carries: bool = True) -> TeamIndex:
-        """Look everything up by name in a compiled scene, with or without a payload.
+        """Look up all addresses in a compiled scene, with or without a payload.
 
         Raises:
             KeyError: the model is not a team scene (the message names what is missing).
@@ -93,7 +93,7 @@ class TeamIndex:
 
 
 def robots_with(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """How many robots, counted from 1 on, have something of a name."""
+    """Number of consecutive robots, from omnid1 on, that have an object of this kind and name."""
     robots = 0
     while mujoco.mj_name2id(model, kind, f"omnid{robots + 1}/{name}") >= 0:
         robots += 1
@@ -101,23 +101,23 @@ def robots_with(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
 
 
 def ids_of(look_up: Callable[[str], Any], robots: int, names: Sequence[str]) -> Index:
-    """Ids of every robot's things of these names, shape (N, names).
+    """Ids of named objects of every robot, shape (N, number of names).
 
     Raises:
-        KeyError: there is none of such a name.
+        KeyError: a name does not exist.
     """
     ids = [[look_up(f"omnid{i + 1}/{name}").id for name in names] for i in range(robots)]
     return np.array(ids, dtype=np.intp)
 
 
 def _added(model: mujoco.MjModel, own: Index, kind: mujoco.mjtJoint) -> Index:
-    """Positions in ``qvel`` of joints of one kind that the robots as designed do not have: effects add them."""
+    """Addresses in ``qvel`` of the joints of one type that effects have added."""
     joints = np.setdiff1d(np.flatnonzero(model.jnt_type == kind), own)
     return model.jnt_dofadr[joints].astype(np.intp)
 
 
 def _base_joints(model: mujoco.MjModel) -> Index:
-    """Free joints, and joints called ``.../wheel_*``."""
+    """Ids of free joints and of joints named ``.../wheel_*``."""
     wheel = [model.joint(j).name.rsplit("/", 1)[-1].startswith("wheel_") for j in range(model.njnt)]
     return np.flatnonzero(
         np.array(wheel, dtype=bool) | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
@@ -126,15 +126,15 @@ def _base_joints(model: mujoco.MjModel) -> Index:
 
 @dataclass(frozen=True)
 class BaseIndex:
-    """Where the wheels of N released robots live; wheels in the order of ``WHEELS``."""
+    """Addresses of the bases of N released robots; wheels in the order of ``WHEELS``."""
 
-    # positions in ``qpos`` and ``qvel``, shape (N, 4)
+    # addresses of the wheels in ``qpos`` and ``qvel``, shape (N, 4)
     wheel_qpos: Index
     wheel_dof: Index
-    drive: Index  # positions of the wheels' motors in ``ctrl``, shape (N, 4)
+    drive: Index  # addresses of the wheels' motors in ``ctrl``, shape (N, 4)
     chassis: Index  # body ids, shape (N,)
-    free_qpos: Index  # where the position and quaternion of every chassis begin in ``qpos``, shape (N,)
-    # number of the wheel, 4 robot + wheel from 0, that each geom is a roller of, or -1; shape (ngeom,)
+    free_qpos: Index  # address of the free joint of every chassis in ``qpos``, shape (N,)
+    # for each geom, the wheel of which it is a roller (4 robot + wheel, from 0), or -1; shape (ngeom,)
     geom_wheel: Index
 
     @property
@@ -144,10 +144,10 @@ class BaseIndex:
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> BaseIndex:
-        """Look everything up.
+        """Look up all addresses in a compiled scene.
 
         Raises:
-            InputError: a robot is parked, or there is none.
+            InputError: a robot is parked, or there is no robot.
         """
         robots = robots_with(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
         if not robots:
@@ -171,7 +171,7 @@ class BaseIndex:
         )
 
     def poses(self, data: mujoco.MjData) -> NDArray[np.float64]:
-        """Where every chassis is: x, y [m], yaw [rad] within +-pi in the world, shape (N, 3)."""
+        """Pose of every chassis in the world: x, y [m], yaw within +-pi [rad], shape (N, 3)."""
         w, x, y, z = data.qpos[self.free_qpos[:, None] + np.arange(3, 7)].T
         at = data.qpos[self.free_qpos[:, None] + np.arange(2)]
         yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

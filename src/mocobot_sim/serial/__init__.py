@@ -1,1 +1,1 @@
-"""A serial robot with effects that its model lacked."""
+"""Serial robots with effects that the nominal model lacks."""

@@ -1,4 +1,4 @@
-"""Effects of a serial robot, and how those act that MJCF cannot say: torques by the state, one joint at a time."""
+"""Effects on a serial robot, and joint torques of the effects that MJCF cannot express."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from estimator.strict import Fields
 from mocobot_sim.functions import FUNCTIONS, Inside, Step, check_law
 
 CREEP = 1e-3
-"""Speed over which dry friction changes its direction here [rad/s or m/s]: slow beside what joints do."""
+"""Speed scale over which dry friction changes its sign [rad/s or m/s]. Chosen: slow compared to joint speeds."""
 
 
 @dataclass(frozen=True)
 class RobotEffect:
-    """One effect."""
+    """One effect on a serial robot."""
 
-    cause: str  # such as ``stribeck``
-    joint: int | None  # which joint, from 1; None of a body that no joint moves, and of the whole robot
-    partner: int | None = None  # the other joint of a coupled drive, from 1
-    parameters: Mapping[str, float] = field(default_factory=dict)  # numbers, by name with the unit as suffix
-    # name of the body that it is about, where it is about one; empty: the one that the joint moves
+    cause: str  # name of the cause, such as ``stribeck``
+    joint: int | None  # number of the joint, from 1; None for a body without joint and for the whole robot
+    partner: int | None = None  # other joint of a coupled drive, from 1
+    parameters: Mapping[str, float] = field(default_factory=dict)  # values by name; suffixes give the units
+    # name of the affected body; empty for the body that the joint moves
     body: str = ""
 
     def number(self, *stems: str) -> float:
-        """The number that is named so, or whose name begins so, whatever its unit.
+        """Value of the parameter with one of the given names, with or without unit suffix.
 
         Raises:
-            ValueError: there is none, or more than one.
+            ValueError: there is no such parameter, or more than one.
         """
         begins = tuple(f"{stem}_" for stem in stems)
         (name,) = (n for n in self.parameters if n in stems or n.startswith(begins))
@@ -42,18 +42,18 @@ class RobotEffect:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """State of all joints at one step."""
+    """State of all joints at one time step."""
 
-    time_s: float  # since the start
-    period_s: float  # of a step
-    q: Array  # positions and rates, shape (J,)
-    dq: Array  # positions and rates, shape (J,)
-    ddq: Array  # accelerations of the step before, shape (J,)
-    load: Array  # torques that the masses behind the joints ask for, shape (J,)
-    torque: Array  # that the drives give, shape (J,)
+    time_s: float  # time
+    period_s: float  # time step
+    q: Array  # positions, shape (J,)
+    dq: Array  # velocities, shape (J,)
+    ddq: Array  # accelerations of the previous step, shape (J,)
+    load: Array  # torques that the gears transmit to the links, shape (J,)
+    torque: Array  # motor torques, shape (J,)
 
     def signal(self, name: str) -> float:
-        """A signal by its name: ``time``, ``q_3``, ``direction_3`` and so on."""
+        """Value of a signal by its name, such as ``time``, ``q_3`` or ``direction_3``."""
         if name == "time":
             return self.time_s
         kind, _, number = name.rpartition("_")
@@ -62,7 +62,7 @@ class State:
 
 
 def direction(speed: float) -> float:
-    """Direction of a motion in [-1, 1]."""
+    """Smoothed sign of a speed, in [-1, 1]."""
     return math.tanh(speed / CREEP)
 
 
@@ -74,17 +74,17 @@ SIGNALS = "time, q_3, dq_3, ddq_3, direction_3, load_3, torque_3"
 
 @dataclass(frozen=True)
 class JointLaw:
-    """``amplitude`` times a function of a signal, and times another signal where one is named, at a joint from 1."""
+    """A formula at a joint: ``amplitude`` times a function of the signal ``of``, optionally times a second signal."""
 
-    # ``torque_3``, what the torque of joint 3 holds besides, or ``position_3``, what its reading is off by, which is
-    # an error of the log and not simulated
+    # ``torque_3`` adds a resisting torque at joint 3; ``position_3`` is an error of the reading, which is an error of
+    # the log and not simulated
     target: str
-    function: str  # as in ``mocobot_sim.functions.FUNCTIONS``
-    # signals, all in SI: ``time``, ``q_3``, ``dq_3``, ``ddq_3``, ``direction_3``, ``load_3`` and ``torque_3``;
-    # ``times`` is empty where there is none
+    function: str  # key of ``mocobot_sim.functions.FUNCTIONS``
+    # signals in SI units: ``time``, ``q_3``, ``dq_3``, ``ddq_3``, ``direction_3``, ``load_3`` or ``torque_3``;
+    # ``times`` is empty for no second signal
     of: str
-    amplitude: float  # in the target's unit over those of the signals
-    # what the function has inside (docs/effects.md)
+    amplitude: float  # in the unit of the target over those of the signals
+    # parameters of the function (docs/effects.md)
     number: float = 0.0
     second: float = 0.0
     phase_rad: float = 0.0
@@ -100,24 +100,24 @@ class JointLaw:
 
     @property
     def joint(self) -> int:
-        """At which joint, from 1."""
+        """Number of the joint, from 1."""
         return int(self.target.rpartition("_")[2])
 
     @property
     def acts(self) -> bool:
-        """Whether it is a torque, and no error of a reading."""
+        """Whether the target is a torque instead of a reading."""
         return self.target.startswith("torque")
 
     def to_dict(self) -> dict[str, str | float]:
-        """Plain JSON values."""
+        """Convert to JSON values."""
         return asdict(self)
 
     @classmethod
     def of_dict(cls, values: Mapping[str, Any], where: str) -> JointLaw:
-        """From plain JSON values.
+        """Make a law from the output of ``to_dict``; ``where`` is the context for error messages.
 
         Raises:
-            InputError: they are no formula.
+            InputError: a key is missing or unknown, or a value is not allowed.
         """
         entry = Fields(values, (*TEXTS, *NUMBERS), where)
         given: dict[str, Any] = {key: entry.number(key) for key in NUMBERS}
@@ -126,10 +126,10 @@ class JointLaw:
 
 
 class ActingLaw:
-    """A law in one run: it may remember what was, such as a play.
+    """A law in one run, with its state, such as that of a backlash.
 
     Attributes:
-        law: which.
+        law: the law.
     """
 
     def __init__(self, law: JointLaw) -> None:
@@ -137,7 +137,7 @@ class ActingLaw:
         self._function: Step | None = None
 
     def torque(self, state: State) -> float:
-        """What it takes from the drive of its joint now [N m or N]; to be asked once a step."""
+        """Resisting torque at the joint [N m or N]; call it once per time step."""
         law = self.law
         if self._function is None:
             inside = Inside(law.number, law.second, law.phase_rad, state.period_s)
@@ -147,15 +147,15 @@ class ActingLaw:
 
 
 def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Array, dry: Array) -> Array:
-    """Torques that ``SMOOTH`` effects take from the drives beyond what the model does, shape (J,) [N m or N].
+    """Resisting torques of the ``SMOOTH`` effects beyond those of the model [N m or N], shape (J,).
 
-    What rubs never drives: fitted friction that is a little below zero, the model's own with it, is none.
+    Total friction never drives a joint: if fitted parameters make it negative, it is set to zero.
 
     Args:
-        effects: any.
-        q, v: joint positions and speeds, shape (J,).
-        damping: the model's own [N m s/rad or N s/m], shape (J,).
-        dry: dry friction, the model's own with it; what is below zero takes from the viscous friction, shape (J,).
+        effects: effects of any cause.
+        q, v: joint positions and velocities, shape (J,).
+        damping: viscous friction coefficients of the model [N m s/rad or N s/m], shape (J,).
+        dry: total dry friction, that of the model included, shape (J,); negative values reduce the viscous friction.
     """
     out = np.zeros(len(q))
     rubbing = np.minimum(dry, 0.0) * np.tanh(v / CREEP)
@@ -168,9 +168,13 @@ def resistances(effects: Sequence[RobotEffect], q: Array, v: Array, damping: Arr
 
 
 def dry_levels(effects: Sequence[RobotEffect], v: Array, load: Array, time: float) -> Array:
-    """Dry friction of ``DRY`` effects beyond the model's, which may be negative, shape (J,) [N m or N].
+    """Dry friction of the ``DRY`` effects beyond that of the model [N m or N], shape (J,); may be negative.
 
-    ``load`` are the torques that the gears pass on, ``time`` since the robot was switched on, as a log has it [s].
+    Args:
+        effects: effects of any cause.
+        v: joint velocities, shape (J,).
+        load: torques that the gears transmit, shape (J,).
+        time: time since the robot was switched on, as in the log [s].
     """
     out = np.zeros(len(v))
     for effect in effects:
@@ -196,7 +200,8 @@ SMOOTH: dict[str, Callable[[RobotEffect, float, float], float]] = {
     "counterbalance": lambda e, q, v: _wave(e, q),
     "spring": lambda e, q, v: e.number("stiffness") * (q - e.number("middle")) + e.number("offset"),
 }
-"""Torques by position and speed, by cause; a slide's ripple counts waves per metre as ``turns`` over 2 pi."""
+"""Resisting torque as a function of position and velocity, by cause. For slides, the waves per metre of a ripple are
+``turns`` over 2 pi."""
 
 DRY: dict[str, Callable[[RobotEffect, float, float, float], float]] = {
     "friction": lambda e, v, load, time: e.number("coulomb"),
@@ -206,10 +211,11 @@ DRY: dict[str, Callable[[RobotEffect, float, float, float], float]] = {
     "load_friction": lambda e, v, load, time: e.number("share") * abs(load),
     "warming": _warming,
 }
-"""Dry friction by speed, load and time, by cause: against the motion, and at rest as much as keeps the joint there."""
+"""Magnitude of dry friction as a function of velocity, load and time, by cause. It opposes motion, and at rest it is
+the limit of stiction."""
 
 VISCOUS = frozenset({"friction", "asymmetric_viscous"})
-"""Of ``SMOOTH``, those that rub."""
+"""Causes in ``SMOOTH`` that are friction."""
 
 LAWS = frozenset({*SMOOTH, *DRY})
-"""Causes that are torques by the state of their own joint."""
+"""Causes that ``step`` simulates as torques that depend on the state of their own joint."""

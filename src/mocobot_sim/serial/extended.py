@@ -1,4 +1,4 @@
-"""A robot with effects, to take away and to roll out: MJCF for what it can express, a small file for the rest."""
+"""Extended models of serial robots: MJCF for the effects it can express, a small file for the others; rollouts."""
 
 from __future__ import annotations
 
@@ -24,20 +24,21 @@ ASSETS = "assets"
 
 
 def take_along(spec: mujoco.MjSpec) -> dict[Path, str]:
-    """Name meshes, height fields, skins and textures by their place in ``assets`` beside a model that is written anew.
+    """Redirect meshes, height fields, skins and textures of a model to a folder ``assets`` beside a copy of the model.
 
-    ``spec`` is the model as read from its file, and is changed; what is not found stays as it is named.
+    Args:
+        spec: model as read from its file; changed. Names of missing files stay unchanged.
 
     Returns:
-        The files, each with its name in ``assets``.
+        The files to copy, each with its name in ``assets``.
 
     Raises:
-        InputError: a file is not the model's own (see ``owned``).
+        InputError: a file is outside the model's folder or of an unknown type (see ``owned``).
     """
     taken: dict[Path, str] = {}
 
     def moved(file: str, inside: str) -> str:
-        # An absolute name stands alone.
+        # ``Path`` ignores the folders before an absolute name.
         named = Path(spec.modelfiledir, inside, Path(file).name if spec.strippath else file)
         if not file or not named.is_file():
             return file
@@ -60,14 +61,14 @@ def take_along(spec: mujoco.MjSpec) -> dict[Path, str]:
 
 
 def put(taken: Mapping[Path, str], spec: mujoco.MjSpec, folder: Path) -> None:
-    """Copy what ``take_along`` found into the folder that the model is written to.
+    """Copy the files found by ``take_along`` into the folder of the new model.
 
     Raises:
         OSError: a file cannot be read or written.
     """
     if taken:
         (folder / ASSETS).mkdir()
-        spec.modelfiledir = str(folder.resolve())  # from where MuJoCo reads them when it writes the model
+        spec.modelfiledir = str(folder.resolve())  # MuJoCo reads the files from here when it writes the model
     for source, name in taken.items():
         shutil.copyfile(source, folder / ASSETS / name)
 
@@ -78,7 +79,7 @@ KEYS = ("cause", "joint", "partner", "body", "parameters", "law", "in")
 LAW = "law"
 CHANGED = ", which is what has changed since the reference; what is wrong with the model in both is not in it"
 LEAST_LOSS = 1e-12
-"""Dry friction with which MuJoCo makes a row for it [N m or N]."""
+"""Smallest ``frictionloss`` for which MuJoCo creates a constraint row [N m or N]. Chosen: any positive value does."""
 
 
 def write_extended(
@@ -89,17 +90,17 @@ def write_extended(
     *,
     reference: bool = False,
 ) -> None:
-    """Write ``robot.xml`` with the files that it needs, ``effects.json`` and a README into a new folder.
+    """Write ``robot.xml`` with its assets, ``effects.json`` and a README into a new folder.
 
     Args:
         spec: the nominal model; changed.
-        effects: what is off.
-        folder: is created.
-        recordings: names of those that it was found from.
-        reference: whether it is what has changed since other logs, whose own errors are then in no model.
+        effects: identified effects.
+        folder: folder to create.
+        recordings: names of the recordings from which the effects were identified.
+        reference: whether the effects are changes since reference logs; errors common to both are then not modelled.
 
     Raises:
-        InputError: the folder cannot be written, MuJoCo refuses the effects, or a file is not the model's.
+        InputError: the folder cannot be written, MuJoCo rejects the effects, or a file is outside the model's folder.
     """
     inside = with_effects(spec, effects)[1]
     places = [
@@ -125,12 +126,12 @@ def _entry(effect: Effect) -> dict[str, Any]:
 
 
 def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
-    """The effects of an extended robot that its MJCF lacks, for ``step``.
+    """Read the effects of an extended robot that are not in its MJCF, for use with ``step``.
 
-    Laws may remember what was, such as a play: load them anew for every run.
+    Laws can have a state, such as that of a backlash, so load them again for every run.
 
     Raises:
-        InputError: ``effects.json`` cannot be read or is something else.
+        InputError: ``effects.json`` cannot be read or has another format.
     """
     path = Path(folder) / NUMBERS
     values = read_json(path, "the effects of an extended robot")
@@ -155,12 +156,12 @@ def _effect(entry: Fields, where: str) -> RobotEffect | ActingLaw:
 def step(
     model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[RobotEffect | ActingLaw], torque: Array
 ) -> None:
-    """One step of a robot whose drives give some torques, with the effects that its MJCF lacks.
+    """Simulate one time step with given motor torques and the effects that are not in the MJCF.
 
     Args:
-        model, data: of ``robot.xml``; ``qfrc_applied`` is written.
-        effects: of ``load_effects``.
-        torque: at the joints, shape (J,).
+        model, data: model of ``robot.xml`` and its data; ``qfrc_applied`` is overwritten.
+        effects: effects from ``load_effects``.
+        torque: motor torques at the joints [N m or N], shape (J,).
     """
     if not effects:
         data.qfrc_applied[:] = torque
@@ -169,7 +170,7 @@ def step(
     listed = [effect for effect in effects if isinstance(effect, RobotEffect)]
     rubbing = [effect for effect in listed if effect.cause in DRY]
     _with_rows(model, data, rubbing)
-    # What the gears pass on: gravity, springs and the bodies' inertia, but nothing that rubs, and no rotors.
+    # Torques that the gears transmit: gravity, springs and link inertia, without friction and reflected inertia.
     inertia = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, inertia, before)
     load = inertia - model.dof_armature * before + data.qfrc_bias - data.qfrc_spring - data.qfrc_gravcomp
@@ -184,7 +185,7 @@ def step(
 
 
 def _with_rows(model: mujoco.MjModel, data: mujoco.MjData, rubbing: Sequence[RobotEffect]) -> None:
-    """``mj_step1`` with a row of MuJoCo's dry friction for every joint that rubs, of whatever size."""
+    """Run ``mj_step1`` so that every joint with dry friction has a friction row, even if its current value is zero."""
     own = sorted({effect.joint - 1 for effect in rubbing if effect.joint is not None})
     said = model.dof_frictionloss[own]
     model.dof_frictionloss[own] = np.maximum(said, LEAST_LOSS)
@@ -193,11 +194,11 @@ def _with_rows(model: mujoco.MjModel, data: mujoco.MjData, rubbing: Sequence[Rob
 
 
 def _rub(data: mujoco.MjData, dry: Array) -> None:
-    """Dry friction in MuJoCo's own rows: it stops a joint and never drives it."""
+    """Set the limits of MuJoCo's friction rows, which can stop a joint but never drive it."""
     if dry.any():
         at = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
         data.efc_frictionloss[at] = np.maximum(dry[data.efc_id[at]], 0.0)
-        if data.nisland:  # each is solved from a copy
+        if data.nisland:  # the solver uses copies of the rows, ordered by island
             data.iefc_frictionloss[:] = data.efc_frictionloss[data.map_iefc2efc]
 
 
@@ -237,40 +238,47 @@ def _row(effect: Effect) -> str:
 
 
 Drive = Callable[[float, Array, Array], Array]
-"""Torques at the joints (J,) by time [s], positions and velocities (J,)."""
+"""Function from time [s], joint positions (J,) and velocities (J,) to motor torques at the joints (J,)."""
 MOST_SPEED = 1e4
-"""Beyond which a run is not followed [rad/s or m/s]: no joint is a hundredth as fast, and MuJoCo still has numbers."""
+"""Joint speed at which a rollout is aborted [rad/s or m/s]. Chosen: over 100 times the speed of real joints."""
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a rollout begins."""
+    """Initial state of a rollout."""
 
     time: float  # [s]
-    # positions, velocities and accelerations, shape (J,) each; with the latter the integration is centred, and
-    # friction by load begins
+    # joint positions, velocities and accelerations, shape (J,) each; the accelerations centre the integration and give
+    # the initial load for load-dependent friction
     q: Array
     dq: Array
     ddq: Array
 
 
 def rollout(built: Built, start: Start, drive: Drive, samples: int, every: int) -> Array:
-    """Positions after every so many steps, shape (n, J), the start's first; n < samples + 1 where a run breaks off.
+    """Simulate a robot and return its joint positions, the initial ones first, shape (samples + 1, J).
 
-    It breaks off where a number is not finite or a joint is faster than ``MOST_SPEED``. ``every`` steps of the
-    integration lie between two of the ``samples`` taken after the start.
+    The rollout is aborted if a number is not finite or a joint is faster than ``MOST_SPEED``; the result is then
+    shorter.
+
+    Args:
+        built: the robot.
+        start: initial state.
+        drive: motor torques.
+        samples: number of samples after the initial state.
+        every: integration steps per sample.
     """
     model = built.model
     data, effects = mujoco.MjData(model), built.running()
     data.time, data.qpos[:], data.qacc[:] = start.time, start.q, start.ddq
-    # MuJoCo's positions go on with the velocity after a step: from half a step before, errors are of second order.
+    # MuJoCo is semi-implicit: starting with the velocity half a step earlier makes the position error second order.
     data.qvel[:] = start.dq - 0.5 * model.opt.timestep * start.ddq
     out = np.empty((samples + 1, model.nq))
     out[0] = start.q
     for k in range(1, samples + 1):
         for _ in range(every):
             step(model, data, effects, drive(data.time, data.qpos, data.qvel))
-            if not np.abs(data.qvel).max() < MOST_SPEED:  # nor where it is no number
+            if not np.abs(data.qvel).max() < MOST_SPEED:  # also true for NaN
                 return out[:k]
         out[k] = data.qpos
     return out

@@ -1,4 +1,4 @@
-"""Effects that MJCF can say, put into a serial robot's model; the model with all effects, ready to be rolled out."""
+"""Put effects into the MJCF of a serial robot, as far as MJCF can express them, and build a model for rollouts."""
 
 from __future__ import annotations
 
@@ -14,15 +14,20 @@ from estimator.errors import InputError
 from mocobot_sim.serial.effects import DRY, LAWS, ActingLaw, JointLaw, RobotEffect
 
 LEAST_MOMENT = 1e-3
-"""Least second moment of mass of a body in any direction, over the largest. Chosen: a thin sheet's."""
+"""Smallest over largest principal second moment of mass of a body. Chosen: that of a thin sheet."""
 _POSSIBLE = 1e-9
-"""Relative; by so much may an inertia be off one that a body can have: rounding of the model's own numbers."""
+"""Relative tolerance for the physical consistency of an inertia. Chosen: rounding of the numbers of a model."""
 
 
 def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Array) -> None:
-    """Give a body of a model mass [kg], centre [m] and inertia about it in place of its own.
+    """Replace the inertial parameters of a body.
 
-    The inertia is along the body's frame [kg m^2], shape (3, 3); the body gets the nearest that one can have.
+    Args:
+        body: body of the model.
+        mass: mass [kg].
+        centre: centre of mass in the body's frame [m], shape (3,).
+        inertia: inertia about the centre of mass in the axes of the body's frame [kg m^2], shape (3, 3); if it is not
+            physically consistent, the nearest consistent one is used.
     """
     moments = np.linalg.eigvalsh(inertia)
     if moments[0] < 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - _POSSIBLE):
@@ -31,17 +36,17 @@ def set_inertial(body: mujoco.MjsBody, mass: float, centre: Array, inertia: Arra
     axes = axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
     body.mass, body.ipos, body.inertia = mass, centre, moments
     body.iquat = Rotation.from_matrix(axes).as_quat(scalar_first=True)
-    # MuJoCo refuses two ways of giving an orientation or an inertia beside each other.
+    # MuJoCo accepts only one specification of orientation and inertia, so clear the others.
     body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     body.fullinertia = np.full(6, np.nan)
     body.explicitinertial = True
 
 
 def keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Fix all bodies of ``spec`` as its ``model`` has them, if its compiler would change what is put into it.
+    """Write the compiled inertial parameters of all bodies into ``spec``, if compiler settings would alter new ones.
 
-    Settings that take inertias from shapes whatever is written, scale the total mass or raise small ones would undo a
-    cause, or pass it on to every other body.
+    Such settings compute inertias from geoms, scale the total mass or raise small values. They could undo a cause or
+    spread it to other bodies, so they are switched off.
     """
     of = spec.compiler
     from_shapes = of.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
@@ -56,18 +61,18 @@ def keep_inertials(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
 
 
 def inertial_of(model: mujoco.MjModel, body: int) -> tuple[float, Array, Array]:
-    """Mass [kg], centre [m] and inertia about it [kg m^2] of a compiled body, along its frame."""
+    """Mass [kg], centre of mass [m] and inertia about it [kg m^2] of a compiled body, in the body's frame."""
     own = Rotation.from_quat(model.body_iquat[body], scalar_first=True).as_matrix()
     inertia = own @ np.diag(model.body_inertia[body]) @ own.T
     return float(model.body_mass[body]), np.array(model.body_ipos[body]), inertia
 
 
 def real_inertia(inertia: Array) -> Array:
-    """The inertia nearest to a fitted, symmetric one about the centre of mass [kg m^2] that a body can have.
+    """Project a symmetric inertia about the centre of mass [kg m^2] onto physically consistent ones.
 
-    A density is nowhere below zero, so second moments of mass are positive semidefinite (P. M. Wensing, S. Kim and
+    Density is not negative, so the matrix of second moments of mass is positive semidefinite (P. M. Wensing, S. Kim and
     J.-J. E. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", RA-L
-    2018); those that are not are set to a thousandth of the largest.
+    2018). Eigenvalues below a thousandth of the largest are raised to that value.
     """
     size, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
     second = (axes * np.maximum(size, LEAST_MOMENT * max(size[-1], 0.0))) @ axes.T
@@ -76,18 +81,22 @@ def real_inertia(inertia: Array) -> Array:
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
-"""Rows of dry friction. By default it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
-20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
+"""Parameters of the rows of dry friction. With MuJoCo's defaults, friction reaches its full value only at a speed of
+about loss / (100 / s inertia), which is 0.2 rad/s for 20 N m on 1 kg m^2. With these parameters a tenth of that speed
+suffices, for steps of up to 1 ms."""
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
-    """Put an effect, its joint counted as in qpos, into a model; False if MJCF has no word for it or its sign."""
+    """Put an effect into a model; return False if MJCF cannot express the effect or its sign.
+
+    The joints of the effect are numbered in the order of ``qpos``, from 1.
+    """
     model = spec.compile()
     if effect.cause == "gravity_direction":
         spec.option.gravity = [effect.number(axis) for axis in "xyz"]
         return True
     if effect.cause == "gravity_compensation":
-        if model.jnt_actgravcomp.any():  # it would come from actuators, which are off
+        if model.jnt_actgravcomp.any():  # applied by the actuators, which are disabled
             return False
         for body in spec.bodies[1:]:
             body.gravcomp += effect.number("share")
@@ -130,7 +139,7 @@ def _at_joint(
         joint.stiffness = stiffness if stiffness.size > 1 else most
         joint.springref = _as_written(spec, joint, effect.number("middle") - effect.number("offset") / most)
     elif effect.cause == "joint_zero":
-        # It stands farther than it reads: in the pose of the drawing it reads that much less.
+        # The true angle exceeds the reading by the zero, so the reading in the reference pose is lower.
         joint.ref = float(joint.ref) - _as_written(spec, joint, effect.number("zero"))
     elif effect.cause == "coupled_drive":
         return _coupled(spec, model, effect)
@@ -140,7 +149,7 @@ def _at_joint(
 
 
 def _coupled(spec: mujoco.MjSpec, model: mujoco.MjModel, effect: RobotEffect) -> bool:
-    """A fixed tendon along both joints rubs and has inertia at their common speed."""
+    """Add a fixed tendon along both joints, with friction and armature at their combined speed."""
     values = [effect.number(stem) for stem in ("coulomb", "viscous", "armature")]
     if min(values) < 0 or effect.partner is None or effect.joint is None:
         return False
@@ -156,7 +165,7 @@ def _coupled(spec: mujoco.MjSpec, model: mujoco.MjModel, effect: RobotEffect) ->
 
 
 def _as_written(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) -> float:
-    """A joint's position [rad or m] in the unit in which its model has angles: degrees, if it says nothing."""
+    """Convert a joint position [rad or m] to the unit of the model's file: degrees for hinges by default."""
     turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
     return float(np.degrees(position)) if turns and spec.compiler.degree else position
 
@@ -191,7 +200,7 @@ def _inertial(
 
 
 def _spread(way: Array) -> Array:
-    """Inertia of a point mass of 1 kg about a point that is so far away [m], shape (3, 3)."""
+    """Inertia of a point mass of 1 kg about a point at distance ``way`` [m], shape (3, 3)."""
     return way @ way * np.eye(3) - np.outer(way, way)
 
 
@@ -205,24 +214,24 @@ Effect = RobotEffect | JointLaw
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A robot that a reference stepper can step."""
+    """A robot with effects, ready for ``mocobot_sim.serial.extended.step``."""
 
-    # compiled, with what MJCF can say; contacts, limits and actuators off, MuJoCo's ``implicitfast``, and dry
-    # friction that hardly depends on the speed
+    # compiled model with the effects that MJCF can express; contacts, limits and actuators are disabled, the integrator
+    # is ``implicitfast``, and dry friction is nearly independent of speed
     model: mujoco.MjModel
-    stepped: tuple[Effect, ...]  # effects that the stepper adds
-    left_out: tuple[int, ...]  # which of the given effects are in neither, numbers from 0
+    stepped: tuple[Effect, ...]  # effects that ``step`` adds
+    left_out: tuple[int, ...]  # indices, from 0, of the given effects that are not simulated
 
     def running(self) -> list[RobotEffect | ActingLaw]:
-        """The stepper's effects for one run: laws may remember."""
+        """Effects for ``step``, new for every run because laws can have a state."""
         return [ActingLaw(e) if isinstance(e, JointLaw) else e for e in self.stepped]
 
 
 def with_effects(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[mujoco.MjModel, list[bool]]:
-    """Put into a model what MJCF can say of effects; the model compiled, and which effects are in it.
+    """Put effects into a model as far as MJCF can express them; return the compiled model and which effects it has.
 
     Raises:
-        InputError: MuJoCo refuses the model with the effects in it.
+        InputError: MuJoCo rejects the model with the effects.
     """
     try:
         inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
@@ -233,10 +242,15 @@ def with_effects(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[mujoco
 
 
 def build(spec: mujoco.MjSpec, effects: Sequence[Effect], step_s: float) -> Built:
-    """Put effects into a nominal model, which is changed, to be integrated in steps of ``step_s`` [s].
+    """Build a robot with effects for rollouts.
+
+    Args:
+        spec: nominal model; changed.
+        effects: effects to add.
+        step_s: integration step [s].
 
     Raises:
-        InputError: MuJoCo refuses the model with the effects in it.
+        InputError: MuJoCo rejects the model with the effects.
     """
     model, inside = with_effects(spec, effects)
     off = mujoco.mjtDisableBit
@@ -250,5 +264,5 @@ def build(spec: mujoco.MjSpec, effects: Sequence[Effect], step_s: float) -> Buil
 
 
 def steps(effect: Effect) -> bool:
-    """Whether the stepper simulates an effect: errors of the log it does not."""
+    """Whether ``step`` can simulate an effect; errors of the log are not simulated."""
     return effect.acts if isinstance(effect, JointLaw) else effect.cause in LAWS

@@ -1,1 +1,1 @@
-"""Trials: what is commanded, simulated and recorded."""
+"""Trials: commands, simulation and recordings."""

@@ -1,4 +1,4 @@
-"""What acts in a trial besides the arms (bases, hands, effects that MJCF lacks), and sensors that misread."""
+"""Interfaces of what acts in a trial besides the arms (bases, hands, some effects), and of faulty sensors."""
 
 from __future__ import annotations
 
@@ -18,52 +18,54 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stage:
-    """A trial that is about to begin, at rest."""
+    """Context of a trial, handed to actors and readers before the first tick."""
 
-    model: mujoco.MjModel  # the trial's
-    data: mujoco.MjData  # the trial's
+    model: mujoco.MjModel  # model of the trial
+    data: mujoco.MjData  # data of the trial, at rest
     index: TeamIndex  # addresses in the model
-    controller: TeamController  # of the arms
+    controller: TeamController  # controller of the arms
     rate_hz: float  # control rate [Hz]
     ticks: int  # control ticks per logged sample
     duration: int  # control ticks of the whole trial
-    shared: dict[str, object] = field(
-        default_factory=dict
-    )  # by name, what several actors keep of the trial together
+    # objects that several actors of the trial share, by name
+    shared: dict[str, object] = field(default_factory=dict)
 
 
 class Actor(Protocol):
-    """Somebody or something that acts at the control rate.
+    """Something that applies forces or drives actuators at the control rate.
 
-    Every tick, before the arms' controller, ``qpos`` and ``qvel`` are those of this instant; whatever MuJoCo derives
-    from them (poses of bodies and sites, contacts, forces) is of the instant one time step before.
+    Actors run before the arms' controller. ``qpos`` and ``qvel`` are those of the current instant. All quantities that
+    MuJoCo derives from them (poses of bodies and sites, contacts, forces) are one time step old.
     """
 
     def start(self, stage: Stage) -> None:
-        """Get ready; called once."""
+        """Prepare for a trial; called once before the first tick."""
 
     def act(self, tick: int) -> None:
-        """Write ``ctrl`` of what it drives; add to ``xfrc_applied`` of the payload or ``qfrc_applied`` (both zero)."""
+        """Write ``ctrl`` of its own actuators; add to ``xfrc_applied`` of the payload or to ``qfrc_applied``.
+
+        Both force arrays are set to zero before the first actor of each tick.
+        """
 
 
 class Reader(Protocol):
-    """A sensor that misreads: it changes what the robots' controllers and logs see."""
+    """A faulty sensor: it changes the readings that controllers and logs use."""
 
     def start(self, stage: Stage) -> None:
-        """Get ready; called once."""
+        """Prepare for a trial; called once before the first tick."""
 
     def read(self, tick: int, seen: Array) -> None:
-        """Change, in place, the positions that the sensors see.
+        """Change in place the positions from which readings are computed.
 
         Args:
-            tick: of the control.
-            seen: ``qpos`` of this instant, and what readers before this one made of it, shape (nq,). The driven angle
-                is motor plus spring, the torque minus the design stiffness times the spring.
+            tick: control tick.
+            seen: ``qpos`` of this instant, as changed by earlier readers, shape (nq,). The driven angle is motor plus
+                spring coordinate; the torque is minus the design stiffness times the spring coordinate.
         """
 
 
 class RobotReadings:
-    """Readings of one robot, to be looked at and changed: a reader's view of ``seen``."""
+    """Access to the readings of one robot in the array ``seen`` of a reader; joints count from 1."""
 
     def __init__(self, stage: Stage, robot: int) -> None:
         index, i = stage.index, robot - 1
@@ -75,14 +77,14 @@ class RobotReadings:
         return -self._stiffness * float(seen[self._spring[joint - 1]])
 
     def set_tau(self, seen: Array, joint: int, value: float) -> None:
-        """Change it, and leave the angle's reading as it is."""
+        """Set the torque reading [N m] without changing the reading of the driven angle."""
         spring, motor = self._spring[joint - 1], self._motor[joint - 1]
         before = float(seen[spring])
         seen[spring] = -value / self._stiffness
         seen[motor] += before - seen[spring]
 
     def phi(self, seen: Array, joint: int) -> float:
-        """Driven angle minus that at home [rad]."""
+        """Driven angle minus its value at home [rad]."""
         return float(seen[self._motor[joint - 1]] + seen[self._spring[joint - 1]])
 
     def add_phi(self, seen: Array, joint: int, error: float) -> None:
@@ -99,12 +101,12 @@ class RobotReadings:
 
 
 class Misreading:
-    """Readings of one robot, wrong.
+    """Reader that changes the readings of one robot by a function.
 
     Args:
-        robot: from 1.
-        change: gets the readings, what is seen, and the time [s]; it changes them.
-        ready: gets the step [s] before the first one, for what has a memory.
+        robot: number of the robot, from 1.
+        change: called every tick with the readings, the array ``seen`` and the time [s]; changes ``seen`` in place.
+        ready: called once before the first tick with the control period [s], to initialise filters.
     """
 
     def __init__(

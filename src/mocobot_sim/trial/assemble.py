@@ -1,4 +1,4 @@
-"""Start a trial at rest: close every loop at home, then load the springs so that nothing moves."""
+"""Initial state of a trial: close all kinematic loops near home, then load the springs for static equilibrium."""
 
 import mujoco
 import numpy as np
@@ -16,7 +16,7 @@ Index = NDArray[np.intp]
 
 
 def loop_jacobian(model: mujoco.MjModel, data: mujoco.MjData, welds: bool = True) -> tuple[Array, Array]:
-    """Jacobian (rows, nv) and gap (rows,) of the rods' and, if wanted, the grasps' constraints, and of no others."""
+    """Jacobian (rows, nv) and residual (rows,) of the loop constraints: rods and, with ``welds``, grasps."""
     kinds = [mujoco.mjtEq.mjEQ_CONNECT] + ([mujoco.mjtEq.mjEQ_WELD] if welds else [])
     equality = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     rows = equality & np.isin(model.eq_type[np.where(equality, data.efc_id, 0)], kinds)
@@ -29,22 +29,22 @@ def loop_jacobian(model: mujoco.MjModel, data: mujoco.MjData, welds: bool = True
 
 
 def static_load(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """What has to hold the team still at ``data.qpos`` on every dof [N or N m], shape (nv,)."""
+    """Generalised forces that hold the team still at ``data.qpos`` [N or N m], shape (nv,)."""
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     return data.qfrc_bias - data.qfrc_passive
 
 
 def open_by(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Largest gap of any loop [m or rad]."""
+    """Largest residual of any loop constraint [m or rad]."""
     mujoco.mj_fwdPosition(model, data)
     return float(np.abs(loop_jacobian(model, data)[1]).max())
 
 
 def close(model: mujoco.MjModel, data: mujoco.MjData, dofs: Index, welds: bool = True) -> float:
-    """Close the loops with the smallest steps of some joints of one coordinate each; returns the gap that remains.
+    """Close the loops by Newton steps of least norm in some coordinates, and return the remaining residual [m or rad].
 
-    Changes ``data.qpos``; without ``welds`` only the rods are closed, not the grasps.
+    Changes ``data.qpos``. Each joint of ``dofs`` has one coordinate. Without ``welds`` only the rods are closed.
     """
     at = model.jnt_qposadr[model.dof_jntid[dofs]]
     gap = np.inf
@@ -59,7 +59,7 @@ def close(model: mujoco.MjModel, data: mujoco.MjData, dofs: Index, welds: bool =
 
 
 def hang(model: mujoco.MjModel, data: mujoco.MjData, dofs: Index) -> bool:
-    """Let pendulum joints hang down; whether any had to move."""
+    """Move pendulum joints to where they hang at rest; return whether any moved."""
     at = model.jnt_qposadr[model.dof_jntid[dofs]]
     moved = False
     for _ in range(50 if len(dofs) else 0):
@@ -78,10 +78,10 @@ def hang(model: mujoco.MjModel, data: mujoco.MjData, dofs: Index) -> bool:
 def turn_free_directions(
     model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, locked: Index, arms: Index
 ) -> bool:
-    """Turn what hangs freely (one or two grasps) to its nearest equilibrium; whether one was found.
+    """Turn a payload that one or two grasps leave free to swing to its nearest equilibrium; return whether one exists.
 
-    Directions in which the loops stay closed while the legs stand still: the moment of gravity along them is brought
-    to zero by Newton steps.
+    The free directions are those in which all loops stay closed with the driven joints locked. Newton steps bring the
+    moment of gravity along them to zero.
     """
     moving = np.setdiff1d(np.concatenate([arms, index.knee_dof.ravel()]), locked)
     at = model.jnt_qposadr[model.dof_jntid[moving]]
@@ -107,9 +107,10 @@ def turn_free_directions(
     return False
 
 
-# How far closing the loops may move a wrist or turn a gimbal from where the scene has them.
+# Largest displacement of a wrist and rotation of a gimbal that closing the loops may cause. Chosen.
 LARGEST_SHIFT_M = 0.06
 LARGEST_TURN_RAD = 0.2
+# Largest unbalanced generalised force of a static equilibrium [N or N m]. Chosen.
 UNHELD_NM = 1e-6
 SWINGS = (
     "the payload cannot rest in the home pose: {:.2g} N m stay unbalanced; with one or two grasps its centre of mass "
@@ -120,18 +121,17 @@ SWINGS = (
 def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex) -> Array:
     """Set ``data`` to static equilibrium in the home pose, or near ``scene.initial``, and return the spring torques.
 
-    Platforms and gimbals go to their home values, the legs follow by Newton steps on MuJoCo's own constraint
-    Jacobian, and the springs take the static load. With N robots the load's distribution has free internal
-    forces; the one with the least sum of squared spring torques is taken. Where home cannot close the loops (tilted
-    bases, mounts that are estimates), all joints share the correction; yielding bases and grasps settle under their
-    loads, and pendulums hang down.
+    Platforms and gimbals move to their home values, and the legs follow by Newton steps on MuJoCo's constraint
+    Jacobian. The springs then take the static load. Several robots can share the load in many ways; the solution with
+    the least sum of squared spring torques is used. If the home pose cannot close the loops (tilted bases, estimated
+    mounts), all joints share the correction. Compliant bases and grasps settle under their loads; pendulums hang down.
 
     Returns:
-        Spring torques [N m] at rest, positive raising the link, shape (N, 3); also written to ``data.ctrl``.
+        Spring torques at rest [N m], positive if they raise the link, shape (N, 3); also written to ``data.ctrl``.
 
     Raises:
-        InputError: no configuration near home closes the loops (a grasp is out of reach), or no spring
-            torques hold the payload at rest there (one or two grasps leave it free to swing).
+        InputError: no configuration near home closes the loops (a grasp is out of reach); or no spring torques hold
+            the payload at rest (one or two grasps leave it free to swing).
     """
     mujoco.mj_resetData(model, data)
     legs = np.concatenate([index.motor_dof.ravel(), index.knee_dof.ravel()])
@@ -145,11 +145,11 @@ def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjDat
         phi, theta = scene.initial
         data.qpos[index.motor_qpos] = phi - home_phi(omnid_design())
         data.qpos[index.gimbal_qpos] = theta
-        # Rods alone: knees and platforms follow the driven angles.
+        # Close the rods only: knees and platforms follow the driven angles.
         close(model, data, np.concatenate([index.knee_dof.ravel(), index.slide_dof.ravel()]), welds=False)
     start = data.qpos.copy()
     _close_arms(model, data, index, arms, start)
-    # Two or three times, because where things yield the loads shift a little.
+    # Iterate, because compliant parts shift the loads.
     for _ in range(3):
         if not _settle(model, data, index, arms, start):
             break
@@ -183,7 +183,7 @@ def _close_arms(
 def _settle(
     model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, arms: NDArray[np.intp], start: Array
 ) -> bool:
-    """Put everything that yields where its load holds it; whether anything moved."""
+    """Move everything compliant or free to its equilibrium under the current load; return whether anything moved."""
     moved = hang(model, data, index.hanging_dof)
     _, unheld, load = _static_forces(model, data, index, check=False)
     if unheld > UNHELD_NM:
@@ -205,23 +205,23 @@ def _settle(
 
 
 def _turned(data: mujoco.MjData, index: TeamIndex, start: Array) -> float:
-    """Largest turn of a gimbal since ``start`` [rad]."""
+    """Largest change of a gimbal angle since ``start`` [rad]."""
     return float(np.abs(data.qpos[index.gimbal_qpos] - start[index.gimbal_qpos]).max())
 
 
 def _static_forces(
     model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, check: bool = True
 ) -> tuple[Array, float, Array]:
-    """Spring torques (N, 3) that hold the team, what they leave unheld, and the load on every dof (nv,)."""
+    """Static spring torques (N, 3) [N m], the largest unbalanced force [N or N m], and the load on every dof (nv,)."""
     needed: Array = static_load(model, data)
     spring = index.spring_dof.ravel()
-    # The floor carries released bases: their wheels settle in a trial's first milliseconds.
+    # The floor carries released bases; their wheels settle in the first milliseconds of a trial.
     apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof])
     rows = np.setdiff1d(np.arange(model.nv), apart)
     jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
     constraint = jacobian[rows]
     selection = (rows[:, None] == spring).astype(float)  # (rows, 3 N)
-    # Constraint forces are free, spring torques cost: weigh the former out of the least-norm solution.
+    # Minimise spring torques only: the large factor makes constraint forces cheap in the least-norm solution.
     free = 1e4
     forces = np.hstack([free * constraint, selection])
     solution = np.linalg.lstsq(forces, needed[rows])[0]
@@ -234,7 +234,7 @@ def _static_forces(
 
 
 def _deflection(model: mujoco.MjModel, index: TeamIndex, torque: Array) -> Array:
-    """Deflections of the springs under a torque [rad], shape (N, 3)."""
+    """Deflections of the springs that balance a torque [rad], shape (N, 3)."""
     springs = model.dof_jntid[index.spring_dof]
     stiffness, poly = model.jnt_stiffness[springs], model.jnt_stiffnesspoly[springs]
     deflection = -torque / stiffness

@@ -1,4 +1,4 @@
-"""Resimulation: a recording's commands in closed loop once more, and what its sensors should then have read."""
+"""Resimulation: run the commands of a recording in closed loop again and predict the readings of its sensors."""
 
 import json
 from dataclasses import replace
@@ -23,21 +23,21 @@ def resimulate(
     timestep_s: float = TIMESTEP_S,
     trial_number: int | None = None,
 ) -> TrialLog:
-    """Simulate a recording's commands with another team.
+    """Simulate the commands of a recording with a given team.
 
-    The robots follow the recorded commands with the recorded gains and the recorded, frozen feed-forward force; they
-    start at rest near the recorded first posture. A take-up phase is not repeated: the first seconds differ.
+    The robots follow the recorded commands with the recorded gains and the recorded feed-forward force. They start at
+    rest near the first recorded posture. The load take-up is not repeated, so the first seconds differ.
 
     Args:
-        recording: with commands and ``control`` (see docs/recording.md).
-        scene: the team that is to do it.
+        recording: recording with commands and ``control`` (see docs/recording.md).
+        scene: team to simulate.
         gains: control gains; None for the recorded ones.
         timestep_s: integration step [s].
-        trial_number: which trial this is, from 1, for the scene's pushes; None lets all act.
+        trial_number: number of the trial, from 1, to which effects such as a push refer; None lets all act.
 
     Raises:
-        InputError: the recording has no commands or no control, or is for another number of robots or another rate.
-        TrialError: the physics cannot be trusted.
+        InputError: the recording lacks commands or control, or has another number of robots or another rate.
+        TrialError: the simulation failed a check.
     """
     meta = recording.metadata
     if recording.ref is None:
@@ -82,5 +82,5 @@ def _feed_forward(recording: Recording) -> Array:
 
 
 def predicted(log: TrialLog) -> Recording:
-    """What ideal sensors read in a trial, the scene's zeros and timing faults included."""
+    """Recording of a trial by sensors without noise or quantisation, with the team's zeros and timing faults."""
     return measure(log, sensor_preset("ideal"), np.random.default_rng(0), name="predicted")

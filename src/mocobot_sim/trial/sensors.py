@@ -1,4 +1,4 @@
-"""What the robots' joint sensors make of the truth: calibration, noise, quantisation."""
+"""Sensor model of the robots' joints: calibration errors, noise, quantisation."""
 
 from dataclasses import dataclass, field
 
@@ -19,10 +19,10 @@ class SensorPreset:
     """Quality of the sensors and of the calibration.
 
     Attributes:
-        name: how the command line calls it.
-        encoder_bits: resolution of every phi and theta encoder, per turn; None for continuous.
-        tau_step_Nm: torque resolution [N m]; 0 for continuous.
-        tau_noise_Nm: standard deviation of white torque noise before rounding [N m].
+        name: name on the command line.
+        encoder_bits: resolution of every phi and theta encoder, in bits per turn; None for no quantisation.
+        tau_step_Nm: torque resolution [N m]; 0 for no quantisation.
+        tau_noise_Nm: standard deviation of the white torque noise before quantisation [N m].
         spread: standard deviations of the calibration errors.
     """
 
@@ -38,6 +38,7 @@ class SensorPreset:
         return self.spread == CalibrationSpread()
 
 
+# Sensor presets by name, from ideal sensors to robots without calibration. Chosen.
 PRESETS = {
     preset.name: preset
     for preset in (
@@ -60,7 +61,7 @@ PRESETS = {
 
 
 def sensor_preset(name: str) -> SensorPreset:
-    """Look a preset up by name.
+    """Look up a preset by name.
 
     Raises:
         InputError: there is no such preset.
@@ -78,19 +79,19 @@ def measure(
     seed: int | None = None,
     name: str = "simulated",
 ) -> Recording:
-    """Read a trial through the sensors.
+    """Make a recording of a trial with simulated sensors.
 
-    A torque reading is the spring's deflection times its design stiffness, so a stiffer spring reads low.
-    Every encoder and torque channel that rounds has a grid of its own, placed at random, so that robots which stand
-    alike do not round alike.
+    A torque reading is the deflection of the spring times its design stiffness, so a stiffer spring reads low. Each
+    quantised channel has a random offset of its quantisation grid, so that robots in equal postures do not have equal
+    rounding errors.
 
     Args:
-        log: the trial.
+        log: log of the trial.
         preset: quality of the sensors.
-        rng: source of the noise and of the grids.
+        rng: random generator for noise and grid offsets.
         payload: name of the payload, for the metadata.
         seed: seed, for the metadata.
-        name: how messages call the recording.
+        name: name of the recording in messages.
     """
     units = log.units
     clock_s = np.array(log.sensors.of("clock_delay_s", log.robots))
@@ -123,10 +124,10 @@ def measure(
 
 
 def _grid(step: float, robots: int, rng: np.random.Generator) -> Array:
-    """Where each channel's grid lies relative to zero, within half a step, shape (N, 3)."""
+    """Random offset of the quantisation grid of each channel, within half a step, shape (N, 3)."""
     return step * rng.uniform(-0.5, 0.5, (robots, 3)) if step else np.zeros((robots, 3))
 
 
 def _round_to(values: Array, step: float, grid: Array) -> Array:
-    # In C order like a recording from a file or another process, so that sums over it have the same bits.
+    # C order, as in a recording read from a file, so that sums over it are bit-identical.
     return np.ascontiguousarray(np.round((values + grid) / step) * step - grid if step else values)

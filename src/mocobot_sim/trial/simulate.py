@@ -1,4 +1,4 @@
-"""From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
+"""Simulate one trial from a request: build the team, run the trial, make recordings."""
 
 from __future__ import annotations
 
@@ -31,44 +31,44 @@ from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 
 LEFT_RAD = 0.3
-"""How far from zero a gimbal that holds nothing may have been left."""
+"""Largest initial angle of a gimbal without payload [rad]. Chosen."""
 
 
 @dataclass(frozen=True)
 class TrialRequest:
-    """One trial to simulate; equal requests give equal bits."""
+    """Specification of one trial; equal requests give identical results."""
 
-    # name of a shipped payload, or path of a payload MJCF; in a free trial the one that the robots have put down
+    # name of a shipped payload, or path of a payload MJCF; a free trial uses only its name and its number of grasps
     payload: str
     trial: str  # ``random``, ``periodic``, ``static`` or ``free``
-    seed: int = 0  # seed of everything random, at least 0
-    number: int = 0  # which of several trials of that kind, at least 0
-    vias: int = 80  # number of vias of a random trial, and of a free one's fast part
+    seed: int = 0  # seed of all random numbers, at least 0
+    number: int = 0  # index among the trials of that kind, from 0
+    vias: int = 80  # number of vias of a random trial, or of the fast part of a free trial
     duration_s: float = 60.0  # length of a periodic trial's motion [s]
-    robots: int | None = None  # number of robots of a free trial; None for as many as the payload has grasps
+    robots: int | None = None  # number of robots of a free trial; None for the payload's number of grasps
 
     @property
     def label(self) -> str:
-        """Name of the payload: a custom payload goes by its file's name."""
+        """Name of the payload; for a custom payload, the name of its file without suffix."""
         return Path(self.payload).stem
 
     def rng(self, purpose: str) -> np.random.Generator:
-        """Independent stream for one purpose of this trial."""
+        """Random generator for one purpose of this trial, independent of those for other purposes."""
         words = f"{purpose}|{self.label}|{self.trial}|{self.number}".encode()
         return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """A finished trial."""
+    """Result of a simulated trial."""
 
-    recordings: dict[str, Recording]  # one per sensor preset
-    log: TrialLog  # what truly happened
-    scene: TeamScene  # the team
+    recordings: dict[str, Recording]  # one per sensor preset, by its name
+    log: TrialLog  # true motion and torques
+    scene: TeamScene  # the team with its effects
 
     @cached_property
     def truth(self) -> GroundTruth:
-        """The payload and the robots; compiles the team once more."""
+        """Ground truth of payload and robots; compiles the model again."""
         return replace(GroundTruth.of(self.scene), control=self.log.stability)
 
 
@@ -83,28 +83,28 @@ def simulate(
     units: Sequence[AsBuilt] = (),
     place: int | None = None,
 ) -> Simulated:
-    """Run one trial and read it through one or several sensor presets.
+    """Run one trial and make a recording with each of several sensor presets.
 
-    Presets with the same calibration spread share the trial: noise and quantisation of the logged channels do not
-    act on the motion. The units of a team depend on the seed alone, so they are the same in all its trials.
+    Presets with the same calibration spread can share a trial, because noise and quantisation of the logged channels
+    do not affect the motion. The deviations of the robots depend on the seed only, so all trials of a team have the
+    same robots.
 
     Args:
-        request: what to simulate.
+        request: specification of the trial.
         presets: sensor presets, all with the same calibration spread.
-        grasps: grasp frames X_1i that the robots believe in when they construct periodic and static
-            trajectories, N transforms; None for the true ones.
+        grasps: estimated grasp frames X_1i for the construction of periodic and static trajectories, N transforms;
+            None for the true ones.
         gains: control gains; None for the defaults.
-        progress: called with the number of samples done and that of all.
-        scene: the team, in place of one built from ``request.payload``, which then is its label only; its robots are
-            what they are, so the presets must be calibrated ones.
-        effects: what is hidden in the team.
-        units: the robots, in place of those that the presets draw or leave as designed; the presets must be calibrated
-            ones.
-        place: 1-based place of the trial in a sequence, which a push names; None for one more than its number.
+        progress: called with the number of samples done and the total number of samples.
+        scene: team to use instead of building one; ``request.payload`` is then only a label, and the presets must be
+            calibrated ones.
+        effects: effects to add to the team.
+        units: deviations of the robots, instead of those drawn by the presets; the presets must be calibrated ones.
+        place: number of the trial, from 1, to which effects such as a push refer; None for ``request.number`` + 1.
 
     Raises:
-        InputError: a request or preset that cannot be met.
-        TrialError: the physics of the trial cannot be trusted.
+        InputError: the request or a preset is invalid, or they do not fit together.
+        TrialError: the simulation failed a check.
     """
     _check(request, presets, scene, units)
     free = request.trial == FREE
@@ -131,7 +131,7 @@ def _check(
     scene: TeamScene | None,
     units: Sequence[AsBuilt],
 ) -> None:
-    """Refuse a request or preset that cannot be met."""
+    """Raise ``InputError`` if a request or preset is invalid, or they do not fit together."""
     if request.trial not in TRIALS:
         raise InputError(f"trial {request.trial!r} does not exist; the trials are {', '.join(TRIALS)}")
     if len({preset.spread for preset in presets}) != 1:
@@ -154,7 +154,14 @@ def _check(
 def draw_units(
     payload: str, preset: SensorPreset, seed: int, robots: int | None = None
 ) -> tuple[AsBuilt, ...]:
-    """Robots as designed (empty) if the preset is calibrated, else drawn from the seed; as many as there are grasps."""
+    """Draw the deviations of a team's robots from the seed; empty (as designed) if the preset is calibrated.
+
+    Args:
+        payload: name or path of the payload.
+        preset: sensor preset with the standard deviations.
+        seed: seed of the team.
+        robots: number of robots; None for the number of grasps of the payload.
+    """
     if preset.calibrated:
         return ()
     return preset.spread.draw(robots or _grasps(payload), np.random.default_rng([seed, *b"units"]))
@@ -165,7 +172,7 @@ def _grasps(payload: str) -> int:
 
 
 def _free_team(request: TrialRequest, preset: SensorPreset, units: Sequence[AsBuilt]) -> TeamScene:
-    """The seed's robots, which are those of its other trials, with their gimbals as somebody left them."""
+    """Build a team without payload: the robots of the seed's other trials, with random gimbal angles."""
     robots = _grasps(request.payload) if request.robots is None else request.robots
     check_robots(robots)
     theta = request.rng("gimbals").uniform(-LEFT_RAD, LEFT_RAD, (robots, 3))
@@ -176,7 +183,7 @@ def _free_team(request: TrialRequest, preset: SensorPreset, units: Sequence[AsBu
 def make_trajectory(
     request: TrialRequest, scene: TeamScene, grasps: RigidTransform | None = None
 ) -> Trajectory:
-    """Commands of a request (arguments as in ``simulate``)."""
+    """Make the commands of a request; arguments as in ``simulate``."""
     home, X_1i = scene.wrist_home_b, scene.X_1i if grasps is None else grasps
     rng = request.rng("trajectory")
     if request.trial == "random":

@@ -1,7 +1,7 @@
-"""Commanded motion of wrists and bases: random vias, a common sphere, static orientations, planar plans.
+"""Commanded motion of wrists and bases: random vias, motion on a sphere, static orientations, planar plans.
 
-Commands of wrists are sampled at the recording's rate; between them the controller follows the cubic spline through
-them, so a recording that carries its commands can be resimulated exactly.
+Wrist commands are sampled at the rate of the recording. Between samples the controller follows a cubic spline through
+them, so a recording with commands can be resimulated exactly.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from estimator.arrays import Array
 from estimator.errors import InputError
 
-RATE_HZ = 100.0
-LONGEST_S = 3600.0  # a trial and its log are kept in memory
-SETTLE_S = 2.5  # at rest before the motion (load take-up) and after it; the estimator trims 2 s of each end
+RATE_HZ = 100.0  # sampling rate of commands and recordings [Hz]
+LONGEST_S = 3600.0  # longest trial [s]; chosen: a trial and its log stay in memory
+# Rest before the motion (load take-up) and after it [s]. Chosen: the estimator trims 2 s at each end.
+SETTLE_S = 2.5
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Trajectory:
 
 
 def minimum_jerk(s: Array) -> Array:
-    """Minimum-jerk profile: 0 to 1 over s in [0, 1], with zero velocity and acceleration at both ends."""
+    """Minimum-jerk profile from 0 to 1 over s in [0, 1], with zero velocity and acceleration at both ends."""
     s = np.clip(s, 0.0, 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
@@ -57,14 +58,13 @@ def random_vias(
 
     Args:
         wrist_home_b: home wrist positions [m], shape (N, 3).
-        rng: source of vias and times.
+        rng: random generator for vias and times.
         vias: number of vias per robot; the wrists then return home.
-        box_m: half sides of the box around home that holds the vias [m].
-        transit_s, dwell_s: uniform ranges of the time between and at vias [s].
+        box_m: half sides of the box around home that contains the vias [m].
+        transit_s, dwell_s: ranges of the uniformly distributed times between and at vias [s].
 
     Raises:
-        InputError: fewer than one via, so many that the motion would last over an hour, or a transit that takes
-            no time.
+        InputError: there is no via, the motion could last over an hour, or a transit could take no time.
     """
     _check_vias(vias, vias * (transit_s[1] + dwell_s[1]))
     if not min(transit_s) > 0:
@@ -87,21 +87,21 @@ def free_motion(
     slow_s: tuple[float, float] = (0.8, 1.2),
     fast_s: tuple[float, float] = (0.5, 0.8),
 ) -> Trajectory:
-    """Motion of arms that hold nothing: holds all over the workspace for their weight, then haste for their inertia.
+    """Motion of arms without payload: static holds that excite gravity, then fast motion that excites inertia.
 
-    Every wrist goes its own way between random points of a ball around home: first to a quarter as many holds as there
-    are vias, then through the vias without a rest, then home.
+    Every wrist moves independently between random points of a ball around home. It stops at vias / 4 holds, rounded up,
+    then passes the vias without stopping, then returns home.
 
     Args:
         wrist_home_b: home wrist positions [m], shape (N, 3).
-        rng: source of points and times.
+        rng: random generator for points and times.
         vias: number of vias per robot in the fast part.
         radius_m: radius of the ball [m].
         hold_s: rest at each hold [s].
-        slow_s, fast_s: uniform ranges of the time to a hold, and of the time to a via [s].
+        slow_s, fast_s: ranges of the uniformly distributed times to each hold and to each via [s].
 
     Raises:
-        InputError: fewer than one via, or so many that the motion would last over an hour.
+        InputError: there is no via, or the motion could last over an hour.
     """
     holds = -(-vias // 4)
     _check_vias(vias, holds * (slow_s[1] + hold_s) + vias * fast_s[1])
@@ -124,14 +124,14 @@ def _check_vias(vias: int, longest_s: float) -> None:
 
 
 def _via_paths(paths: Sequence[tuple[Array, Array, Array]]) -> Array:
-    """Robots' points, times between them and at them; all at rest at both ends, shape (Q, N, 3)."""
+    """Sample the paths of all robots, shape (Q, N, 3), from (points, transit times, dwell times) of each."""
     duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
     return np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1)
 
 
 def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: float) -> Array:
-    """From point to point with minimum jerk, beginning at ``start`` [s]; shape (Q, 3)."""
+    """Sample a minimum-jerk path through points that starts at the time ``start`` [s], shape (Q, 3)."""
     ref = np.tile(points[0], (len(time), 1))
     for k in range(len(transit)):
         on = time >= start
@@ -149,21 +149,21 @@ def sphere_motion(
     amplitude_rad: float = np.deg2rad(3.4),
     frequency_hz: Sequence[float] = (0.7, 0.85, 0.6),
 ) -> Trajectory:
-    """Periodic motion of all wrists on the sphere whose great circle runs through the grasps (section IV.C.3).
+    """Periodic motion of all wrists on the sphere whose great circle passes through the grasps (paper, section IV.C.3).
 
-    The payload turns about the centre of the circle through three grasps, each axis at its own frequency, so every
-    wrist stays on that sphere. Other than three grasps need not lie on one circle: they turn about their centroid.
+    The payload turns about the centre of the circle through its three grasps, so every wrist stays on the sphere. The
+    frequency differs for each axis. With other than three grasps the payload turns about their centroid.
 
     Args:
         wrist_home_b: home wrist positions [m], shape (N, 3).
-        X_1i: grasp frames in {1}, as the robots have estimated them; N transforms.
+        X_1i: estimated grasp frames in {1}, N transforms.
         duration_s: length of the motion, ramps included [s].
-        rng: source of the phases; None for zero phases.
+        rng: random generator for the phases; None for zero phases.
         amplitude_rad: amplitude of each component of the rotation vector [rad].
         frequency_hz: frequency of each component [Hz].
 
     Raises:
-        InputError: the motion is shorter than its ramps or longer than an hour, or there is one robot only.
+        InputError: the motion is shorter than its ramps or longer than an hour, or there is only one robot.
     """
     ramp = 2.0
     if not 2.0 * ramp <= duration_s <= LONGEST_S:
@@ -186,18 +186,18 @@ def static_orientations(
     transit_s: float = 2.0,
     hold_s: float = 10.0,
 ) -> Trajectory:
-    """Hold the payload still at distinct orientations, tilted about evenly spaced horizontal axes (section IV.C.2).
+    """Hold the payload still in orientations tilted about evenly spaced horizontal axes (paper, section IV.C.2).
 
     Args:
         wrist_home_b: home wrist positions [m], shape (N, 3).
-        X_1i: grasp frames in {1}, as the robots have estimated them; N transforms.
-        orientations: how many holds.
-        tilt_rad: tilt of each hold [rad].
+        X_1i: estimated grasp frames in {1}, N transforms.
+        orientations: number of holds.
+        tilt_rad: tilt at each hold [rad].
         transit_s: time between holds [s].
         hold_s: time at each hold, settling included [s].
 
     Raises:
-        InputError: fewer than one orientation, or one robot only.
+        InputError: there is no orientation, or only one robot.
     """
     if orientations < 1:
         raise InputError(f"orientations is {orientations}; it must be at least 1")
@@ -213,7 +213,10 @@ def static_orientations(
 
 
 def _turn_about(wrist_home_b: Array, X_1i: RigidTransform, centre: Array, rotation: Array) -> Array:
-    """Wrist positions in {b} when the payload turns by rotation vectors (Q, 3), given in {1} at home, about centre."""
+    """Wrist positions in each {b} while the payload turns about a centre, shape (Q, N, 3).
+
+    ``rotation`` holds rotation vectors in the home axes of {1} [rad], shape (Q, 3); ``centre`` is in {1} [m].
+    """
     if len(X_1i) < 2:
         raise InputError(
             "one robot cannot turn a payload about a point: periodic and static trials need two or more"
@@ -222,14 +225,14 @@ def _turn_about(wrist_home_b: Array, X_1i: RigidTransform, centre: Array, rotati
     refs = []
     for home, X in zip(np.asarray(wrist_home_b), X_1i, strict=True):
         arm = X.translation - centre
-        # {b} of robot i is {1} turned by its yaw: grasp frames are parallel to {b} at home up to the home tilt.
+        # At home, grasp frame i equals {b} of robot i up to tilt, so its yaw gives the heading of {b} in {1}.
         yaw = Rotation.from_euler("z", X.rotation.as_euler("ZYX")[0])
         refs.append(home + yaw.inv().apply(turn.apply(arm) - arm))
     return np.stack(refs, axis=1)
 
 
 def _circumcentre(p: Array) -> Array:
-    """Centre of the circle through three points; the centroid of other than three, or of collinear ones."""
+    """Centre of the circle through three points; the centroid if they are collinear or not three."""
     if len(p) == 3:
         a, b = p[1] - p[0], p[2] - p[0]
         n = np.cross(a, b)
@@ -239,7 +242,7 @@ def _circumcentre(p: Array) -> Array:
 
 
 def compose(pose: ArrayLike, of: ArrayLike) -> Array:
-    """Pose in the world of what has the pose ``of`` in the frame ``pose``; shapes (..., 3) broadcast."""
+    """Compose planar poses (x, y [m], yaw [rad]): ``of`` is given in the frame ``pose``; shapes (..., 3) broadcast."""
     pose, of = np.broadcast_arrays(np.asarray(pose, dtype=float), np.asarray(of, dtype=float))
     cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
     x, y = of[..., 0], of[..., 1]
@@ -247,32 +250,37 @@ def compose(pose: ArrayLike, of: ArrayLike) -> Array:
 
 
 def relative(frame: ArrayLike, pose: ArrayLike) -> Array:
-    """Pose of ``pose`` as seen from ``frame``, both in the world, yaw within +-pi; shapes (..., 3) broadcast."""
+    """Planar pose of ``pose`` in ``frame``, both given in the world; yaw within +-pi, shapes (..., 3) broadcast."""
     frame, pose = np.asarray(frame, dtype=float), np.asarray(pose, dtype=float)
     away = pose - frame
     return np.concatenate([seen_from(frame[..., 2], away[..., :2]), wrapped(away[..., 2:])], axis=-1)
 
 
 def seen_from(yaw: ArrayLike, vector: ArrayLike) -> Array:
-    """Vectors (x, y) in the axes of frames that are turned by ``yaw`` [rad]; shapes (...), (..., 2) -> (..., 2)."""
+    """Express planar vectors in axes turned by ``yaw`` [rad]; shapes (...), (..., 2) -> (..., 2)."""
     x, y = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
 
 
 def wrapped(angle: ArrayLike) -> Array:
-    """The same angle within +-pi [rad]."""
+    """Wrap an angle to +-pi [rad]."""
     return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def moved(pose: ArrayLike, step: ArrayLike) -> Array:
-    """Pose (..., 3) after a constant body twist has acted for a while: odometry (Modern Robotics, section 13.4).
+    """Integrate a constant body twist from a planar pose: odometry (Lynch and Park, "Modern Robotics", section 13.4).
 
-    ``step`` is the twist times the time (turn [rad], along x, along y [m]), shape (..., 3).
+    Args:
+        pose: x, y [m], yaw [rad], shape (..., 3).
+        step: twist times duration: rotation [rad], displacement along x and y [m], shape (..., 3).
+
+    Returns:
+        The pose afterwards, shape (..., 3).
     """
     pose, step = np.broadcast_arrays(np.asarray(pose, dtype=float), np.asarray(step, dtype=float))
     turn, x, y = step[..., 0], step[..., 1], step[..., 2]
-    # The chord of an arc is turned by half the arc's angle and shorter by the sinc of that.
+    # The chord of an arc is rotated by half the arc's angle and shorter by the sinc of that half angle.
     shorter = np.sinc(turn / (2.0 * np.pi))
     heading = pose[..., 2] + 0.5 * turn
     cos, sin = np.cos(heading), np.sin(heading)
@@ -280,19 +288,19 @@ def moved(pose: ArrayLike, step: ArrayLike) -> Array:
 
 
 def yaw_of(R: ArrayLike) -> Array:
-    """Yaw of rotations near level [rad], shape (..., 3, 3) -> (...): the heading of their x axis."""
+    """Yaw of rotation matrices [rad]: the heading of their x axis, shape (..., 3, 3) -> (...)."""
     R = np.asarray(R, dtype=float)
     return np.arctan2(R[..., 1, 0], R[..., 0, 0])
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One straight piece of a plan; the frame starts and ends it at rest, with minimum jerk.
+    """One straight segment of a plan, traversed with minimum jerk from rest to rest.
 
     Attributes:
-        to: pose at its end in the world: x, y [m], yaw [rad].
-        duration_s: time to get there, greater than 0 [s].
-        rest_s: time at rest there [s].
+        to: pose at the end in the world: x, y [m], yaw [rad].
+        duration_s: duration of the motion, greater than 0 [s].
+        rest_s: rest at the end [s].
     """
 
     to: tuple[float, float, float]
@@ -302,7 +310,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class PlanarMotion:
-    """Where frames are meant to be at every tick; N frames.
+    """Planned planar motion of N frames, one row per control tick.
 
     Attributes:
         rate_hz: ticks per second [Hz].
@@ -316,21 +324,21 @@ class PlanarMotion:
 
     @property
     def duration_s(self) -> float:
-        """From the first tick to the last [s]."""
+        """Time from the first tick to the last [s]."""
         return (len(self.pose) - 1) / self.rate_hz
 
 
 def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 1000.0) -> PlanarMotion:
-    """Motion of one frame along straight legs.
+    """Plan the motion of one frame along straight legs.
 
     Args:
-        start: pose at the beginning: x, y [m], yaw [rad].
-        legs: what to do, one after the other; yaw is not wrapped, so 2 pi is a full turn.
-        rest_s: time at rest before the first leg [s].
+        start: initial pose in the world: x, y [m], yaw [rad].
+        legs: segments in order; yaw is not wrapped, so a change of 2 pi is a full turn.
+        rest_s: rest before the first leg [s].
         rate_hz: ticks per second [Hz].
 
     Raises:
-        InputError: there is no leg, a number is not finite, a duration is not positive or the whole lasts over an hour.
+        InputError: there is no leg, a number is not finite, a duration is not positive, or the plan lasts over an hour.
     """
     if not legs:
         raise InputError("a plan has no legs; it needs at least one")
@@ -360,14 +368,16 @@ def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 
 
 
 def carried(motion: PlanarMotion, places: ArrayLike) -> PlanarMotion:
-    """Motion of N frames that are fixed to a moving one: what bases do that stay put under a moving payload.
+    """Motion of N frames rigidly attached to a moving one, such as bases that keep their place under a moving payload.
 
-    ``places`` is where they are in the world at the beginning: x, y [m], yaw [rad], shape (N, 3).
+    Args:
+        motion: motion of the moving frame; its first frame is used.
+        places: initial poses of the attached frames in the world: x, y [m], yaw [rad], shape (N, 3).
     """
     lead, twist = motion.pose[:, 0], motion.twist[:, 0]
     held = relative(lead[0], np.asarray(places, dtype=float))  # poses in the moving frame, (N, 3)
     pose = compose(lead[:, None], held[None])
-    # Velocity of the held origins in the moving frame, turned into their own axes.
+    # Velocity of each attached origin, rotated from the moving frame into the attached frame.
     x, y, yaw = held.T
     turn, v_x, v_y = (part[:, None] for part in twist.T)
     velocity = seen_from(yaw, np.stack([v_x - turn * y, v_y + turn * x], axis=-1))

@@ -1,4 +1,4 @@
-"""Run one trial: physics and control at 1 kHz, logged at 100 Hz, checked for everything that can go wrong."""
+"""Run one trial: physics and control at 1 kHz, logged at 100 Hz, with checks of the simulation."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from mocobot_sim.trial.trial_log import Rows, SensedLog, TrialLog
 
 @dataclass(frozen=True)
 class _Others:
-    """Actors, sensors that misread, and pushes of one trial."""
+    """Actors, readers and pushes of one trial, each in the order in which they act."""
 
-    actors: tuple[Actor, ...]  # each in the order in which it acts
-    readers: tuple[Reader, ...]  # each in the order in which it acts
-    pushes: tuple[Push, ...]  # each in the order in which it acts
-    carries: bool  # whether there is a payload to act on
-    R_Wb1: Array  # axes of robot 1's {b} in the world, shape (3, 3)
+    actors: tuple[Actor, ...]
+    readers: tuple[Reader, ...]
+    pushes: tuple[Push, ...]
+    carries: bool  # whether there is a payload
+    R_Wb1: Array  # orientation of robot 1's {b} in the world, shape (3, 3)
 
     @classmethod
     def of(cls, scene: TeamScene, trial_number: int | None, actors: Sequence[Actor]) -> _Others:
-        """``actors``, and after them what the scene's effects bring to a trial."""
+        """Collect the given actors, then those, the readers and the pushes of the scene's effects."""
         pushes = (effect for effect in scene.effects if isinstance(effect, Push))
         return cls(
             (*actors, *(actor for effect in scene.effects for actor in effect.actors(trial_number))),
@@ -48,12 +48,12 @@ class _Others:
         return bool(self.actors or self.readers or self.pushes)
 
     def start(self, stage: Stage) -> None:
-        """Get ready."""
+        """Start all actors and readers."""
         for part in (*self.actors, *self.readers):
             part.start(stage)
 
     def before_control(self, stage: Stage, tick: int, seen: Array) -> None:
-        """Act, from no force applied on, and change what the sensors see, shape (nq,), in place."""
+        """Clear applied forces, run the actors, then let readers change ``seen`` in place, shape (nq,)."""
         data = stage.data
         if self.carries and (self.pushes or self.actors):
             data.xfrc_applied[stage.index.payload_body] = 0.0
@@ -67,7 +67,7 @@ class _Others:
                 reader.read(tick, seen)
 
     def after_control(self, stage: Stage) -> None:
-        """Push."""
+        """Apply the pushes that are active now."""
         for push in self.pushes:
             if push.acts(stage.data.time):
                 mujoco.mj_kinematics(stage.model, stage.data)
@@ -88,22 +88,22 @@ def run_trial(
     """Simulate one trial in closed loop.
 
     Args:
-        scene: the team; its controllers misread what ``scene.units`` says.
+        scene: the team; ``scene.units`` gives the sensor zeros that its controllers see.
         trajectory: commands.
         gains: control gains; None for the defaults.
-        progress: called with the number of samples done and that of all, at first with 0 and then every second of the
-            trial.
-        trial_number: which trial this is, from 1: the scene's pushes for other trials do not act; None lets all act.
-        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up, or
-            for none at all where nothing is held.
-        timestep_s: integration step [s]; None for the scene's.
-        actors: what else acts: bases that drive, a person's hand.
+        progress: called with the number of samples done and the total number, first with 0 and then once per simulated
+            second.
+        trial_number: number of the trial, from 1; effects for other trials do not act, None lets all act.
+        feed_forward: constant feed-forward force of every robot in its {b} [N], shape (N, 3). With None the controller
+            takes up the load; without payload the force is then zero.
+        timestep_s: integration step [s]; None for that of the scene.
+        actors: additional actors, such as driving bases or a person's hand.
 
     Raises:
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
             leaves its range.
-        InputError: the team cannot be assembled, the trajectory is for another number of robots or leaves
-            the workspace, or the control rate does not divide into whole steps.
+        InputError: the team cannot be assembled; the trajectory is for another number of robots or leaves
+            the workspace; or rates and time step are not whole multiples of each other.
     """
     _check_commands(scene, trajectory)
     gains = gains or ControlGains()
@@ -145,7 +145,7 @@ def run_trial(
             if disturbed:
                 others.after_control(stage)
             if tick == sample * ticks:
-                # A step first evaluates forces and frames at the state it starts from: one instant for all.
+                # A step first evaluates forces and frames at its initial state, so the whole row has one instant.
                 log.before_step(sample)
                 step(model, data)
                 log.after_step(sample)
@@ -153,7 +153,7 @@ def run_trial(
             else:
                 remaining = substeps
             if remaining:
-                step(model, data, remaining)  # by position: 0.4 us less
+                step(model, data, remaining)  # positional arguments are faster
         if sample % 100 == 99 or sample == last:
             log.check(reported, sample + 1, design)
             if progress:
@@ -171,13 +171,13 @@ def _whole(name: str, ratio: float) -> int:
 
 
 def between_commands(ref_b: Array, ticks: int) -> tuple[Array, Array]:
-    """Commands at every control tick: the cubic spline through the recorded ones, at rest at both ends.
+    """Interpolate commands to the control rate by a cubic spline that is at rest at both ends.
 
-    Straight lines between commands would jump in velocity at every sample; the ripple this causes is locked to
-    the sampling, so it does not average out but aliases into the torques (up to 0.12 % on inertia).
+    Linear interpolation would make the velocity jump at every sample. The resulting ripple is synchronous with the
+    sampling, so it aliases into the torques instead of averaging out (error of inertia up to 0.12 %).
 
     Returns:
-        Positions [m] and rates [m/s] at ``ticks`` per command, shape (Q * ticks, N, 3); the last command is held.
+        Positions [m] and rates [m/s] at ``ticks`` per command, shapes (Q * ticks, N, 3); the last command is held.
     """
     times = np.arange(len(ref_b)) / RATE_HZ
     spline = CubicSpline(times, ref_b, bc_type="clamped")

@@ -1,4 +1,4 @@
-"""The log of a trial: what is kept of every sample, checked as it comes, and what the sensors see."""
+"""Log of a trial: the true state of every sample, checked while the trial runs, and the signals of the sensors."""
 
 from __future__ import annotations
 
@@ -22,19 +22,25 @@ from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 
 @dataclass(frozen=True)
 class SensedLog:
-    """Joint angles and torque readings at the control rate, before zeros, noise and rounding."""
+    """Signals of the joint sensors at the control rate, before zeros, noise and rounding."""
 
     rate_hz: float  # control rate [Hz]; the first row is at t = 0
     ticks: int  # rows per sample of the recording
     phi: Array  # driven angles [rad], shape (T, N, 3)
     theta: Array  # gimbal angles (z, y, x) [rad], shape (T, N, 3)
-    tau: Array  # torque readings, minus design stiffness times deflection, through the sensor's lag [N m], (T, N, 3)
+    tau: Array  # minus design stiffness times deflection, after the sensor's lag [N m], shape (T, N, 3)
 
     def sampled(self, channel: str, delay_s: Array) -> Array:
-        """A channel at the recording's instants, each robot's later by its delay [s], shape (Q, N, 3).
+        """Sample a channel at the recording rate, delayed by ``delay_s`` [s] for each robot.
 
-        Delays, shape (N,), need not be whole ticks: a cubic spline runs through the rows. Before the first and after
-        the last row the end values hold.
+        Delays that are not whole ticks use a cubic spline through the rows. Outside the trial the end values hold.
+
+        Args:
+            channel: ``phi``, ``theta`` or ``tau``.
+            delay_s: delays [s], shape (N,).
+
+        Returns:
+            Samples, shape (Q, N, 3).
         """
         values = getattr(self, channel)
         rows = values[:: self.ticks].copy()
@@ -47,7 +53,7 @@ class SensedLog:
 
 @dataclass(frozen=True)
 class TrialLog:
-    """What truly happened, at ``RATE_HZ``; nothing here has passed a sensor.
+    """True motion and torques of a trial at ``RATE_HZ``; only ``sensed`` holds signals of sensors.
 
     All quantities of one row belong to one instant.
 
@@ -56,19 +62,19 @@ class TrialLog:
         time: [s], shape (Q,).
         phi: driven angles [rad], shape (Q, N, 3).
         theta: gimbal angles (z, y, x) [rad], shape (Q, N, 3).
-        tau: true torque of the springs on the proximal links, positive raising them [N m], shape (Q, N, 3).
+        tau: true torque of the springs on the proximal links, positive if it raises them [N m], shape (Q, N, 3).
         ref_b: commanded wrist positions in {b} [m], shape (Q, N, 3).
         p_W1: origin of {1} in the world [m], shape (Q, 3).
-        R_W1: orientation of {1} (the payload, or robot 1's flange that holds nothing) in the world, shape (Q, 3, 3).
-        feed_forward: the controller's frozen load force in {b} [N], shape (N, 3).
+        R_W1: orientation of {1} in the world, shape (Q, 3, 3); {1} is robot 1's flange if there is no payload.
+        feed_forward: feed-forward force of the controller at the end, in {b} [N], shape (N, 3).
         gains: control gains.
         units: how each robot deviates from the design, N entries.
         sensors: timing faults of the sensors.
-        sensed: what the joint sensors see, at the control rate.
+        sensed: signals of the joint sensors at the control rate.
         rod_error_m: largest distance between a rod's tip and its platform joint [m].
         weld_error_m: largest distance between a flange and its grasp [m].
         weld_error_rad: largest angle between a flange and its grasp [rad].
-        stability: whether the control was stable; None where bases drove or others acted on the arms.
+        stability: least damped mode of the control loop; None if bases drove or other actors took part.
     """
 
     trial: str
@@ -95,23 +101,26 @@ class TrialLog:
         return self.phi.shape[1]
 
     def payload_rotation(self) -> Array:
-        """Rotation vector of the payload from its pose at the first sample, in {1} then [rad], shape (Q, 3)."""
+        """Rotation vector of the payload since the first sample, in the axes of {1} at that sample [rad], (Q, 3)."""
         return (Rotation.from_matrix(self.R_W1[0]).inv() * Rotation.from_matrix(self.R_W1)).as_rotvec()
 
 
+# Largest gap of a rod, and largest gap and angle of a weld, in a valid trial. Chosen.
 ROD_LIMIT_M = 0.02e-3
 WELD_LIMIT_M = 0.01e-3
 WELD_LIMIT_RAD = np.deg2rad(0.001)
 
 
 class Rows:
-    """Q rows of N robots, one per sample of the recording; ``before_step`` and ``after_step`` write them in turn.
+    """Records the state of a trial, one row per sample of the recording.
+
+    For each sample, call ``before_step``, step MuJoCo, then call ``after_step``.
 
     Args:
-        model, data, index: the trial's.
-        samples: Q.
-        slack_m: by how much each grasp may open beyond a weld's softness [m], N entries; empty for none.
-        slack_rad: by how much it may turn [rad], likewise.
+        model, data, index: model, data and addresses of the trial.
+        samples: number of samples Q.
+        slack_m: allowed gap of each grasp beyond the tolerance of a weld [m], N entries; empty for none.
+        slack_rad: allowed angle of each grasp beyond the tolerance of a weld [rad], N entries; empty for none.
     """
 
     def __init__(
@@ -128,7 +137,7 @@ class Rows:
         )
         self.sites = np.concatenate([index.grasp_site, index.payload_site, *(end.ravel() for end in ends)])
         self.welded = self.sites[: 2 * robots]
-        # Views of MuJoCo's memory, which stays where it is: to ask for them takes as long as to copy them.
+        # Keep views of MuJoCo's arrays: attribute access takes as long as copying the data.
         self._state, self._spring = data.qpos, data.qfrc_spring
         self._xpos, self._xmat = data.site_xpos, data.site_xmat
         self.qpos = np.empty((samples, model.nq))
@@ -137,13 +146,13 @@ class Rows:
         self.site_xmat = np.empty((samples, 2 * robots, 9))
 
     def before_step(self, sample: int) -> None:
-        """Keep the state that a step starts from."""
+        """Record the state before a step."""
         self.qpos[sample] = self._state
 
     def after_step(self, sample: int) -> None:
-        """Keep the forces and frames that the step evaluated at that state."""
+        """Record the forces and frames that the step has evaluated at the state before it."""
         self.spring_force[sample] = self._spring
-        # "clip" changes no index, and lets numpy write where it shall.
+        # All indices are valid; mode "clip" lets numpy write to the output without a buffer.
         self._xpos.take(self.sites, 0, self.site_xpos[sample], "clip")
         self._xmat.take(self.welded, 0, self.site_xmat[sample], "clip")
 
@@ -161,20 +170,20 @@ class Rows:
         return self.spring_force[rows][:, self.index.spring_dof]
 
     def errors(self, rows: slice) -> tuple[Array, Array, Array]:
-        """Opening of rods (rows, 3 N) and welds (rows, N) [m], and angle of welds (rows, N) [rad]."""
+        """Gaps of rods (rows, 3 N) and welds (rows, N) [m], and angles of welds (rows, N) [rad]."""
         n = self.index.robots
         xpos, xmat = self.site_xpos[rows], self.site_xmat[rows].reshape(-1, 2 * n, 3, 3)
         rod = np.linalg.norm(xpos[:, 2 * n : 5 * n] - xpos[:, 5 * n :], axis=-1)
         weld = np.linalg.norm(xpos[:, :n] - xpos[:, n : 2 * n], axis=-1)
-        # |R1 - R2|_F = 2 sqrt(2) sin(angle / 2): exact for the tiny angles here, where arccos is not.
+        # |R1 - R2|_F = 2 sqrt(2) sin(angle / 2) is accurate for small angles, where arccos is not.
         angle = np.linalg.norm(xmat[:, :n] - xmat[:, n:], axis=(-2, -1)) / np.sqrt(2.0)
         return rod, weld, angle
 
     def check(self, start: int, stop: int, design: OmnidDesign) -> None:
-        """Check the rows since the last check.
+        """Check the rows from ``start`` to ``stop``.
 
         Raises:
-            TrialError: the physics cannot be trusted.
+            TrialError: MuJoCo warned, a value is not finite, a joint or torque is out of range, or a loop opened.
         """
         rows = slice(start, stop)
         when = np.arange(start, stop) / RATE_HZ
@@ -202,7 +211,7 @@ class Rows:
         sensed: SensedLog,
         stability: Stability | None,
     ) -> TrialLog:
-        """The log of the whole trial."""
+        """Make the log of the whole trial from all rows."""
         rows = slice(None)
         rod, weld, angle = self.errors(rows)
         return TrialLog(
@@ -227,7 +236,10 @@ class Rows:
 
 
 def _limit(name: str, values: Array, low: float, high: float, unit: str, when: Array, robot: int = 0) -> None:
-    """Raise for the first value, shape (rows, N, k), outside [low, high]; the values' robots count from ``robot``."""
+    """Raise ``TrialError`` for the first value outside [low, high]; values have shape (rows, N, k).
+
+    The first robot of the values has the index ``robot``, counted from 0.
+    """
     bad = ~((values >= low) & (values <= high))
     if bad.any():
         row, i, k = (int(axis[0]) for axis in np.nonzero(bad))

@@ -1,4 +1,4 @@
-"""Ground truth of a scene's payload, read back from the compiled MuJoCo model, and its sidecar file."""
+"""Ground truth of payload and robots, read from the compiled MuJoCo model, and its sidecar file."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from mocobot_sim.scene.team_index import TeamIndex
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """The payload, and the robots, as MuJoCo simulates them.
+    """Payload and robots as simulated.
+
+    Without payload N is 0, and all numbers of the payload are zero.
 
     Attributes:
         R_1i: grasp orientations in {1}, shape (N, 3, 3).
         p_1i: grasp positions in {1} [m], shape (N, 3).
-        mass_kg: mass.
+        mass_kg: mass [kg].
         p_1c: centre of mass in {1} [m], shape (3,).
-        R_1c: principal axes in {1}, moments ascending, shape (3, 3).
-        principal_kgm2: principal moments of inertia, ascending, shape (3,).
-        units: how each robot deviates from the design, N entries.
-        effects: what else was hidden in the team.
-        control: whether the control of the trial was stable, if that is known.
-
-    Robots that hold nothing have no grasps (N = 0 above), and all of the payload is zero.
+        R_1c: principal axes in {1} as columns, in the order of the moments, shape (3, 3).
+        principal_kgm2: principal moments of inertia in ascending order [kg m^2], shape (3,).
+        units: how each robot deviates from the design, one entry per robot.
+        effects: effects that were added to the team.
+        control: least damped mode of the trial's control loop; None if unknown.
     """
 
     R_1i: Array
@@ -77,9 +77,9 @@ class GroundTruth:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able form, units in the keys; orientations as rotation vectors in degrees.
+        """Convert to JSON values; keys give the units, orientations are rotation vectors in degrees.
 
-        Robots that hold nothing have ``as_built``, ``effects`` and ``control`` only.
+        Without payload there are only the keys ``as_built``, ``effects`` and ``control``.
         """
         payload = {
             "grasps": [
@@ -99,10 +99,10 @@ class GroundTruth:
 
 
 def write_truth(truth: GroundTruth, recording: Path) -> None:
-    """Write the sidecar beside a recording; the estimator never reads it.
+    """Write the ground truth to the sidecar file of a recording; the estimator never reads it.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     write_json(truth_path(recording), truth.to_dict())
 
