@@ -160,9 +160,7 @@ def check_diagnose(options: opt.Diagnose) -> None:
     _check_file(options, options.json)
     _check_logs(logs, options.model)
     for path in filter(Path.exists, map(truth_path, options.rec)) if options.model is None else ():
-        read_json(
-            path, TRUTH
-        )  # only checks that the file is readable; nothing uses its content before the verdict
+        read_json(path, TRUTH)  # checks only that the file is readable
 
 
 def check_compare(options: opt.Compare) -> None:
@@ -286,10 +284,7 @@ def _check_logs(logs: Sequence[Path], *beside: Path | None) -> None:
     """Check that logs and further files exist, and that the logs have a known format."""
     _check_there([*logs, *(path for path in beside if path is not None)])
     for path in logs:
-        if path.is_file() and path.suffix.lower() not in (
-            ".json",
-            ".parquet",
-        ):  # their readers report more detail
+        if path.is_file() and path.suffix.lower() not in (".json", ".parquet"):  # their readers check
             log_kind(path)
 
 

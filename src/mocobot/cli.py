@@ -129,9 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(arguments: Sequence[str]) -> None:
-    if isinstance(
-        sys.stdout, io.TextIOWrapper
-    ):  # file names may contain characters that the terminal cannot encode
+    if isinstance(sys.stdout, io.TextIOWrapper):  # the terminal may not encode all names
         sys.stdout.reconfigure(errors="backslashreplace")
     name = next((word for word in arguments if word in COMMANDS), None)
     if "--version" in arguments:

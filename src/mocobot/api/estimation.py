@@ -97,8 +97,6 @@ def read_estimate(path: Path | str) -> Estimate:
     Raises:
         InputError: the file cannot be read or is not a complete estimate.
     """
-    from mocobot_view.payload import (
-        read_estimate as read,
-    )  # imports MuJoCo, which the estimate itself does not need
+    from mocobot_view.payload import read_estimate as read  # imports MuJoCo
 
     return public(Estimate, read(Path(path)))

@@ -117,9 +117,7 @@ def recordings_of(
             with suppress(RepeatedRowsError):
                 recording = None if is_log else read(path)
             if recording is None:
-                from mocobot_sim.scene.models import (
-                    omnid_design,
-                )  # imports MuJoCo, which recordings do not need
+                from mocobot_sim.scene.models import omnid_design  # imports MuJoCo
 
                 needed = True
                 source = open_log(path, log_map if is_log else None)
