@@ -73,7 +73,7 @@ def ellipsoid(semi_axes: ArrayLike) -> Triangles:
 
 
 def capsule(radius: float, half_length: float) -> Triangles:
-    """Make a capsule: a cylinder along z of length 2 ``half_length`` with half spheres of ``radius`` at its ends [m]."""
+    """Make a capsule along z: a cylinder of length 2 ``half_length`` [m] with half spheres of ``radius`` [m]."""
     low, low_normal = _arc(radius, -np.pi / 2, 0.0, ALONG)
     high, high_normal = _arc(radius, 0.0, np.pi / 2, ALONG)
     shift = np.array([0.0, half_length])
