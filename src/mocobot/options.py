@@ -334,15 +334,15 @@ class CampaignOptions(Options):
     """Options of a campaign: what it consists of and where it runs."""
 
     payload: str = "a"
-    """Payload configuration, or the path of a payload MJCF."""
+    """Payload configuration, or path of a payload MJCF."""
     trials: Annotated[str, tyro.conf.arg(metavar="KIND,KIND,...")] = "random,random,periodic,static"
-    """Trials of every set."""
+    """Kinds of the trials of every set."""
     vias: int | None = None
     """Number of vias of a random trial; default: 80."""
     duration_s: float | None = None
     """Length of a periodic motion [s]; default: 60."""
     preset: str = "nominal"
-    """Sensors: ideal or nominal."""
+    """Sensor preset: ideal or nominal."""
     background: tuple[Literal["calibrated", "uncalibrated"], ...] = ("calibrated", "uncalibrated")
     """Robots as designed, or with drawn calibration errors; both also deviate within the tolerances."""
     units: Annotated[AnyPath | None, tyro.conf.arg(metavar="TEAM.json")] = None
@@ -398,7 +398,7 @@ class CampaignOptions(Options):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kind of every trial."""
+        """List the kind of every trial."""
         return kinds_of(self.trials, ("random", "periodic", "static"))
 
 
@@ -430,7 +430,7 @@ class ConvertOptions(Options):
     clock: Literal["keep", "correct"] = "keep"
     """Keep the robots' time stamps, or correct the offsets between their clocks; both report the offsets."""
     rate_hz: Annotated[float, tyro.conf.arg(metavar="HZ")] = 100.0
-    """Rate of the recording [Hz]."""
+    """Sample rate of the recording [Hz]."""
     max_gap_s: Annotated[float, tyro.conf.arg(metavar="S")] = 0.08
     """Longest gap between samples to fill [s]."""
     crop: Annotated[str | None, tyro.conf.arg(metavar="FROM:TO")] = None
@@ -447,7 +447,7 @@ class ConvertOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class Convert(Files, ConvertOptions):
-    """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
+    """Convert a log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these formats."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
     """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz, .mat or .parquet file, or a LeRobot dataset."""
@@ -632,7 +632,7 @@ class Simulate(SimulateOptions):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kind of every trial."""
+        """List the kind of every trial."""
         return (self.trajectory,) if self.trials is None else kinds_of(self.trials, get_args(TrialKind))
 
 

@@ -1,4 +1,4 @@
-"""Pictures of campaigns and of comparisons."""
+"""Draw pictures of campaigns and comparisons."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path

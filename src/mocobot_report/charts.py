@@ -41,8 +41,8 @@ class Chart:
     layout: Mapping[str, Any]  # properties of plotly's layout
     height: int  # [px]
     keys: Sequence[Key] = ()
-    note: str = ""  # below the title
-    narrow: Mapping[str, float] = field(default_factory=dict)  # on phones, by dotted path in the layout
+    note: str = ""  # text below the title
+    narrow: Mapping[str, float] = field(default_factory=dict)  # for phones, by dotted path in the layout
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON for the page's script; arrays that several traces share as ``x`` are stored in ``arrays``."""
@@ -184,12 +184,12 @@ class Line:
     key: Key
     time: Array  # shape (n,); NaN interrupts the line
     values: Array  # shape (n,)
-    points: bool = False  # markers in place of a line
+    points: bool = False  # draw markers instead of a line
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One of several plots above each other."""
+    """One of several stacked plots."""
 
     title: str  # title of the vertical axis
     unit: str

@@ -138,7 +138,7 @@ def _title(values: Values, *, robot: bool) -> str:
 
 
 def _verdict_kind(values: Values) -> str:
-    """Return the colour of the verdict; a good verdict turns to a warning if something remains unexplained."""
+    """Return the colour of the verdict: warn instead of good if something remains or the search did not finish."""
     kind = KINDS[values["verdict"]]
     doubt = values["remains"] or not values.get("finished", True)
     return "warn" if doubt and kind == "good" else kind
@@ -209,7 +209,7 @@ def _causes(causes: Sequence[Values]) -> dict[str, Any]:
     sizes: Rows = []
     support: Rows = []
     for cause in causes:
-        # A zero without standard error belongs to a form of the law that this cause does not have.
+        # A zero without standard error belongs to a variant of the cause that does not apply.
         there = [number for number in numbers_of(cause) if number[2]["value"] or number[2]["se"] is not None]
         for k, (name, at, entry) in enumerate(there):
             words, unit = _parameter(cause, name)

@@ -26,7 +26,7 @@ MARGIN = 0.04
 NEAREST = 0.1
 """Smallest distance of the camera from the nearest point, relative to the spread of the points. Chosen."""
 TURNS = (0.0, *(sign * turn for turn in range(15, 180, 15) for sign in (-1, 1)), 180.0)
-"""Azimuth offsets that ``clearest`` tries [deg], in order of preference."""
+"""Azimuth offsets that ``clearest`` compares [deg]; the first of equally good ones wins."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -213,7 +213,7 @@ def with_labels(
         labels: texts to write, K entries.
         at: column and row of the middle of each text [px], NaN if behind the camera; shape (K, 2).
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # an extra
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # an optional dependency
     from matplotlib.figure import Figure
     from matplotlib.patheffects import withStroke
 

@@ -53,11 +53,11 @@ class Calibration(Folder, Below):
     result = "calibration"
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_calibration(self)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         held = ", ".join(f"{payload.parameters[0]:.4g} kg" for payload in self.payloads)
         return f"<Calibration of {self.robots} robots from {len(self.trials)} recordings: {held}>"
 

@@ -90,12 +90,12 @@ class Comparison(Folder):
         return "; ".join(f"{group.name} ({_clearest(group)})" for group in self.changed_groups)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         groups = f"{len(self.changed_groups)} of {len(self.groups)} groups changed"
         return f"<Comparison of two results, {self.kind}: {groups}>"
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         plural = "diagnoses" if self.kind == "diagnosis" else f"{self.kind}s"
         lines = [f"Two {plural}: A is {self.a}", f"{'':{len(plural) + 6}}B is {self.b}", ""]
         lines += _fill(self.verdict)

@@ -45,7 +45,7 @@ class Group:
         entries: name of each number, "" for a single one.
         a, b: values in both results, shape (K,).
         a_covariance, b_covariance: error covariances of the values, shape (K, K).
-        covariance: error covariance of the difference b - a, without errors that both share, shape (K, K).
+        covariance: error covariance of the difference b - a, in which common errors cancel, shape (K, K).
     """
 
     name: str
@@ -100,7 +100,7 @@ class Group:
 
     @property
     def difference(self) -> Array:
-        """b - a, shape (K,)."""
+        """Difference b - a, shape (K,)."""
         return self.b - self.a
 
     @property
@@ -335,7 +335,7 @@ def _pairs(a: Calibration, b: Calibration) -> Iterator[tuple[CalibratedPayload, 
 
 
 def _deviations(a: Calibration, b: Calibration, robot: int, kind: str) -> Group | None:
-    """Group one robot's deviations of one kind in the units of reports; None if not both calibrations have errors."""
+    """Group one robot's deviations of one kind in the units of reports; None if no entry has errors in both."""
     at = AT[kind]
     known = (a.sd[robot, at] > 0) & (b.sd[robot, at] > 0)
     if not known.any():

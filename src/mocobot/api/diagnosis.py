@@ -92,16 +92,16 @@ class Diagnosis(Folder):
 
     @property
     def verdict(self) -> Word:
-        """``"consistent"``, ``"miscalibrated"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
+        """One of "consistent", "miscalibrated", "explained", "partly_explained" and "unexplained"."""
         return self.to_dict()["verdict"]
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """The named causes, in the order of discovery."""
+        """Named causes in the order of discovery."""
         return tuple(_cause(entry) for entry in self.to_dict()["causes"])
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         values = self.to_dict()
         named = ", ".join(map(name_of, values["causes"])) or "nothing named"
         return f"<Diagnosis of {len(values['recordings'])} trials: {self.verdict}; {named}>"

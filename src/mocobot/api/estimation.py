@@ -1,4 +1,4 @@
-"""Estimate a payload."""
+"""Estimate a payload from recordings."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -26,11 +26,11 @@ class Estimate(PayloadEstimate):
     """
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_estimate(self)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         mass = "mass not determined" if self.mass is None else f"{self.mass.mass:.4g} kg"
         return f"<Estimate from {len(self.recordings)} recordings: {mass}, {self.method}>"
 

@@ -46,11 +46,11 @@ class Look:
         return not self.ready_for.startswith("ready for: nothing")
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_inspection(self)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         return f"<{type(self).__name__} of {self.name}: {self.ready_for}>"
 
     def to_dict(self) -> dict[str, Any]:

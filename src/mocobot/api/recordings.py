@@ -169,11 +169,11 @@ def check_no_log(path: Path) -> None:
             return
     except InputError:
         if path.is_dir() or path.suffix in (".parquet", ".json"):
-            return  # not a log at all, or a damaged recording
+            return  # no log, or a damaged recording
         raise InputError(
             f"{path}: is not a recording of mocobot, and mocobot convert does not read its format; make it {FORMATS}"
         ) from None
-    name = Path(os.path.realpath(path)).name or "log"  # "." and "/" have none
+    name = Path(os.path.realpath(path)).name or "log"  # "." and "/" have no name
     target = path.parent / f"{name if path.is_dir() else path.stem}.parquet"
     if target == path:
         target = path.parent / f"{path.stem}_recording.parquet"

@@ -68,7 +68,7 @@ class Watched(Folder):
         return "\n".join(self.lines)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         return f"<Watched of {len(self.recordings)} recordings: {'' if self.good else 'not '}good>"
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:

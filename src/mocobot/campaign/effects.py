@@ -170,7 +170,7 @@ def gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
     """Return the axes of gimbal joints 1, 2, 3 (z, y, x) at home in {1}, one per row and robot, shape (N, 3, 3)."""
     out = []
     for theta, X in zip(team.theta_home, team.X_1i, strict=True):
-        flange = X.rotation * Rotation.from_euler("ZYX", theta).inv()  # {b} turned into {1}
+        flange = X.rotation * Rotation.from_euler("ZYX", theta).inv()  # rotation from {b} to {1}
         after_z = flange * Rotation.from_euler("Z", theta[0])
         after_y = after_z * Rotation.from_euler("Y", theta[1])
         axes = [flange.apply([0, 0, 1]), after_z.apply([0, 1, 0]), after_y.apply([1, 0, 0])]

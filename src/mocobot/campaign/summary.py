@@ -42,14 +42,14 @@ BINS = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 0.99), (0.99, 1.0 + 1e-12))
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
-    """Exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
+    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
     low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
     high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
     return float(low), float(high)
 
 
 def share(hits: int, of: int) -> dict[str, Any]:
-    """Counts and interval of a share, as plain values: {hits, of, interval}."""
+    """Return counts and interval of a share as plain values: {hits, of, interval}."""
     return {"hits": hits, "of": of, "interval": list(interval(hits, of))}
 
 
