@@ -210,7 +210,7 @@ class CalibrateOptions(Options):
 
     map: LogMap = None
     prior: Annotated[AnyPath | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
-    """Prior standard deviations of the robots' deviations (docs/calibration.md); default: uncalibrated robots."""
+    """Prior standard deviations of the robots' deviations (docs/calibration.md); uncalibrated robots if omitted."""
     payload_of: Annotated[AnyWords, tyro.conf.arg(metavar="REC=LABEL...")] = ()
     """Payload label of a recording, if the recording does not state it."""
     known_mass: Annotated[AnyWords, tyro.conf.arg(metavar="[LABEL=]KG[+-SE]...")] = ()
@@ -338,9 +338,9 @@ class CampaignOptions(Options):
     trials: Annotated[str, tyro.conf.arg(metavar="KIND,KIND,...")] = "random,random,periodic,static"
     """Kinds of the trials of every set."""
     vias: int | None = None
-    """Number of vias of a random trial; default: 80."""
+    """Number of vias of a random trial; 80 if omitted."""
     duration_s: float | None = None
-    """Length of a periodic motion [s]; default: 60."""
+    """Length of a periodic motion [s]; 60 if omitted."""
     preset: str = "nominal"
     """Sensor preset: ideal or nominal."""
     background: tuple[Literal["calibrated", "uncalibrated"], ...] = ("calibrated", "uncalibrated")
@@ -420,13 +420,13 @@ class ConvertOptions(Options):
 
     map: LogMap = None
     trial: TrialKind | None = None
-    """Kind of trial; default: that of the log or the map, else "random". "free": the robots hold nothing."""
+    """Kind of trial; if omitted, that of the log or the map, else "random". "free": the robots hold nothing."""
     payload: str | None = None
     """Label of the payload."""
     design: Annotated[AnyPath | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Design parameters of the robots; default: those of the log, else of the Omnid."""
+    """Design parameters of the robots; if omitted, those of the log, else of the Omnid."""
     level: Literal["joint", "wrist"] | None = None
-    """Signals to write: driven angles and torques, or wrist positions and forces; default: those of the log."""
+    """Signals to write: driven angles and torques, or wrist positions and forces; if omitted, those of the log."""
     clock: Literal["keep", "correct"] = "keep"
     """Keep the robots' time stamps, or correct the offsets between their clocks; both report the offsets."""
     rate_hz: Annotated[float, tyro.conf.arg(metavar="HZ")] = 100.0
@@ -482,7 +482,7 @@ class InspectOptions(Options):
 
     map: LogMap = None
     design: Annotated[AnyPath | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Design parameters of the robots, used if the log has none; default: those of the Omnid."""
+    """Design parameters of the robots, used if the log has none; if omitted, those of the Omnid."""
     calibration: Calibrated = None
     episode: Episode = None
 
@@ -541,7 +541,7 @@ class Report(Files):
     dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
     """Folder that one of these commands wrote with --out; for estimates, the folder that holds their files."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
-    """Page to write; default: DIR/report.html."""
+    """Page to write; DIR/report.html if omitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -565,7 +565,7 @@ class Effects:
     """List the physical effects that `simulate --effect` can hide in a team: parameters, units and ranges."""
 
     name: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME...")] = ()
-    """Effects to list; default: all."""
+    """Effects to list; all if omitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -581,9 +581,9 @@ class SimulateOptions(Options):
     model: Annotated[AnyPath | None, tyro.conf.arg(metavar="DIR")] = None
     """Extended model to simulate instead of a payload on robots as designed."""
     vias: int | None = None
-    """Number of vias of a random trial, or of the fast part of a free trial; default: 80."""
+    """Number of vias of a random trial, or of the fast part of a free trial; 80 if omitted."""
     duration_s: float | None = None
-    """Length of a periodic motion [s]; default: 60."""
+    """Length of a periodic motion [s]; 60 if omitted."""
     preset: AnyName = "nominal"
     """Sensor preset: ideal, nominal or uncalibrated."""
     seed: int = 0
@@ -591,7 +591,7 @@ class SimulateOptions(Options):
     level: Literal["joint", "wrist"] = "joint"
     """Signals in the file: driven angles and spring torques, or wrist positions and forces."""
     robots: int | None = None
-    """Number of robots of a free trial; default: the number of grasps of the payload."""
+    """Number of robots of a free trial; if omitted, the number of grasps of the payload."""
 
     def check(self) -> None:
         """Raise InputError if options exclude each other or an effect does not exist."""
@@ -626,8 +626,8 @@ class Simulate(SimulateOptions):
     trajectory: TrialKind = "random"
     """Kind of motion; free: every arm moves alone and holds nothing."""
     payload: str | None = None
-    """Payload configuration, or path of a payload MJCF (body 'payload', sites grasp1 .. graspN); default: 'a', unless
-    a model is given."""
+    """Payload configuration, or path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if omitted,
+    unless a model is given."""
     force: Force = False
 
     @property
@@ -642,14 +642,14 @@ class ReplayOptions(Options):
 
     map: LogMap = None
     estimate: Annotated[AnyPath | None, tyro.conf.arg(metavar="EST.json")] = None
-    """Estimate to show, written by `mocobot estimate --out`; default: an estimate from each recording."""
+    """Estimate to show, written by `mocobot estimate --out`; if omitted, an estimate is made from each recording."""
     calibration: Calibrated = None
     truth: AnyFlag = False
     """Also show the truth that is stored beside each recording (REC.truth.json)."""
     diagnosis: Annotated[AnyPath | None, tyro.conf.arg(metavar="DIR")] = None
     """Mark the causes of a diagnosis, written by `mocobot diagnose --out`."""
     payload: Annotated[AnyName | None, tyro.conf.arg(metavar="NAME|FILE.xml")] = None
-    """Geometry of the payload; default: that of the recording's label, or bars between the grasps."""
+    """Geometry of the payload; if omitted, that of the recording's label, or bars between the grasps."""
     web: bool = False
     """Serve the replay to a browser instead of opening the viewer."""
 
