@@ -1,9 +1,9 @@
-"""A real six-axis arm tells what its maker's model lacks: a published run of a Staubli TX40, from log to verdict.
+"""Diagnose the manufacturer's model of a real six-axis arm, from a published log of a Staubli TX40.
 
     python scenarios/any_robot.py [FOLDER]
 
-FOLDER holds excitation.parquet (models/tx40/README.md says where it is from); without it, MOCOBOT_TX40_DATA or
-data/tx40 is used. The same five lines do for any robot in MJCF or URDF and any log of its joints.
+FOLDER holds excitation.parquet (models/tx40/README.md states its source); the default is the variable MOCOBOT_TX40_DATA
+or data/tx40. The same calls work for any robot in MJCF or URDF and any log of its joints.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FOLDER = ROOT / "data" / "tx40"
 
 
 def main() -> None:
-    """Read the model, look at the log, and find out what the model gets wrong."""
+    """Inspect the log, and diagnose what the model gets wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("MOCOBOT_TX40_DATA", FOLDER), help="of excitation.parquet"

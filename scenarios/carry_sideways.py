@@ -1,6 +1,6 @@
-"""Three Omnids carry payload (a) sideways by 0.5 m and yaw it by 20 deg by driving, their arms soft.
+"""Three Omnids drive payload (a) sideways by 0.5 m and yaw it by 20 deg, with compliant arms.
 
-Every base follows its own place under the moving payload; the arms only hold.
+Every base follows its planned place under the moving payload; the arms only hold.
 
 python scenarios/carry_sideways.py [--payload a] [--out FOLDER]
 """
@@ -36,7 +36,7 @@ BEGIN_S, SIDE_S, TURN_S, REST_S = 1.5, 4.0, 4.0, 1.0
 
 
 def main() -> None:
-    """Carry, and compare what was commanded with what happened."""
+    """Run the trial with the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--payload", default="a", help="name of a shipped payload, or a payload MJCF")
     parser.add_argument(
@@ -50,12 +50,12 @@ def main() -> None:
 
 
 def carry(payload: str, out: Path) -> None:
-    """Run the trial, print what happened, and draw it."""
+    """Run the trial, print the errors, and draw the motion."""
     make_folder(out)
     scene = build_team(payload, released=True)
     middle = scene.X_1i.translation[:, :2].mean(
         axis=0
-    )  # the point that moves straight and that the payload turns about
+    )  # reference point: it moves straight, and the payload rotates about it
     aside = (middle[0], middle[1] + SIDEWAYS_M)
     motion = plan(
         (*middle, 0.0),
@@ -91,14 +91,14 @@ def carry(payload: str, out: Path) -> None:
 
 
 def reference(scene: TeamScene, log: TrialLog) -> np.ndarray:
-    """Where the payload's reference point truly is, and the payload's yaw, shape (Q, 3)."""
+    """Return the true position of the payload's reference point [m] and the payload's yaw [rad], shape (Q, 3)."""
     middle = scene.X_1i.translation[:, :2].mean(axis=0)
     frame = np.column_stack([log.p_W1[:, :2], np.unwrap(yaw_of(log.R_W1))])
     return compose(frame, relative(frame[0], [*middle, 0.0]))
 
 
 def report(motion: PlanarMotion, log: TrialLog, bases: DriveLog, led: np.ndarray) -> None:
-    """Print the errors at the ends of both legs and the largest on the way."""
+    """Print the errors at the ends of both legs, and the largest errors in between."""
     planned = motion.pose[:: round(motion.rate_hz / RATE_HZ), 0]
     off, base_off, belief = led - planned, bases.true - bases.planned, bases.true - bases.odometry
     print("true - planned          payload: x, y [mm], yaw [deg]      worst base [mm], [deg]")
@@ -133,9 +133,9 @@ def report(motion: PlanarMotion, log: TrialLog, bases: DriveLog, led: np.ndarray
 
 
 def plot(motion: PlanarMotion, log: TrialLog, bases: DriveLog, led: np.ndarray, path: Path) -> None:
-    """Commanded against achieved motion, of the payload and of the bases."""
+    """Plot commanded and achieved motion of payload and bases."""
     planned = motion.pose[:: round(motion.rate_hz / RATE_HZ), 0]
-    figure = Figure(figsize=(12, 7.0), layout="constrained")  # without pyplot: no display, no global state
+    figure = Figure(figsize=(12, 7.0), layout="constrained")  # without pyplot, no display is needed
     axes = figure.subplots(2, 3)
     grey, colours = "#6b7280", ("#2f6fd0", "#e07b39", "#2a9d8f")
     top = axes[0]

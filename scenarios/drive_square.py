@@ -1,4 +1,4 @@
-"""One Omnid drives a square and turns in place on its mecanum wheels: what was commanded, what it did, what slipped.
+"""One Omnid drives a square and turns in place on mecanum wheels: compare commanded and actual motion and wheel slip.
 
 python scenarios/drive_square.py [--pace SECONDS] [--out FOLDER]
 """
@@ -31,12 +31,16 @@ from mocobot.pictures import Camera, Marks, make_folder, render
 from mocobot.trajectories import RATE_HZ
 
 SIDE_M = 0.8
-HURRY_S = 0.9  # a side: asks for 5.7 m/s^2, and the rollers' grip ends at 4.9
+HURRY_S = 0.9  # per side: requires 5.7 m/s^2, but the rollers slip above 4.9
 SIDES = ("forward", "left", "backward", "right")
 
 
 def square(side_s: float) -> tuple[PlanarMotion, np.ndarray]:
-    """Four sides without turning, then one turn in place, twice as long; and when the legs begin and end [s]."""
+    """Plan four sides without rotation and a turn in place that takes twice as long.
+
+    Returns:
+        The motion, and the times at which the legs begin and end [s], shape (6,).
+    """
     corners = [(SIDE_M, 0.0), (SIDE_M, SIDE_M), (0.0, SIDE_M), (0.0, 0.0)]
     legs = [Leg((x, y, 0.0), side_s, rest_s=0.5) for x, y in corners]
     legs.append(Leg((0.0, 0.0, 2.0 * np.pi), 2.0 * side_s, rest_s=0.5))
@@ -45,7 +49,7 @@ def square(side_s: float) -> tuple[PlanarMotion, np.ndarray]:
 
 
 def main() -> None:
-    """Drive with the textbook's kinematics, with those of twelve rollers, and in too much of a hurry."""
+    """Compare textbook kinematics, kinematics with rollers, and a motion that is too fast."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out/drive_square"), help="folder for the pictures")
     parser.add_argument(
@@ -59,11 +63,11 @@ def main() -> None:
 
 
 def compare(pace_s: float, out: Path) -> None:
-    """Drive three times, print what happened, and draw it."""
+    """Drive three times, print the errors, and draw the motion."""
     calm, hasty = square(pace_s), square(HURRY_S)
     make_folder(out)
     design, model = base_design(), compile_solo(build_solo())
-    turning = 0.5 * (calm[1][4] + calm[1][5]) - 0.25  # amid the turn
+    turning = 0.5 * (calm[1][4] + calm[1][5]) - 0.25  # middle of the turn
     snapshots = Snapshots([turning])
     runs = {
         "textbook kinematics": (MecanumKinematics.textbook(design), calm, None),
@@ -93,7 +97,7 @@ def compare(pace_s: float, out: Path) -> None:
 
 
 def table(log: DriveLog, ends: np.ndarray) -> str:
-    """Where each leg should have ended, did end, and would have by odometry."""
+    """Tabulate, for each leg, the errors of its end point and of odometry, the slip and the wheel load."""
     lines = [
         "leg          true - planned             odometry - true            slip rms   largest  least load"
     ]
@@ -113,8 +117,8 @@ def _pose(error: np.ndarray) -> str:
 
 
 def plot(textbook: DriveLog, rollers: DriveLog, path: Path) -> None:
-    """Paths, what the wheels did, and how far each kinematics is off."""
-    figure = Figure(figsize=(12, 7.5), layout="constrained")  # without pyplot: no display, no global state
+    """Plot paths, wheel speeds, slip and load, and the odometry error of both kinematics."""
+    figure = Figure(figsize=(12, 7.5), layout="constrained")  # without pyplot, no display is needed
     axes = figure.subplot_mosaic([["path", "x", "yaw"], ["speed", "slip", "load"]])
     grey, blue, orange = "#6b7280", "#2f6fd0", "#e07b39"
     axis = axes["path"]

@@ -1,9 +1,9 @@
-"""A real machine with one slide tells what its model lacks: the EMPS benchmark's axis, from MATLAB file to verdict.
+"""Diagnose a real machine with one linear axis, the EMPS benchmark, from its MATLAB file.
 
     python scenarios/emps.py [FOLDER]
 
-FOLDER holds DATA_EMPS.mat of nonlinearbenchmark.org; without it, MOCOBOT_EMPS_DATA or data/emps is used. Where the file
-is not, an axis with the published mass and friction is simulated in its place.
+FOLDER holds DATA_EMPS.mat from nonlinearbenchmark.org; the default is the variable MOCOBOT_EMPS_DATA or data/emps. If
+the file is missing, the script simulates an axis with the published mass and friction instead.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import mocobot
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER, NAME = ROOT / "data" / "emps", "DATA_EMPS.mat"
 MASS_KG, COULOMB_N, VISCOUS_NS_PER_M, OFFSET_N = 95.1, 20.4, 203.5, -3.2
-"""Published for the benchmark: force = mass acceleration + viscous speed + Coulomb sign(speed) + offset."""
+"""Published parameters: force = mass * acceleration + viscous * speed + Coulomb * sign(speed) + offset."""
 GAIN_N_PER_V, KP_PER_S, KV_VS_PER_M, LIMIT_V = 35.15065188248547, 160.18, 243.45, 10.0
 PERIOD_S, STEPS, ENCODER_M = 1e-3, 10, 5e-8
 
 
 def reference(cycles: int = 4) -> np.ndarray:
-    """Out and back at three speeds, over and over [m], one number every millisecond."""
+    """Return the reference position [m], sampled every millisecond: repeated strokes at three speeds."""
     knots = np.array([0.0, 0.1, 0.8, 0.9, 1.5, 1.6, 2.2, 2.5])
     speed = np.array([0.0, 0.04, 0.04, 0.09, 0.09, 0.14, 0.14, 0.0])
     out = np.interp(np.arange(0.0, knots[-1], PERIOD_S), knots, speed)
@@ -35,7 +35,7 @@ def reference(cycles: int = 4) -> np.ndarray:
 
 
 def simulate(path: Path) -> None:
-    """Write a recording of the axis under its digital loop, with the variables of the benchmark's files."""
+    """Simulate the axis under its digital controller; write a file with the variables of the benchmark."""
     rng, q_ref = np.random.default_rng(0), reference()
     q, dq, step = 0.0, 0.0, PERIOD_S / STEPS
     measured, voltage = np.empty(len(q_ref)), np.empty(len(q_ref))
@@ -46,7 +46,7 @@ def simulate(path: Path) -> None:
         rest = GAIN_N_PER_V * voltage[k] - OFFSET_N + 0.5 * rng.standard_normal()
         for _ in range(STEPS):
             free = dq + step * (rest - VISCOUS_NS_PER_M * dq) / MASS_KG
-            # Dry friction takes speed away, at most all of it.
+            # Dry friction reduces the speed, but cannot reverse it.
             dq = np.sign(free) * max(abs(free) - step * COULOMB_N / MASS_KG, 0.0)
             q += step * dq
     voltage += 3e-3 * rng.standard_normal(len(voltage))
@@ -57,7 +57,7 @@ def simulate(path: Path) -> None:
 
 
 def main() -> None:
-    """Read the model, look at the log, and find out what the model gets wrong."""
+    """Inspect the log, and diagnose what the model gets wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("MOCOBOT_EMPS_DATA", FOLDER), help=f"of {NAME}"

@@ -1,4 +1,4 @@
-"""Five Omnids under a ring of your own: any payload MJCF with a body 'payload' and sites grasp1 .. graspN will do.
+"""Estimate a custom payload that five Omnids carry: any MJCF with a body 'payload' and sites grasp1 .. graspN works.
 
 python scenarios/five_robots.py
 """
@@ -16,7 +16,7 @@ ROBOTS, RADIUS_M, MASS_KG = 5, 0.9, 20.0
 
 
 def ring_mjcf() -> str:
-    """A thin ring, its grasps evenly spaced around it, {1} at the first grasp."""
+    """Return the MJCF of a thin ring with evenly spaced grasps and {1} at the first grasp."""
     angles = 2.0 * np.pi * np.arange(ROBOTS) / ROBOTS
     grasps = [RADIUS_M * np.array([np.cos(a) - 1.0, np.sin(a)]) for a in angles]
     sites = "\n".join(
@@ -43,7 +43,7 @@ def ring_mjcf() -> str:
 
 
 def main() -> None:
-    """Estimate a ring that five robots carry."""
+    """Simulate five robots that carry a ring, estimate it, and compare with the truth."""
     with tempfile.TemporaryDirectory() as folder:
         payload = Path(folder) / "ring.xml"
         payload.write_text(ring_mjcf(), encoding="utf-8")

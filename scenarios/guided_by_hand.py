@@ -1,8 +1,7 @@
-"""A person guides the payload that three Omnids carry: the force it takes, with and without the estimate.
+"""A person guides the payload that three Omnids carry: compare the required forces with and without an estimate.
 
-The arms float: no stiffness, only the payload's weight fed forward. The person's two hands hold a handle over the
-middle of the frame and move it along one and the same path. Then the bases are released, and follow the person across
-the room.
+The arms have no stiffness and only compensate the payload's weight. The person's hands move a handle over the middle
+of the frame along the same path in every case. Then the bases are released and follow the person across the room.
 
 python scenarios/guided_by_hand.py [--payload a] [--estimate est.json] [--out FOLDER]
 """
@@ -27,14 +26,14 @@ from mocobot.robots import ControlGains, draw_units
 from mocobot.trajectories import RATE_HZ, Trajectory
 
 BEGIN_S = 3.0
-# Out of the way to one side, up and tilted, hold, and back.
+# Aside, up and tilted, then hold, and back.
 PATH = (
     Move((0.06, 0.0, 0.04), (float(np.deg2rad(6.0)), 0.0, 0.0), 2.0, 1.5),
     Move((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0, 1.5),
 )
 ACROSS_THE_ROOM = (Move((0.0, 0.6, 0.03), (0.0, 0.0, float(np.deg2rad(20.0))), 6.0, 2.0),)
 HANDS = Grip()
-# The same motion to within millimetres, whatever pulls at it: shows the force, and takes no part in it.
+# A stiff grip keeps the motion equal within millimetres in all cases, so that the forces can be compared.
 FIRM = Grip(20000.0, 1500.0, 2000.0, 100.0)
 GUESS_KG = 10.0
 
@@ -44,10 +43,10 @@ class Case:
     """One way of carrying.
 
     Attributes:
-        name: what the robots do.
-        arms: what they believe; None to hold what they held at the start.
-        gains: of the arms.
-        scene: the team.
+        name: behaviour of the robots.
+        arms: controller of floating arms; None for arms that hold their initial position.
+        gains: control gains of the arms.
+        scene: scene of the team.
     """
 
     name: str
@@ -57,7 +56,7 @@ class Case:
 
 
 def main() -> None:
-    """Compare."""
+    """Run the comparison with the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--payload", default="a", help="name of a shipped payload, or a payload MJCF")
     parser.add_argument(
@@ -74,7 +73,7 @@ def main() -> None:
 
 
 def compare(payload: str, estimate_path: Path | None, out: Path) -> None:
-    """Estimate if need be, run all cases, print and draw."""
+    """Estimate the payload unless an estimate is given, run all cases, and print and draw the results."""
     make_folder(out)
     team = build_team(payload)
     if team.robots < 3:
@@ -123,12 +122,12 @@ def _guess(truth: Payload) -> Payload:
 
 
 def _handle(truth: Payload) -> np.ndarray:
-    """A handle over the centre of mass, 79 mm over the grasps, where the bars are: kindest to whoever must lift."""
+    """Return the position of the handle in {1} [m]: above the centre of mass, 79 mm above the grasps, at the bars."""
     return np.array([*truth.p_1c[:2], 0.079])
 
 
 def read_estimate(path: Path) -> Payload:
-    """What a file of `mocobot estimate --out` says."""
+    """Read an estimate that `mocobot estimate --out` wrote."""
     try:
         return Payload.of_estimate(mocobot.read_estimate(path))
     except InputError as error:
@@ -136,7 +135,7 @@ def read_estimate(path: Path) -> Payload:
 
 
 def make_estimate(payload: str, preset: str) -> Estimate:
-    """The robots' own: from one random and one static trial."""
+    """Estimate the payload from one random and one static trial of the robots."""
     random = mocobot.simulate(payload, "random", vias=30, preset=preset)
     return mocobot.estimate([random, mocobot.simulate(payload, "static", preset=preset)])
 
@@ -150,7 +149,7 @@ def _score(preset: str, estimate: Estimate, truth: Payload) -> str:
 
 
 def guide(case: Case, grip_1: np.ndarray, grip: Grip) -> HandLog:
-    """One trial: the same path of the hands, whatever the robots do."""
+    """Run one trial of a case; the hands follow the same path in every case."""
     hand = GuidingHand(grip_1, PATH, BEGIN_S, grip)
     run_trial(
         case.scene, _stay(case.scene, hand.duration_s), case.gains,
@@ -166,7 +165,7 @@ def _stay(scene: TeamScene, duration_s: float) -> Trajectory:
 def across_the_room(
     payload: str, case: Case, grip_1: np.ndarray
 ) -> tuple[HandLog, DriveLog, list[np.ndarray] | str]:
-    """Bases released: they follow their wrists, and these the person."""
+    """Run a trial with released bases: the wrists follow the person, and the bases follow the wrists."""
     scene = build_team(payload, case.scene.units, released=True)
     hand = GuidingHand(grip_1, ACROSS_THE_ROOM, 2.0)
     drive, snapshots = FollowingDrive(scene.mounts, scene.units), Snapshots([2.0, 5.5, hand.duration_s])
@@ -182,7 +181,7 @@ def across_the_room(
         k = min(round(t * RATE_HZ), len(log.time) - 1)
         mark = Marks()
         mark.path(log.position[: k + 1 : 10], 0.006, (0.16, 0.44, 0.82, 1.0))
-        # 1 N is 0.15 m.
+        # Force arrows: 0.15 m per N.
         mark.arrow(log.position[k], log.position[k] + 0.15 * log.force[k], 0.014, (0.85, 0.15, 0.15, 1.0))
         marks.append(mark)
     middle = log.position[0, :2]
@@ -195,7 +194,7 @@ def _rms(rows: np.ndarray) -> float:
 
 
 def table(cases: Sequence[Case], logs: Sequence[Sequence[HandLog]], truth: Payload) -> str:
-    """Forces for the same motion, and what softer hands make of it."""
+    """Tabulate the forces for the same motion, and the errors with softer hands."""
     lines = [
         f"\nweight of the payload {9.81 * truth.mass_kg:.1f} N; handle moved 60 mm aside, 40 mm up, by 6 deg, and back",
         "                                     the same motion: force [N]   moment [N m]   | hands of 1 kN/m:"
@@ -216,7 +215,7 @@ def table(cases: Sequence[Case], logs: Sequence[Sequence[HandLog]], truth: Paylo
 
 
 def journey(name: str, hand: HandLog, bases: DriveLog) -> str:
-    """What it takes to lead the team through the room."""
+    """Describe the effort to lead the team through the room."""
     on = hand.time >= 2.0
     travelled = np.linalg.norm(bases.true[-1, :, :2] - bases.true[0, :, :2], axis=-1)
     way = 1e3 * np.linalg.norm(hand.intended[-1] - hand.intended[0])
@@ -230,8 +229,8 @@ def journey(name: str, hand: HandLog, bases: DriveLog) -> str:
 
 
 def plot(cases: Sequence[Case], logs: Sequence[HandLog], hand: HandLog, bases: DriveLog, path: Path) -> None:
-    """Force over time of every case, and the way through the room."""
-    figure = Figure(figsize=(12, 7.5), layout="constrained")  # without pyplot: no display, no global state
+    """Plot the forces of every case over time, and the path through the room."""
+    figure = Figure(figsize=(12, 7.5), layout="constrained")  # without pyplot, no display is needed
     axes = figure.subplot_mosaic([["force", "force", "room"], ["moment", "moment", "lead"]])
     colours = ("#6b7280", "#8b5cf6", "#e07b39", "#c2a100", "#2a9d8f", "#111827", "#2f6fd0")
     for case, log, colour in zip(cases, logs, colours, strict=False):

@@ -1,4 +1,4 @@
-"""Hide friction in one joint of a simulated team, and let the recordings tell: what is wrong, where, and how much.
+"""Hide friction in one joint of a simulated team, and diagnose from its recordings what is wrong, where, and how much.
 
 python scenarios/hidden_effect.py
 python scenarios/hidden_effect.py FOLDER    # keeps the recordings, for `mocobot diagnose`
@@ -16,7 +16,7 @@ from mocobot.trajectories import random_vias, sphere_motion
 
 
 def main(folder: Path | None = None) -> None:
-    """Two trials of payload (b) with 16-bit encoders and noisy torques; nobody tells the diagnosis what is hidden."""
+    """Simulate two trials of payload (b) with 16-bit encoders and noisy torques, and diagnose them blind."""
     rng, nominal = np.random.default_rng(5), mocobot.PRESETS["nominal"]
     friction = mocobot.make_effect(
         "joint_friction", {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}, robot=2, joint=1

@@ -1,4 +1,4 @@
-"""Carry payload (b) with uncalibrated robots, estimate it, and write a replay of estimate against truth.
+"""Simulate uncalibrated robots with payload (b), and write a replay that shows estimate and truth.
 
 python scenarios/replay_estimate.py [replay.rrd], then: rerun replay.rrd
 """
@@ -12,7 +12,7 @@ import mocobot
 
 
 def main(target: Path) -> None:
-    """One periodic trial of 20 s; encoders are off by about 1 deg, lengths by 1 mm, springs by 2 %."""
+    """Replay a periodic trial of 20 s; encoders are off by about 1 deg, lengths by 1 mm, springs by 2 %."""
     recording = mocobot.simulate("b", "periodic", duration_s=20, preset="uncalibrated")
     mocobot.replay(recording, target, truth=recording.truth)
     print(f"{target}: {target.stat().st_size / 1e6:.1f} MB; open it with: rerun {target}")

@@ -1,4 +1,4 @@
-"""Render a team at rest to a PNG, without a screen: python scenarios/team_picture.py [a|b|c|d] [picture.png]"""
+"""Render a team at rest to a PNG, off-screen: python scenarios/team_picture.py [a|b|c|d] [picture.png]"""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mocobot.pictures import team_view
 
 
 def main(payload: str, picture: Path) -> None:
-    """Write a picture of the team in its home pose, or say why there is none."""
+    """Write a picture of the team in its home pose, or exit with the reason why there is none."""
     try:
         seen = team_view(payload)
     except mocobot.InputError as error:

@@ -1,4 +1,4 @@
-"""Carry payload (b), record, estimate it, and compare with the truth: the paper's experiment in one short script.
+"""Simulate a team with payload (b), estimate the payload, and compare with the truth: a short version of the paper.
 
 python scenarios/unknown_payload.py
 """
@@ -9,7 +9,7 @@ import mocobot
 
 
 def main() -> None:
-    """Three trials with 16-bit encoders and noisy torques, one estimate."""
+    """Estimate the payload from three trials with 16-bit encoders and noisy torques."""
     trials = [
         mocobot.simulate("b", "random", vias=40),
         mocobot.simulate("b", "periodic", duration_s=30),

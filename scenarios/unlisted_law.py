@@ -1,4 +1,4 @@
-"""Hide something that no catalogue lists in a simulated team, and let the recordings tell where, and by which formula.
+"""Hide an effect outside the catalogue in a simulated team, and identify its place and formula from recordings.
 
 python scenarios/unlisted_law.py
 python scenarios/unlisted_law.py FOLDER    # keeps the verdict: pictures, numbers, the extended model
@@ -16,7 +16,7 @@ from mocobot.trajectories import random_vias, sphere_motion
 
 
 def main(folder: Path | None = None) -> None:
-    """Robot 2's first torque sensor feels where its joint stands, twelve times a turn; two trials of payload (b)."""
+    """Add a torque sensor error with twelve periods per turn to joint 1 of robot 2, and diagnose two trials."""
     rng, nominal = np.random.default_rng(6), mocobot.PRESETS["nominal"]
     poles = mocobot.make_effect(
         "law",

@@ -1,4 +1,4 @@
-"""The public names, each with the module that defines it: ``__init__.py`` takes them from here."""
+"""The public names, each with the module that defines it; ``__init__.py`` reads this file."""
 
 from estimator.errors import InputError as InputError
 from estimator.inputs import set_max_unpacked as set_max_unpacked

@@ -1,4 +1,4 @@
-"""Bases that drive: planned motions in the plane, mecanum kinematics, one robot alone, and what a drive logs."""
+"""Mobile bases: planned planar motions, mecanum kinematics, simulation of a single robot, and logs of a drive."""
 
 from mocobot_sim.base.design import WHEELS, BaseDesign, MecanumKinematics, base_design
 from mocobot_sim.base.drive import (

@@ -1,8 +1,8 @@
-"""What each command refuses before it loads numpy, MuJoCo or anything else that takes time: ``check_`` and its name.
+"""Checks of each command before it loads numpy, MuJoCo or other slow modules: ``check_`` and the command's name.
 
-Options check themselves (``mocobot.options``); here are files to read and places to write. One rule for every command:
-nothing that exists is overwritten unasked. ``--force`` replaces a file, and a folder that is an earlier result of the
-same command and nothing else; never an input.
+Options check themselves (``mocobot.options``); this module checks files to read and places to write. No command
+overwrites anything without ``--force``. With it, a command replaces a file, or a folder that holds only an earlier
+result of the same command. No command replaces an input.
 """
 
 import os
@@ -21,14 +21,14 @@ from mocobot_sim.effect_names import check_effect_name
 from mocobot_sim.scene.models import payload_path, truth_path
 
 CALIBRATION = "calibration.json"
-"""The file in the folder of ``mocobot calibrate --out``."""
+"""Name of the JSON file that ``mocobot calibrate --out`` writes into its folder."""
 CONFIG, CONFIG_FORMAT = "config.json", "mocobot-campaign-config"
-"""What the folder of a campaign is known by."""
+"""File that marks the folder of a campaign, and its format."""
 SCORES, PARTIAL = "paper.json", "partial"
-"""The file in the folder of ``mocobot paper --out``, and the folder in it of a run that is not over."""
+"""In the folder of ``mocobot paper --out``: the file of scores, and the subfolder of an unfinished run."""
 TRUTH = "the truth beside a simulated recording"
 LEAST_BYTES = 12
-"""Least size of a Parquet file: its first and last bytes, and the length of the footer between them."""
+"""Smallest size of a Parquet file [bytes]. Derived: 4 bytes of magic at each end, 4 for the length of the footer."""
 
 
 INPUTS = {
@@ -44,11 +44,11 @@ INPUTS = {
     opt.CampaignOptions: ("payload", "units", "tolerances", "calibration"),
     opt.Replay: ("rec", "estimate", "model", "map", "calibration"),
 }
-"""Options that name files which a command reads, in the order of its provenance."""
+"""Options that name the input files of each command, in the order in which its provenance lists them."""
 
 
 def inputs_of(options: Any) -> list[Path]:
-    """Files and folders that a command reads, as far as options name them."""
+    """List the files and folders that the options of a command name as inputs."""
     found: list[Path] = []
     for name in next(INPUTS[kind] for kind in type(options).__mro__ if kind in INPUTS):
         value = getattr(options, name)
@@ -66,7 +66,7 @@ def inputs_of(options: Any) -> list[Path]:
 
 
 def map_file(name: str) -> list[Path]:
-    """The file that a map is read from, none for a built-in one."""
+    """Return the file of a map in a list, which is empty for a built-in map."""
     if not Path(name).is_file():
         return []
     from mocobot_logs.maps import MAPS
@@ -75,20 +75,20 @@ def map_file(name: str) -> list[Path]:
 
 
 def check_inspect(options: opt.Inspect) -> None:
-    """Everything that can be refused before the log is read."""
+    """Check the options and files of ``inspect`` before the log is read."""
     options.check_for(options.model)
     _check_file(options, options.json)
     _check_logs([options.rec], options.model)
 
 
 def check_map(options: opt.Map) -> None:
-    """Everything that can be refused before the log is read."""
+    """Check the options and files of ``map`` before the log is read."""
     _check_file(options, options.out)
     _check_logs([options.log], options.model)
 
 
 def check_convert(options: opt.Convert) -> None:
-    """Everything that can be refused before the log is read."""
+    """Check the options and files of ``convert`` before the log is read."""
     options.check()
     check_target_of(options, targets(options.out, 1)[0] if options.split_at_gaps else options.out)
     if options.json is not None:
@@ -97,13 +97,13 @@ def check_convert(options: opt.Convert) -> None:
 
 
 def targets(out: Path, count: int) -> list[Path]:
-    """Numbered names for the parts of a log."""
+    """Make the numbered paths for the parts of a log."""
     width = len(str(count))
     return [out.with_name(f"{out.stem}-{k:0{width}}{out.suffix}") for k in range(1, count + 1)]
 
 
 def check_target_of(options: opt.Convert, out: Path) -> None:
-    """One recording, under the name that it will have."""
+    """Check that ``convert`` may write one recording to the path ``out``."""
     inputs = inputs_of(options)
     if output_kind(out) == "folder":
         check_no_input(out, inputs)
@@ -113,7 +113,7 @@ def check_target_of(options: opt.Convert, out: Path) -> None:
 
 
 def check_estimate(options: opt.Estimate) -> None:
-    """Everything that can be refused before a recording is read."""
+    """Check the options and files of ``estimate`` before a recording is read."""
     options.check()
     _check_recordings(options.rec)
     if options.pictures:
@@ -125,7 +125,7 @@ def check_estimate(options: opt.Estimate) -> None:
 
 
 def check_calibrate(options: opt.Calibrate) -> None:
-    """Everything that can be refused before a recording is read."""
+    """Check the options and files of ``calibrate`` before a recording is read."""
     if not options.rec:
         raise InputError("no recording with a payload is given; name them first, those of --free after it")
     files = [*options.rec, *options.free]
@@ -136,7 +136,7 @@ def check_calibrate(options: opt.Calibrate) -> None:
 
 
 def check_watch(options: opt.Watch) -> None:
-    """Everything that can be refused before a log is read."""
+    """Check the options and files of ``watch`` before a log is read."""
     options.check()
     _check_recordings(options.rec)
     stems = [path.stem for path in options.rec]
@@ -148,7 +148,7 @@ def check_watch(options: opt.Watch) -> None:
 
 
 def check_diagnose(options: opt.Diagnose) -> None:
-    """Everything that can be refused before a recording is read."""
+    """Check the options and files of ``diagnose`` before a recording is read."""
     if not options.rec and options.exclude:
         raise InputError("no recording given; name them before --exclude")
     options.check()
@@ -160,18 +160,18 @@ def check_diagnose(options: opt.Diagnose) -> None:
     _check_file(options, options.json)
     _check_logs(logs, options.model)
     for path in filter(Path.exists, map(truth_path, options.rec)) if options.model is None else ():
-        read_json(path, TRUTH)  # what it says, nobody asks before the verdict
+        read_json(path, TRUTH)  # checks only that the file is readable
 
 
 def check_compare(options: opt.Compare) -> None:
-    """Everything that can be refused before a result is read."""
+    """Check the options and files of ``compare`` before a result is read."""
     _check_folder(options, "comparison")
     _check_file(options, options.json)
     _check_there([options.a, options.b])
 
 
 def check_simulate(options: opt.Simulate) -> None:
-    """Everything that can be refused before a team is built, the effects' numbers among it."""
+    """Check the options and files of ``simulate``, including the effects' parameters, before a team is built."""
     out = options.out
     if out is None:
         raise InputError(
@@ -201,13 +201,13 @@ def _check_payload(payload: str | None) -> None:
 
 
 def check_effects(options: opt.Effects) -> None:
-    """Names of effects."""
+    """Check that the named effects exist."""
     for name in options.name:
         check_effect_name(name)
 
 
 def check_campaign(options: opt.Campaign) -> None:
-    """Everything that can be refused before a team is built, but for the names of sensors."""
+    """Check the options and files of ``campaign`` before a team is built; sensor names are checked later."""
     options.check()
     inputs = inputs_of(options)
     _check_there(inputs)
@@ -221,7 +221,7 @@ def check_campaign(options: opt.Campaign) -> None:
 
 
 def is_campaign(folder: Path) -> bool:
-    """Whether a folder holds a campaign, whole or begun."""
+    """Whether a folder holds a campaign, finished or not."""
     try:
         return read_json(folder / CONFIG, "what a campaign is of").get("format") == CONFIG_FORMAT
     except InputError:
@@ -229,7 +229,7 @@ def is_campaign(folder: Path) -> bool:
 
 
 def check_paper(options: opt.Paper) -> None:
-    """Everything that can be refused before the experiment is planned."""
+    """Check the options and files of ``paper`` before the experiment is planned."""
     options.check()
     if options.recordings and not options.out:
         raise InputError("recordings needs --out")
@@ -244,24 +244,24 @@ def check_paper(options: opt.Paper) -> None:
 
 
 def _is_interrupted(folder: Path) -> bool:
-    """Whether a folder holds parts of a run, and beside them nothing or its results, which are written at the end.
+    """Whether a folder holds the partial results of a run, alone or beside final results.
 
-    Which run's, the command finds out.
+    The command itself checks whether the partial results belong to the same run.
     """
     names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
     return names == {PARTIAL} or names >= {PARTIAL, SCORES}
 
 
 def check_report(options: opt.Report) -> None:
-    """A folder that is none, and a page that may not be written, or cannot."""
+    """Check that the folder of ``report`` exists and that the page may be written."""
     if options.dir.is_file() and options.dir.suffix != ".json":
-        return  # the command finds out what kind of file it is
+        return  # the command itself reports what kind of file it is
     sought.check_folder(options.dir)
     check_output(options.out or options.dir / sought.NAME, force=options.force, suffix=sought.SUFFIX)
 
 
 def check_replay(options: opt.Replay) -> None:
-    """Everything that can be refused before a recording is read."""
+    """Check the options and files of ``replay`` before a recording is read."""
     options.check_for(options.out, options.model)
     _check_recordings(options.rec)
     _check_file(options, options.out, suffix=".rrd")
@@ -269,7 +269,7 @@ def check_replay(options: opt.Replay) -> None:
 
 
 def _check_recordings(recordings: Sequence[Path]) -> None:
-    """At least one recording, each once."""
+    """Check that at least one recording is given, and none twice."""
     if not recordings:
         raise InputError("no recording given; name at least one file")
     seen: set[str] = set()
@@ -281,15 +281,15 @@ def _check_recordings(recordings: Sequence[Path]) -> None:
 
 
 def _check_logs(logs: Sequence[Path], *beside: Path | None) -> None:
-    """Files that must be there, the logs of a known format."""
+    """Check that logs and further files exist, and that the logs have a known format."""
     _check_there([*logs, *(path for path in beside if path is not None)])
     for path in logs:
-        if path.is_file() and path.suffix.lower() not in (".json", ".parquet"):  # of those reading tells more
+        if path.is_file() and path.suffix.lower() not in (".json", ".parquet"):  # their readers check
             log_kind(path)
 
 
 def _check_there(paths: Sequence[Path]) -> None:
-    """A file or folder to read is missing, or cut; what else may be wrong with it, reading tells."""
+    """Refuse paths that do not exist and truncated Parquet files; the readers report all other faults."""
     for path in paths:
         try:
             path.stat()
@@ -302,7 +302,7 @@ def _check_there(paths: Sequence[Path]) -> None:
 
 
 def _check_parquet(path: Path) -> None:
-    """An empty or a cut Parquet file; whatever does not look like one is let pass."""
+    """Refuse an empty or truncated Parquet file; files of other formats pass."""
     try:
         with path.open("rb") as file:
             head = file.read(len(MAGIC))
@@ -310,7 +310,7 @@ def _check_parquet(path: Path) -> None:
             file.seek(-min(size, len(MAGIC)), os.SEEK_END)
             end = file.read()
     except (OSError, ValueError):
-        return  # a folder, or what may not be read: reading tells
+        return  # a folder or an unreadable file: the reader reports it
     if head != MAGIC and (size or path.suffix.lower() != ".parquet"):
         return
     if size < LEAST_BYTES or end != MAGIC:
@@ -319,7 +319,7 @@ def _check_parquet(path: Path) -> None:
 
 
 def _check_folder(options: Any, kind: str, what: str = "") -> None:
-    """The folder of a result, where one is asked for."""
+    """Check the output folder of a result, if one is requested."""
     if options.out is not None:
         called = what or f"an earlier {kind}"
         check_folder(options.out, inputs_of(options), holds(kind), called, force=options.force)
@@ -328,13 +328,17 @@ def _check_folder(options: Any, kind: str, what: str = "") -> None:
 
 
 def _check_file(options: Any, path: Path | None, suffix: str = "") -> None:
-    """A file to write, where one is asked for."""
+    """Check an output file, if one is requested."""
     if path is not None:
         check_output(path, inputs_of(options), force=options.force, suffix=suffix)
 
 
 def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix: str = "") -> None:
-    """Find out that a file may not be written, or cannot, before the work is done whose result it would hold."""
+    """Check that a file may be written, before the command computes its content.
+
+    Raises:
+        InputError: the path is an input or lies in one, exists without ``force``, or cannot be written.
+    """
     check_no_input(path, inputs)
     check_target(path, suffix)
     if path.exists() and not force:
@@ -342,7 +346,7 @@ def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix
 
 
 def check_no_input(path: Path, inputs: Sequence[Path]) -> None:
-    """Find out that an output is an input, or lies in one."""
+    """Raise InputError if an output path is an input or lies in one."""
     with system_errors(path):
         real = Path(os.path.realpath(path))
         for given in inputs:
@@ -355,18 +359,18 @@ def check_no_input(path: Path, inputs: Sequence[Path]) -> None:
 def check_folder(
     path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str, *, force: bool
 ) -> None:
-    """Find out that a folder may not be written, or cannot, before the work is done whose result it would hold.
+    """Check that a folder may be written, before the command computes its content.
 
     Args:
-        path: folder to be created or replaced.
+        path: folder to create or replace.
         inputs: files that must not be lost.
-        is_ours: whether an existing folder is an earlier result and nothing else.
-        what: the kind of result, for messages.
-        force: whether such a folder may be replaced; an empty one always may.
+        is_ours: tells whether an existing folder holds only an earlier result.
+        what: kind of that result, for error messages.
+        force: whether an earlier result may be replaced; an empty folder always may.
 
     Raises:
-        InputError: it is a file, or holds an input or something that is no such result, or such a result without
-            ``force``, or is the current folder, or nothing can be put there.
+        InputError: the path is a file, the current folder or one above it, cannot be written, or holds an input, other
+            content, or an earlier result without ``force``.
     """
     real = Path(os.path.realpath(path))
     with system_errors(path):

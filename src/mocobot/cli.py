@@ -1,4 +1,4 @@
-"""The ``mocobot`` command: words to options, options to what runs them, and whatever is wrong to one sentence."""
+"""The ``mocobot`` command: parse the arguments, run the command and turn every error into one sentence."""
 
 import difflib
 import io
@@ -64,10 +64,10 @@ TASKS = {
         "mocobot report verdict",
     ),
 }
-"""What the help lists: commands with what they are for, by task, and an example of each task."""
+"""Content of the help: for each task its commands with their purpose, and an example."""
 COMMANDS = [name for commands, _ in TASKS.values() for name in commands]
-"""Each has a dataclass of options of its name in ``mocobot.options``, a function in ``mocobot.checks`` that refuses
-what it can before anything is loaded that takes time, and one in ``mocobot.commands`` that runs it."""
+"""Names of the commands. Each has a dataclass of options in ``mocobot.options``, a function in ``mocobot.checks`` that
+refuses bad input before slow imports, and a function in ``mocobot.commands`` that runs it."""
 PROG, CONFIG = "mocobot", "--config"
 ABOUT = (
     "Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what the simulation "
@@ -77,40 +77,40 @@ ABOUT = (
     "options of a command; COMMAND --config FILE.toml takes more options from a file's table [COMMAND].",
 )
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
-"""Exit codes; the last two are 128 and the signal that other programs die of."""
+"""Exit codes; the last two are 128 plus the number of the signal (SIGINT, SIGPIPE)."""
 ENDING = (signal.SIGTERM, signal.SIGHUP)
-"""Signals that end the command as an interruption does: with what it began cleared away."""
+"""Signals that end the command like an interruption: temporary files are removed."""
 NARROWEST, WIDEST = 40, 100
-"""Columns that the help takes at least and at most."""
+"""Smallest and largest width of the help [columns]."""
 
 
 class NotGood(Exception):
-    """The work is done and written, and with ``--strict`` the answer is not good: one sentence that says why."""
+    """Raised with ``--strict`` after all output is written, if the result is bad; the message says why."""
 
 
 class _Shown:
-    """Standard output with what is printed escaped where it would be a command to a terminal."""
+    """Standard output that escapes terminal control sequences in the printed text."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
 
     def write(self, text: str) -> int:
-        """Print."""
+        """Print escaped text."""
         return self._out.write(printable(text))
 
     def __getattr__(self, name: str) -> Any:
-        """All else is standard output's own."""
+        """Forward every other attribute to standard output."""
         return getattr(self._out, name)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: ends the process with a code of docs/commands, unless all is well.
+    """Run the command line; end the process with an exit code unless the command succeeds.
 
-    0 done; 1 done, and with ``--strict`` the answer is not good; 2 refused after one sentence on standard error;
+    Exit codes: 1 done, but ``--strict`` rejects the result; 2 refused, with one sentence on standard error;
     130 interrupted; 141 standard output was closed before everything was printed; 143 terminated.
     """
     for each in ENDING:
-        if signal.getsignal(each) == signal.SIG_DFL:  # not where nohup ignores it
+        if signal.getsignal(each) == signal.SIG_DFL:  # keep SIGHUP ignored under nohup
             signal.signal(each, _end)
     try:
         try:
@@ -129,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(arguments: Sequence[str]) -> None:
-    if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
+    if isinstance(sys.stdout, io.TextIOWrapper):  # the terminal may not encode all names
         sys.stdout.reconfigure(errors="backslashreplace")
     name = next((word for word in arguments if word in COMMANDS), None)
     if "--version" in arguments:
@@ -144,7 +144,7 @@ def _run(arguments: Sequence[str]) -> None:
         set_max_unpacked(getattr(options, "max_unpacked", None))
         command = type(options).__name__.lower()
         getattr(import_module("mocobot.checks"), f"check_{command}")(options)
-        # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
+        # joblib stops idle workers and starts new ones. No work is lost, and the user cannot prevent it.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         with redirect_stdout(cast("TextIO", _Shown(sys.stdout))):
             _command(command)(options)
@@ -153,7 +153,7 @@ def _run(arguments: Sequence[str]) -> None:
 
 
 def _command(name: str) -> Callable[[Any], None]:
-    """What runs the options: imported only now, for neither the help nor a refusal needs MuJoCo or the estimator."""
+    """Import the function that runs a command; help and refusals do without MuJoCo and the estimator."""
     try:
         return getattr(import_module("mocobot.commands"), name)
     except (AttributeError, ImportError, RuntimeError) as error:
@@ -167,7 +167,7 @@ def _command(name: str) -> Callable[[Any], None]:
 
 
 def help_text() -> str:
-    """The commands by task, with an example of each task."""
+    """Format the help: the commands by task, with an example of each task."""
     width = max(NARROWEST, min(WIDEST, shutil.get_terminal_size((80, 24)).columns))
     lines = [f"usage: {PROG} COMMAND [OPTIONS]", "", *textwrap.wrap(ABOUT[0], width)]
     for task, (commands, example) in TASKS.items():
@@ -181,8 +181,7 @@ def help_text() -> str:
 
 
 def _version() -> str:
-    """Version of the installed package."""
-    from importlib.metadata import PackageNotFoundError, version  # 20 ms that nothing else needs
+    from importlib.metadata import PackageNotFoundError, version  # takes 20 ms; only --version needs it
 
     try:
         return version("mocobot")
@@ -192,12 +191,12 @@ def _version() -> str:
 
 def _end(number: int, _: object) -> NoReturn:
     for each in ENDING:
-        signal.signal(each, signal.SIG_IGN)  # once is enough
+        signal.signal(each, signal.SIG_IGN)  # ignore further signals while the process ends
     sys.exit(128 + number)
 
 
 def _flush() -> None:
-    """Print what is still to be printed; help ends the process, so that there may be some whatever happened."""
+    """Flush standard output; also needed after the help, which ends the process."""
     try:
         print(end="", flush=True)
     except BrokenPipeError:
@@ -208,7 +207,7 @@ def _flush() -> None:
 
 
 def _forget() -> None:
-    """Let go of what cannot be printed: Python tries again on its way out, and that must not fail a second time."""
+    """Redirect standard output to the null device, so that Python's flush at exit cannot fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -219,13 +218,13 @@ def _exit(sentence: str, code: int) -> NoReturn:
 
 @cache
 def kinds() -> dict[str, type]:
-    """The dataclass of options of every command."""
+    """Map each command to the dataclass of its options."""
     options = import_module("mocobot.options")
     return {name: getattr(options, name.capitalize()) for name in COMMANDS}
 
 
 def flags(command: str) -> dict[str, Field[Any]]:
-    """Options of a command, without dashes in front, and the fields that they set."""
+    """Map each option of a command, without leading dashes, to the dataclass field that it sets."""
     tyro = import_module("tyro")
     found = {}
     for entry in fields(kinds()[command]):
@@ -239,14 +238,14 @@ def flags(command: str) -> dict[str, Field[Any]]:
 
 @dataclass(frozen=True)
 class Configured:
-    """Arguments of the command line, with those of a file.
+    """Arguments of the command line, merged with those of a configuration file.
 
     Attributes:
-        words: all of them, as if all had been given there.
-        command: which of them is the command, or None.
-        spelled: options as the user spells them, by what they are called.
-        table: file and table, as a sentence names them.
-        names: options that are the file's.
+        words: all arguments, as if the command line had given them all.
+        command: name of the command, or None.
+        spelled: the user's spelling of each option, by option name.
+        table: file and table, as error messages name them.
+        names: options that come from the file.
     """
 
     words: list[str]
@@ -256,7 +255,7 @@ class Configured:
     names: tuple[str, ...] = ()
 
     def in_words_of_the_user(self, sentence: str) -> str:
-        """A sentence on options with these as the user writes them, and with the file that gives the first one."""
+        """Rewrite an error message: spell options as the user did, and name the file that set the first one."""
         if self.command is None:
             return sentence
         by_field = {field.name: name for name, field in flags(self.command).items()}
@@ -272,7 +271,11 @@ class Configured:
 
 
 def with_config(arguments: Sequence[str]) -> Configured:
-    """Arguments with the options of a file behind them; what the command line says itself goes before the file."""
+    """Append the options of the ``--config`` file to the arguments; the command line takes precedence.
+
+    Raises:
+        InputError: the file cannot be read, or names an unknown command or option.
+    """
     left, file = _taken(arguments)
     command = next((word for word in left if word in COMMANDS), None)
     if command is None:
@@ -302,7 +305,7 @@ def with_config(arguments: Sequence[str]) -> Configured:
 
 
 def _taken(arguments: Sequence[str]) -> tuple[list[str], str | None]:
-    """The other arguments, and the file of options."""
+    """Split the arguments into all others and the path of the ``--config`` file, or None."""
     left, file, rest = [], None, iter(arguments)
     for word in rest:
         name, equals, value = word.partition("=")
@@ -318,13 +321,13 @@ def _taken(arguments: Sequence[str]) -> tuple[list[str], str | None]:
 
 
 def _newer(flag: str, known: Mapping[str, Any]) -> str:
-    """The newer spelling of an option, where a command has that and not the earlier one."""
+    """Translate an earlier name of an option, if the command has only the new one."""
     newer = import_module("mocobot.options").OLD_NAMES.get(flag)
     return newer if newer in known and flag not in known else flag
 
 
 def _renamed(words: list[str], command: str) -> tuple[list[str], dict[str, str]]:
-    """Words with earlier spellings of options in their newer one, and how each was spelled."""
+    """Replace earlier option names by the new ones; also return the user's spelling of each option."""
     known, out, spelled = flags(command), [], {}
     for word in words:
         name, equals, value = word.partition("=")
@@ -334,14 +337,14 @@ def _renamed(words: list[str], command: str) -> tuple[list[str], dict[str, str]]
                 raise InputError(f"{spelled[flag]} and {name} are one option; give it once")
             name = f"--{flag}" if flag in known else name
         out.append(name + equals + value)
-    if command == "convert" and "--out" in out[:-1]:  # the place to write is a word of its own there
+    if command == "convert" and "--out" in out[:-1]:  # convert takes its output as a positional argument
         at = out.index("--out")
         out = [*out[:at], *out[at + 2 :], out[at + 1]]
     return out, spelled
 
 
 def _words(where: str, flag: str, value: Any, entry: Field[Any]) -> list[str]:
-    """A value as the command line has it."""
+    """Translate a value of the configuration file into command-line arguments."""
     tyro, allowed = import_module("tyro"), get_args(entry.type)
     values = value if isinstance(value, list) else [value]
     if any(isinstance(each, Mapping | list) for each in values):
@@ -364,11 +367,15 @@ def _close(name: str, known: Sequence[str]) -> str:
 
 
 def parse(words: Sequence[str]) -> Any:
-    """The options of the command that the words name; help is printed, and ends the process."""
+    """Parse arguments into the options of their command; ``--help`` prints the help and ends the process.
+
+    Raises:
+        InputError: the arguments do not fit the command.
+    """
     import tyro
     from tyro import (
         _errors,
-    )  # boxes of text would not be one sentence; pyproject.toml says which versions have this
+    )  # private, to report errors as one sentence instead of boxes; pyproject.toml restricts the versions
 
     def refuse(event: _errors.ParseErrorEvent) -> None:
         raise InputError(_sentence(event, next((word for word in words if word in COMMANDS), None)))
@@ -388,14 +395,14 @@ def parse(words: Sequence[str]) -> Any:
                 registry=_registry(),
             )
         except OSError as error:
-            if error.filename is None:  # a closed pipe
+            if error.filename is None:  # the pipe is closed
                 raise
-            said = f"{error.filename}: cannot be written ({error.strerror})"  # a completion
+            said = f"{error.filename}: cannot be written ({error.strerror})"  # a shell completion of tyro
             raise InputError(said) from error
 
 
 def _sentence(event: Any, command: str | None) -> str:
-    """What tyro finds wrong, as the sentence of an error."""
+    """Turn a parse error of tyro into one sentence."""
     from tyro import _errors
 
     more = f"see {PROG} {command} --help" if command else f"see {PROG} --help"
@@ -420,7 +427,7 @@ def _sentence(event: Any, command: str | None) -> str:
 
 
 def _unknown(tokens: Sequence[str], command: str | None, more: str) -> str:
-    """Arguments that nothing takes, and what may have been meant."""
+    """Report an unknown argument and suggest a similar one."""
     token = next((each for each in tokens if each.startswith("-")), tokens[0])
     if command is None and not token.startswith("-"):
         hint = _close(token, COMMANDS) or f"the commands are {', '.join(COMMANDS)}"
@@ -434,7 +441,7 @@ def _unknown(tokens: Sequence[str], command: str | None, more: str) -> str:
 
 
 def _name(argument: Any, *, and_value: bool = False) -> str:
-    """How an argument is called on the command line."""
+    """Return the flag of an option, or the metavar of a positional argument."""
     metavar = str(argument.lowered.metavar)
     if argument.is_positional():
         return metavar
@@ -443,7 +450,7 @@ def _name(argument: Any, *, and_value: bool = False) -> str:
 
 
 def _registry() -> Any:
-    """How words become values: what may be left out cannot be named, and messages are for users."""
+    """Make tyro's registry of value parsers: an optional value does not accept "none", and errors suit users."""
     from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec
 
     registry = ConstructorRegistry()
@@ -471,7 +478,7 @@ def _registry() -> Any:
 
 
 def _without_none(kind: Any) -> Any:
-    """The type of a value that may be left out."""
+    """Return T for the type T | None, and any other type unchanged."""
     allowed = get_args(kind)
     if get_origin(kind) in (Union, UnionType) and len(allowed) == 2 and NoneType in allowed:
         return next(each for each in allowed if each is not NoneType)
@@ -501,4 +508,4 @@ VALUES: Mapping[Any, tuple[Callable[[str], Any], str]] = {
     str: (str, "NAME"),
     Path: (Path, "PATH"),
 }
-"""What makes a value of a word, and how the help calls it."""
+"""For each type, the function that parses its text and its metavar in the help."""

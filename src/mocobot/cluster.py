@@ -1,4 +1,4 @@
-"""Processes on other machines: joblib's work goes to a Dask scheduler while a block runs."""
+"""Run joblib's tasks on other machines, through a Dask scheduler."""
 
 import platform
 from collections.abc import Iterator, Mapping
@@ -10,25 +10,25 @@ from estimator.errors import InputError
 
 INSTALL = "pip install 'mocobot[cluster]'"
 REACH_S, WORKERS_S = 20.0, 120.0
-"""How long a scheduler is looked for, and its first worker waited for."""
+"""Time limits for reaching the scheduler and for its first worker [s]. Chosen."""
 
 LARGE_TASKS = {"distributed.admin.large-graph-warning-threshold": "1TB"}
-"""An estimate is sent all recordings of its experiment, tens of MB on purpose: Dask would warn from 10 MB on."""
+"""Raises Dask's 10 MB warning limit, because an estimate sends all recordings of its experiment, tens of MB."""
 
 
 @contextmanager
 def workers_of(scheduler: str | None) -> Iterator[None]:
-    """A block in which ``joblib.Parallel`` runs on the workers of a scheduler; as ever without one.
+    """Context manager: ``joblib.Parallel`` runs on the workers of a scheduler inside the block.
 
-    What a lost worker had to do is done by another. Workers must have the same versions of everything that numbers pass
-    through, and one thread each, so that the same seeds give the same bits on any number of them.
+    Another worker takes over the tasks of a lost one. Workers must have one thread each and the same versions of all
+    numerical packages, so that results do not depend on the number of workers.
 
     Args:
-        scheduler: its address (``tcp://host:8786``), or the path of its scheduler file; None for no cluster.
+        scheduler: address (``tcp://host:8786``) or path of the scheduler file; None leaves joblib unchanged.
 
     Raises:
-        InputError: dask.distributed is not installed, the scheduler cannot be reached, has no workers, or workers of
-            other versions, it is lost, or a task ends every worker that tries it.
+        InputError: dask.distributed is not installed; the scheduler cannot be reached, has no workers or is lost;
+            a worker has other versions or more threads; or a task ends every worker that tries it.
     """
     if scheduler is None:
         yield
@@ -37,7 +37,7 @@ def workers_of(scheduler: str | None) -> Iterator[None]:
         from dask import config
         from distributed import CancelledError, Client, KilledWorker
         from distributed.comm.core import CommClosedError
-        from joblib._dask import DaskDistributedBackend  # which "dask" stands for; it has no public name
+        from joblib._dask import DaskDistributedBackend  # joblib's backend "dask"; it has no public name
     except ImportError as error:
         raise InputError(
             f"--scheduler needs dask.distributed, which is not installed; get it with: {INSTALL}"
@@ -45,7 +45,7 @@ def workers_of(scheduler: str | None) -> Iterator[None]:
     from joblib import parallel_config
 
     class Workers(DaskDistributedBackend):
-        """Sends work away even where one worker is left: joblib would do it in this process then."""
+        """Sends tasks to the cluster even if one worker is left; joblib would then use this process."""
 
         def effective_n_jobs(self, n_jobs: int) -> int:
             return max(2, super().effective_n_jobs(n_jobs))
@@ -60,7 +60,7 @@ def workers_of(scheduler: str | None) -> Iterator[None]:
             client = Client(scheduler_file=scheduler, timeout=REACH_S, set_as_default=True)
         else:
             client = Client(scheduler, timeout=REACH_S, set_as_default=True)
-    except (OSError, ValueError, TypeError) as error:  # a time that ran out is an OSError
+    except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
         raise InputError(f"scheduler {scheduler}: cannot be reached ({_line(error)})") from error
     with client:
         _check_workers(client, scheduler)
@@ -99,7 +99,7 @@ def _check_workers(client: Any, scheduler: str) -> None:
 
 
 def versions() -> dict[str, str]:
-    """What must be the same on every machine."""
+    """Versions of Python, the numerical packages and the code, which must be the same on every machine."""
     from mocobot.results import PACKAGES, code_digest, version_of
 
     found = {name: version_of(name) or "none" for name in PACKAGES}

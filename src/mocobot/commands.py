@@ -1,6 +1,6 @@
-"""What every command does, a function of its name each: call ``mocobot``, write, and print.
+"""The commands, one function each: call ``mocobot``, write the results and print the report.
 
-Printing comes after files and folders are in place: whoever reads may close the pipe.
+A command prints after it has written all files, because the reader of its output may close the pipe.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ WIDTH, WIDEST, INDENT = 110, 100, "    "
 
 
 def inspect(options: opt.Inspect) -> None:
-    """Look at a log; without ``strict`` it ends well whatever is found."""
+    """Inspect a log; only ``strict`` turns findings into an exit code other than 0."""
     with bar(None, "reading", "") as advance, bar(None, "checking", "mistake") as tried:
         found = mocobot.inspect(options.rec, options.model, options, advance=advance, tried=tried)
     if options.json is not None:
@@ -42,7 +42,7 @@ def inspect(options: opt.Inspect) -> None:
 
 
 def map(options: opt.Map) -> None:
-    """Draft a map; doubts are in the draft, and counted on standard error."""
+    """Draft a map of a log; the draft marks doubtful lines, and standard error states their number."""
     draft = mocobot.map(options.log, options.model, options)
     if options.out is None:
         print(draft, end="")
@@ -52,7 +52,7 @@ def map(options: opt.Map) -> None:
 
 
 def convert(options: opt.Convert) -> None:
-    """Bring a log onto one grid, write it as any format, and say what was done."""
+    """Resample a log onto one time grid, write it and report the conversion."""
     with bar(None, "reading", "") as advance:
         if options.split_at_gaps:
             parts = mocobot.convert_parts(options.log, options, advance=advance)
@@ -79,7 +79,7 @@ def convert(options: opt.Convert) -> None:
 
 
 def _earlier(out: Path, written: Sequence[Path]) -> list[Path]:
-    """Numbered recordings that this conversion did not write."""
+    """Find numbered recordings from earlier conversions, which this conversion did not write."""
     numbered = re.compile(re.escape(out.stem) + r"-[0-9]+" + re.escape(out.suffix))
     names = {target.name for target in written}
     return sorted(
@@ -88,7 +88,7 @@ def _earlier(out: Path, written: Sequence[Path]) -> list[Path]:
 
 
 def estimate(options: opt.Estimate) -> None:
-    """Estimate what recordings hold, write and print it."""
+    """Estimate the payload of recordings; write and print the estimate."""
     notes: list[str] = []
     with stages() as (say, _):
         found = mocobot.estimate(options.rec, options, say=say, note=notes.append)
@@ -109,7 +109,11 @@ def estimate(options: opt.Estimate) -> None:
 
 
 def _team_picture(options: opt.Estimate, found: Any, path: Path) -> list[str]:
-    """A picture of the team as estimated, in the middle of the first recording, or why there is none."""
+    """Draw the estimated team in the middle of the first recording.
+
+    Returns:
+        A sentence that explains why there is no picture; empty if there is one.
+    """
     from matplotlib.image import imsave
 
     from mocobot.api.recordings import recordings_of
@@ -123,7 +127,7 @@ def _team_picture(options: opt.Estimate, found: Any, path: Path) -> list[str]:
 
 
 def calibrate(options: opt.Calibrate) -> None:
-    """Find out how the robots differ from their design, write and print it."""
+    """Estimate how the robots differ from their design; write and print the calibration."""
     notes: list[str] = []
     with stages() as (say, _):
         found = mocobot.calibrate(options.rec, options.free, options, say=say, note=notes.append)
@@ -139,7 +143,7 @@ def calibrate(options: opt.Calibrate) -> None:
 
 
 def diagnose(options: opt.Diagnose) -> None:
-    """Find out what the simulation gets wrong, report and write it."""
+    """Find out what the simulation gets wrong; write and print the diagnosis."""
     notes: list[str] = []
     made_with = {}
     if options.out or options.json:
@@ -168,7 +172,7 @@ def diagnose(options: opt.Diagnose) -> None:
 
 
 def _inputs_of_diagnosis(options: opt.Diagnose) -> list[Path]:
-    """Files that a diagnosis is made from."""
+    """List the files that a diagnosis reads."""
     if options.model is None:
         return inputs_of(options)
     from mocobot.api.joints import map_path, read_model
@@ -179,7 +183,10 @@ def _inputs_of_diagnosis(options: opt.Diagnose) -> list[Path]:
 
 
 def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
-    """The truth beside the recordings, opened after the verdict, if all have the same."""
+    """Read the truth files beside the recordings; None unless all state the same payload.
+
+    The command calls this after the verdict, so that the truth cannot influence it.
+    """
     keys = ("grasps", "mass_kg", "p_1c_m", "principal_inertia_kgm2")
     found = []
     for path in paths:
@@ -192,7 +199,7 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
 
 
 def watch(options: opt.Watch) -> None:
-    """Logs to a first verdict, and a page with all of it."""
+    """Turn logs into a first verdict and a page that shows it."""
     out = options.out
     made_with = provenance("watch", options, inputs_of(options))
     if out is None and options.open:
@@ -216,7 +223,7 @@ def watch(options: opt.Watch) -> None:
 
 
 def compare(options: opt.Compare) -> None:
-    """Two results side by side, and what differs by more than its errors."""
+    """Compare two results and report what differs by more than its standard errors."""
     found = mocobot.compare(options.a, options.b)
     inputs = [path for path in (options.a, options.b) if path.is_file()]
     _write(found, options, provenance("compare", options, inputs) if options.out or options.json else {})
@@ -228,7 +235,7 @@ def compare(options: opt.Compare) -> None:
 
 
 def simulate(options: opt.Simulate) -> None:
-    """Simulate trials of one team, write their recordings and the truth beside them."""
+    """Simulate trials of one team; write their recordings with the truth beside each."""
     from mocobot.trajectories import RATE_HZ
 
     kinds, out, many = options.kinds, options.out, options.trials is not None
@@ -262,7 +269,7 @@ def simulate(options: opt.Simulate) -> None:
 
 
 def effects(options: opt.Effects) -> None:
-    """List what can be hidden in a simulated team, from the effects' own classes."""
+    """List the effects that a simulation can hide, from the docstrings and fields of their classes."""
     from mocobot_sim.effects.catalogue import EXAMPLE, allowed, paragraphs
 
     width = min(WIDEST, shutil.get_terminal_size((WIDEST, 24)).columns)
@@ -281,7 +288,7 @@ def effects(options: opt.Effects) -> None:
 
 
 def campaign(options: opt.Campaign) -> None:
-    """Hide effects in simulated teams, diagnose blind, count, and write it."""
+    """Hide effects in simulated teams, diagnose them blind, and write the hit and error rates."""
     from mocobot.campaign import run
 
     start = time.perf_counter()
@@ -295,7 +302,7 @@ def campaign(options: opt.Campaign) -> None:
 
 
 def paper(options: opt.Paper) -> None:
-    """Run the paper's experiment, print the tables, write the results."""
+    """Run the paper's experiment; print its tables and write its results."""
     from mocobot.api.paper import run_experiment
 
     start = time.perf_counter()
@@ -311,7 +318,7 @@ def paper(options: opt.Paper) -> None:
 
 
 def report(options: opt.Report) -> None:
-    """One HTML page of a result folder."""
+    """Make one HTML page from a result folder."""
     if options.dir.is_file() and options.dir.suffix != ".json":
         from mocobot.api.recordings import check_no_log
 
@@ -325,7 +332,7 @@ def report(options: opt.Report) -> None:
 
 
 def replay(options: opt.Replay) -> None:
-    """Recordings as moving scenes and time series, in the Rerun viewer, a browser or a file."""
+    """Show recordings as moving scenes and time series: in the Rerun viewer, a browser or a file."""
 
     def note(text: str) -> None:
         print(text, flush=True)
@@ -347,7 +354,7 @@ def _write(
     made_with: dict[str, Any],
     say: Callable[[str], object] = lambda _: None,
 ) -> list[str]:
-    """The folder and the JSON that are asked for; what could not be made, sentences."""
+    """Write the requested folder and JSON; return one sentence per file that could not be made."""
     missing: Any = None
     if options.out is not None:
         say("write")

@@ -1,4 +1,4 @@
-"""A person guides the payload: hands that move it, arms that float under it."""
+"""Hand guiding: simulated hands that move the payload, and soft arms that carry its weight."""
 
 from mocobot_sim.guided import FLOAT_GAINS, FloatArms, Grip, GuidingHand, HandLog, Move, Payload
 

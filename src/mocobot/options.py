@@ -1,8 +1,8 @@
-"""Options of every command, and of the call of the same name: the docstring of a field is its help.
+"""Options of every command and of the call with the same name; the docstring of a field is its help text.
 
-``mocobot.diagnose(..., options)`` takes ``DiagnoseOptions``, and likewise the others; keyword arguments of a call are
-fields of them. ``Diagnose``, which the command line makes, adds what only a command has: its logs, and where results
-go. Nothing here takes long to import.
+``mocobot.diagnose(..., options)`` takes ``DiagnoseOptions``; its keyword arguments are fields of that class. The other
+calls work alike. ``Diagnose``, which the command line creates, adds what only the command needs: logs and outputs.
+This module imports nothing slow.
 """
 
 import math
@@ -19,7 +19,7 @@ from estimator.errors import InputError
 from mocobot_sim.effect_names import check_effect_name
 from mocobot_sim.scene.models import payload_path
 
-if TYPE_CHECKING:  # from Python the object may be given that a file holds
+if TYPE_CHECKING:  # Python callers may pass the object itself instead of the path of its file
     AnyPath: TypeAlias = Any
     AnyName: TypeAlias = Any
     AnyFlag: TypeAlias = Any
@@ -79,25 +79,25 @@ MaxUnpacked = Annotated[
 TrialKind = Literal["random", "periodic", "static", "free"]
 MOST_ODDS, LONGEST_S = 1000.0, 1e6
 SLOWEST_HZ, FASTEST_HZ, LONGEST_GAP_S = 20.0, 2000.0, 10.0
-"""Bounds of a converted recording: the estimator's filter passes 5 Hz."""
+"""Bounds of the conversion: rates [Hz] and the longest filled gap [s]. Chosen: the estimator's filter passes 5 Hz."""
 
 
 class Options:
-    """What options of every kind have."""
+    """Base class of all options."""
 
     def check(self) -> None:
-        """Raise an InputError for options that exclude each other, or a number out of its range."""
+        """Raise InputError if options exclude each other or a number is out of range."""
 
 
 Made = TypeVar("Made", bound=Options)
 
 
 def made(kind: type[Made], options: Made | None, given: Mapping[str, Any]) -> Made:
-    """The options of a call: those given as one object, with the keyword arguments in place of its fields.
+    """Build the options of a call: the given object, with its fields replaced by the keyword arguments.
 
     Raises:
-        InputError: they contradict each other, or a value is out of range.
-        TypeError: there is no such option.
+        InputError: options contradict each other, or a value is out of range.
+        TypeError: an option does not exist.
     """
     found: Any = kind(**given) if options is None else replace(options, **given)  # pyright: ignore
     found.check()
@@ -105,7 +105,7 @@ def made(kind: type[Made], options: Made | None, given: Mapping[str, Any]) -> Ma
 
 
 def refuse_teams(options: Any, names: Iterable[str]) -> None:
-    """Refuse options of a team where the model of one robot is given."""
+    """Raise InputError if an option that only applies to a team is set while a single robot's model is given."""
     default = {field.name: field.default for field in fields(options)}
     for name in names:
         if getattr(options, name) != default[name]:
@@ -113,13 +113,13 @@ def refuse_teams(options: Any, names: Iterable[str]) -> None:
 
 
 def refuse_both(options: Any, one: str, other: str, why: str) -> None:
-    """Refuse two options that exclude each other."""
+    """Raise InputError if two options that exclude each other are both set."""
     if getattr(options, one) not in (None, ()) and getattr(options, other) not in (None, ()):
         raise InputError(f"{one} and {other} are both given; {why}")
 
 
 def check_range(options: Any, name: str, least: float, most: float = math.inf) -> None:
-    """Refuse a number that is out of range."""
+    """Raise InputError if a number is out of range."""
     value = getattr(options, name)
     if not least <= value <= most:
         allowed = f"at least {least:g}" if most == math.inf else f"from {least:g} to {most:g}"
@@ -127,21 +127,21 @@ def check_range(options: Any, name: str, least: float, most: float = math.inf) -
 
 
 def check_seconds(seconds: float | None) -> None:
-    """Refuse a time limit that is none."""
+    """Raise InputError if the time limit is not positive or exceeds ``LONGEST_S``."""
     if seconds is not None and not 0.0 < seconds <= LONGEST_S:
         raise InputError(f"seconds is {seconds:g}; it must be above 0 and at most {LONGEST_S:g} s")
 
 
 def check_motion(options: Any, kinds: Sequence[str], needed: Mapping[str, tuple[str, ...]]) -> None:
-    """Refuse a number that says nothing about any of the motions.
+    """Raise InputError if an option is set that applies to none of the trials.
 
     Args:
-        options: of the simulation.
-        kinds: of the trials.
-        needed: kinds of which at least one must be there, by option.
+        options: options of the simulation.
+        kinds: kind of every trial.
+        needed: for each option, the trial kinds to which it applies.
 
     Raises:
-        InputError: an option is given without such a trial.
+        InputError: an option is set, but no trial is of a kind to which it applies.
     """
     for name, wanted in needed.items():
         if getattr(options, name) is not None and not set(wanted) & set(kinds):
@@ -150,7 +150,7 @@ def check_motion(options: Any, kinds: Sequence[str], needed: Mapping[str, tuple[
 
 
 def kinds_of(trials: str, known: Sequence[str]) -> tuple[str, ...]:
-    """Kind of every trial of a list such as ``random,static``."""
+    """Split a list such as ``random,static`` into the kind of every trial."""
     kinds = tuple(trials.split(","))
     if not set(kinds) <= set(known):
         raise InputError(
@@ -161,7 +161,7 @@ def kinds_of(trials: str, known: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Files:
-    """What every command has that reads a log and writes something."""
+    """Options shared by all commands that read a log and write a result."""
 
     force: Force = False
     max_unpacked: MaxUnpacked = None
@@ -169,21 +169,20 @@ class Files:
 
 @dataclass(frozen=True, kw_only=True)
 class EstimateOptions(Options):
-    """How a payload is estimated."""
+    """Options of the payload estimate."""
 
     map: LogMap = None
     calibration: Calibrated = None
     self_calibrate: Flag = False
-    """Calibrate the robots on these recordings, and take what they carry from the same fit; free trials may be among
-    them."""
+    """Calibrate the robots and estimate the payload in one fit of these recordings, which may include free trials."""
     method: Literal["auto", "fit", "staged", "joint"] = "auto"
-    """One fit of closed loops and balance of wrenches; the paper's stages; its grasps, and one least squares for the
-    rest. auto: the fit, if noise is all that it leaves."""
+    """How to estimate. fit: one fit of loop closure and wrench balance. staged: the method of the paper. joint: the
+    grasps of the paper, then one least squares. auto: the fit, if it leaves only noise."""
     cutoff_hz: float = 5.0
-    """Cut-off of the low-pass filter [Hz]."""
+    """Cut-off frequency of the low-pass filter [Hz]."""
 
     def check(self) -> None:
-        """Raise an InputError for options that exclude each other."""
+        """Raise InputError if options exclude each other."""
         if self.self_calibrate:
             named = {"calibration": self.calibration is not None, "method": self.method != "auto"}
             for name in (name for name, given in named.items() if given):
@@ -195,82 +194,82 @@ class Estimate(Files, EstimateOptions):
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
 
     rec: Logs
-    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload."""
+    """Recordings (Parquet), or logs in any format that ``convert`` reads, all of one payload."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Write the estimate as JSON."""
     json: Json = None
     pictures: Flag = False
-    """Make OUT a folder: estimate.json, report.txt, and a picture of the team as estimated."""
+    """Make OUT a folder with estimate.json, report.txt and a picture of the estimated team."""
     strict: Flag = False
-    """Exit with 1 if the estimate is flagged, or nothing could be determined."""
+    """Exit with 1 if the estimate is flagged, or if the recordings determine neither mass nor grasps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateOptions(Options):
-    """How the robots of a team are calibrated."""
+    """Options of the calibration of a team's robots."""
 
     map: LogMap = None
     prior: Annotated[AnyPath | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
-    """How far the robots may be off (docs/calibration.md); robots out of the box if not given."""
+    """Prior standard deviations of the robots' deviations (docs/calibration.md); uncalibrated robots if omitted."""
     payload_of: Annotated[AnyWords, tyro.conf.arg(metavar="REC=LABEL...")] = ()
-    """Which payload a recording is of, where it does not say so itself."""
+    """Payload label of a recording, if the recording does not state it."""
     known_mass: Annotated[AnyWords, tyro.conf.arg(metavar="[LABEL=]KG[+-SE]...")] = ()
-    """Weighed payloads: c=10.48+-0.005; 0.1 % if no standard error is given. One decides the springs' common scale."""
+    """Weighed payloads: c=10.48+-0.005; standard error 0.1 % if not given. One fixes the springs' common scale."""
     parallel_flanges: Flag = False
-    """The z axes of all flanges are parallel: decides the zeros of theta_x, and with them the frames of drawings."""
+    """Assume that the z axes of all flanges are parallel; this fixes the zeros of theta_x and the drawing frames."""
     tilt: Flag = False
-    """Bases may not stand level (0.2 deg, if the prior says nothing)."""
+    """Estimate the tilt of each base (standard deviation 0.2 deg unless the prior states one)."""
     arm_masses: Flag = False
-    """Each arm's masses may be off (10 %, if the prior says nothing)."""
+    """Estimate the mass error of each arm (standard deviation 10 % unless the prior states one)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Calibrate(Files, CalibrateOptions):
-    """Find out how every robot differs from its design, from recordings of what the team carries."""
+    """Estimate how every robot differs from its design, from recordings of a team that carries payloads."""
 
     rec: Logs
-    """Recordings (Parquet) of one team that carries payloads, or logs of any format that ``convert`` reads."""
+    """Recordings (Parquet) of one team that carries payloads, or logs in any format that ``convert`` reads."""
     free: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="REC...")] = ()
-    """Recordings of the same robots with nothing in their hands; they tell what the arms weigh."""
+    """Recordings of the same robots without a payload; they determine the weight of the arms."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for calibration.json, report.txt, every robot's numbers and the calibrated team's model."""
+    """Folder for calibration.json, report.txt, the parameters of every robot and the model of the calibrated team."""
     json: Json = None
     pictures: Pictures = False
     strict: Flag = False
-    """Exit with 1 if there are findings that speak against the numbers."""
+    """Exit with 1 if a finding casts doubt on the numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnoseOptions(Options):
-    """How a diagnosis is made, of a team or of one robot of joints."""
+    """Options of the diagnosis of a team or of a single robot."""
 
     map: LogMap = None
     calibration: Calibrated = None
     tolerances: Tolerances = None
     exclude: Annotated[AnyWords, tyro.conf.arg(metavar="CAUSE...")] = ()
-    """Causes not to consider."""
+    """Causes to leave out."""
     closed_loop: bool = True
-    """Run the recorded commands again, without and with what is found."""
+    """Simulate the recorded commands again, without and with the causes found."""
     laws: Literal["auto", "always", "never"] = "auto"
-    """Look for laws that no table lists: where the noise is louder than the sensors', always, or never."""
+    """Search for laws outside the catalogue. auto: only if the noise exceeds that of the sensors."""
     odds: float = ODDS
-    """Odds of any cause being there before the data are seen; more where a fault is suspected."""
+    """Prior odds that a cause is present; raise them if you suspect a fault."""
     whole: bool = False
-    """Search all of a team's long recordings, not a choice of their parts."""
+    """Search long recordings of a team in full instead of selected parts."""
     seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
-    """End after this time with the best verdict so far, as Ctrl-C does."""
+    """Stop after this time [s] with the best verdict so far; Ctrl-C does the same."""
     jobs: Jobs = 1
     scheduler: Scheduler = None
 
     def check(self) -> None:
-        """Raise an InputError for a number that is out of range."""
+        """Raise InputError if a number is out of range."""
         check_range(self, "jobs", 1)
         if not 0.0 < self.odds <= MOST_ODDS:
             raise InputError(f"odds is {self.odds:g}; it must be greater than 0 and at most {MOST_ODDS:g}")
         check_seconds(self.seconds)
 
     def check_for(self, model: object, reference: object) -> None:
-        """Raise an InputError for what a team does not take, or one robot of joints does not."""
+        """Raise InputError for an option that does not apply to a team, or to a single robot."""
         if model is not None:
             refuse_teams(self, ("calibration", "scheduler", "laws", "odds", "whole", "jobs"))
         elif reference:
@@ -286,10 +285,10 @@ class Diagnose(Files, DiagnoseOptions):
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
     rec: Logs
-    """Recordings or logs that ``convert`` reads, all of one payload; with --model, logs of one robot's joints."""
+    """Recordings, or logs that ``convert`` reads, all of one payload; with --model, joint logs of one robot."""
     model: Model = None
     reference: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...")] = ()
-    """With --model: logs of the same robot while it was well; what is off there, too, is no news."""
+    """With --model: logs of the same robot when it was healthy; what deviates there, too, is not counted as a fault."""
     jobs: Jobs = 2
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for diagnosis.json, report.txt, the residuals and the extended model."""
@@ -298,56 +297,56 @@ class Diagnose(Files, DiagnoseOptions):
     strict: Flag = False
     """Exit with 1 if the verdict is neither consistent nor explained."""
     verbose: Flag = False
-    """Print all that report.txt says."""
+    """Print the full text of report.txt."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WatchOptions(Options):
-    """How a first look is taken."""
+    """Options of the first look."""
 
     map: LogMap = None
     jobs: Jobs = 1
 
     def check(self) -> None:
-        """Raise an InputError for a number that is out of range."""
+        """Raise InputError if a number is out of range."""
         check_range(self, "jobs", 1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Watch(Files, WatchOptions):
-    """Look at recordings or logs once, and say what there is: inspect, convert, estimate, calibrate if the robots
-    contradict each other, diagnose, and make a page."""
+    """Analyse recordings or logs in one run: inspect, convert, estimate, calibrate if the robots contradict each
+    other, diagnose, and make a page."""
 
     rec: Logs
-    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload."""
+    """Recordings (Parquet), or logs in any format that ``convert`` reads, all of one payload."""
     jobs: Jobs = 2
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for the page, and for all that it is made of."""
+    """Folder for the page and the results that it shows."""
     open: Flag = False
-    """Open the page in a browser; without --out it is in a temporary folder."""
+    """Open the page in a browser; without --out it goes to a temporary folder."""
     pictures: Pictures = False
     strict: Flag = False
-    """Exit with 1 if there is no estimate, or the verdict is neither consistent nor explained."""
+    """Exit with 1 if there is no estimate, or if the verdict is neither consistent nor explained."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignOptions(Options):
-    """What a campaign consists of, and where it runs."""
+    """Options of a campaign: what it consists of and where it runs."""
 
     payload: str = "a"
-    """Payload configuration, or the path of a payload MJCF."""
+    """Payload configuration, or path of a payload MJCF."""
     trials: Annotated[str, tyro.conf.arg(metavar="KIND,KIND,...")] = "random,random,periodic,static"
-    """Trials of every set."""
+    """Kinds of the trials of every set."""
     vias: int | None = None
-    """Vias of a random trial; 80 if not given."""
+    """Number of vias of a random trial; 80 if omitted."""
     duration_s: float | None = None
-    """Length of a periodic motion [s]; 60 if not given."""
+    """Length of a periodic motion [s]; 60 if omitted."""
     preset: str = "nominal"
-    """Sensors: ideal or nominal."""
+    """Sensor preset: ideal or nominal."""
     background: tuple[Literal["calibrated", "uncalibrated"], ...] = ("calibrated", "uncalibrated")
-    """Robots as designed, or drawn as uncalibrated ones are; within tolerances besides."""
+    """Robots as designed, or with drawn calibration errors; both also deviate within the tolerances."""
     units: Annotated[AnyPath | None, tyro.conf.arg(metavar="TEAM.json")] = None
-    """Your robots, in place of these backgrounds: how each deviates from its design."""
+    """Your own robots instead of these backgrounds: how each deviates from its design."""
     calibration: Annotated[
         AnyPath | None,
         tyro.conf.arg(
@@ -356,26 +355,26 @@ class CampaignOptions(Options):
         ),
     ] = None
     tolerances: Annotated[AnyPath | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """How far a healthy robot may be off: drawn for every team, and known to the diagnosis."""
+    """Tolerances of a healthy robot; deviations are drawn from them for every team, and the diagnosis knows them."""
     exclude: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
-    """Causes that are neither hidden nor considered."""
+    """Causes to neither hide nor consider."""
     causes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
-    """Causes to hide, in turn; the whole catalogue if none is named."""
+    """Causes to hide, in turn; the whole catalogue if none is given."""
     sizes: Annotated[tuple[float, ...], tyro.conf.arg(metavar="TIMES...")] = (1.0, 2.0, 4.0)
-    """Sizes of what is hidden, over the detection limit of the very team, in turn."""
+    """Sizes of the hidden effects, in turn, as multiples of that team's detection limit."""
     teams: int = 2
-    """Teams of each background; a set of each has nothing hidden."""
+    """Teams per background; each also gets one set without a hidden effect."""
     sets: int = 12
-    """Sets of each background with one effect hidden; give more to go on with a campaign."""
+    """Sets per background with one hidden effect; a larger number continues an existing campaign."""
     closed_loop: bool = False
-    """Run the recorded commands of every set again, as `diagnose` does: better, and slower."""
+    """Simulate the recorded commands of every set again, as `diagnose` does; more accurate, but slower."""
     seed: int = 0
-    """Seed of teams, effects, trajectories and noise."""
+    """Random seed of teams, effects, trajectories and noise."""
     jobs: Jobs = 2
     scheduler: Scheduler = None
 
     def check(self) -> None:
-        """Raise an InputError for what cannot be met, but for names of sensors."""
+        """Raise InputError for options that cannot be met; sensor names are checked later."""
         needed = {"vias": ("random",), "duration_s": ("periodic",)}
         check_motion(self, self.kinds, needed)
         for name, least in (("jobs", 1), ("teams", 1), ("sets", 0), ("seed", 0)):
@@ -399,17 +398,17 @@ class CampaignOptions(Options):
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kind of every trial."""
+        """List the kind of every trial."""
         return kinds_of(self.trials, ("random", "periodic", "static"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign(CampaignOptions):
-    """Try your own experiment blind: hide effects in simulated teams, diagnose them, and count what is found, missed
-    and invented. An interrupted campaign goes on in its folder."""
+    """Test your own experiment blind: hide effects in simulated teams, diagnose them, and count what is found, missed
+    and invented. An interrupted campaign resumes in its folder."""
 
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
-    """Folder for the results of all sets, campaign.json, sets.csv and report.txt."""
+    """Folder for campaign.json, sets.csv, report.txt and the results of all sets."""
     json: Json = None
     pictures: Pictures = False
     force: Force = False
@@ -417,61 +416,61 @@ class Campaign(CampaignOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class ConvertOptions(Options):
-    """How a log becomes a recording."""
+    """Options of the conversion of a log to a recording."""
 
     map: LogMap = None
     trial: TrialKind | None = None
-    """Kind of trial, if neither log nor map says; "random" else. "free": robots that hold nothing."""
+    """Kind of trial; if omitted, that of the log or the map, else "random". "free": the robots hold nothing."""
     payload: str | None = None
-    """Name of the payload."""
+    """Label of the payload."""
     design: Annotated[AnyPath | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Numbers of the robots, if not the log's own or those of the Omnid."""
+    """Design parameters of the robots; if omitted, those of the log, else of the Omnid."""
     level: Literal["joint", "wrist"] | None = None
-    """What to write: driven angles and torques, or wrist positions and forces; that of the log if not given."""
+    """Signals to write: driven angles and torques, or wrist positions and forces; if omitted, those of the log."""
     clock: Literal["keep", "correct"] = "keep"
-    """Believe the robots' stamps, or take out what their clocks differ by. It is estimated and reported either way."""
+    """Keep the robots' time stamps, or correct the offsets between their clocks; both report the offsets."""
     rate_hz: Annotated[float, tyro.conf.arg(metavar="HZ")] = 100.0
-    """Rate of the recording [Hz]."""
+    """Sample rate of the recording [Hz]."""
     max_gap_s: Annotated[float, tyro.conf.arg(metavar="S")] = 0.08
-    """Longest time without samples that is filled in [s]."""
+    """Longest gap between samples to fill [s]."""
     crop: Annotated[str | None, tyro.conf.arg(metavar="FROM:TO")] = None
-    """Keep a part of the log only, in seconds from its start: 12:95, 12: or :95."""
+    """Keep only a part of the log, in seconds from its start: 12:95, 12: or :95."""
     drop: Annotated[AnyWords, tyro.conf.UseAppendAction, tyro.conf.arg(metavar="robot=N:FROM-TO")] = ()
-    """Leave out samples of one robot, in seconds from the log's start: robot=2:30-31. May be given several times."""
+    """Leave out samples of one robot, in seconds from the log's start: robot=2:30-31."""
     episode: Episode = None
 
     def check(self) -> None:
-        """Raise an InputError for a number that is out of range."""
+        """Raise InputError if a number is out of range."""
         check_range(self, "rate_hz", SLOWEST_HZ, FASTEST_HZ)
         check_range(self, "max_gap_s", 0.0, LONGEST_GAP_S)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Convert(Files, ConvertOptions):
-    """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
+    """Convert a log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these formats."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
     """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz, .mat or .parquet file, or a LeRobot dataset."""
     out: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="OUT")]
-    """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a new rosbag2 folder if it has no suffix."""
+    """File to write: .parquet, .csv, .npz, .mcap or .db3; without a suffix, a new rosbag2 folder."""
     split_at_gaps: Flag = False
-    """Make a recording of every part between gaps too long to be filled: OUT-1, OUT-2, ..."""
+    """Write one recording per part between gaps that are too long to fill: OUT-1, OUT-2, ..."""
     json: Json = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapOptions(Options):
-    """How a map is drafted."""
+    """Options of the draft of a map."""
 
     episode: Episode = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Map(Files, MapOptions):
-    """Draft the map of a log, for `convert --map`: what is which channel, by names, the units in them, and values."""
+    """Draft the map of a log for `convert --map`: match columns to channels by their names, units and values."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """Log of any format that ``convert`` reads."""
+    """Log in any format that ``convert`` reads."""
     model: Model = None
     out: Annotated[Path | None, tyro.conf.arg(metavar="MAP.toml")] = None
     """Write the draft to a file instead of the terminal."""
@@ -479,56 +478,56 @@ class Map(Files, MapOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class InspectOptions(Options):
-    """How a log is looked at."""
+    """Options of the inspection of a log."""
 
     map: LogMap = None
     design: Annotated[AnyPath | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Numbers of the robots, where the log does not say; the Omnid's if not given."""
+    """Design parameters of the robots, used if the log has none; if omitted, those of the Omnid."""
     calibration: Calibrated = None
     episode: Episode = None
 
     def check_for(self, model: object) -> None:
-        """Raise an InputError for what one robot of joints does not take."""
+        """Raise InputError for an option that does not apply to a single robot."""
         if model is not None:
             refuse_teams(self, ("design", "calibration"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Inspect(Files, InspectOptions):
-    """Look at a log before anyone trusts a number of it: stamps, channels, clocks, wiring, excitation."""
+    """Check a log before you trust its numbers: time stamps, channels, clocks, wiring, excitation."""
 
     rec: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
-    """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
+    """Recording, or log in any format that ``convert`` reads; damaged files are accepted."""
     model: Model = None
     json: Json = None
     strict: Flag = False
-    """Exit with 1 if the log is ready for nothing."""
+    """Exit with 1 if no command can use the log."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Paper(Options):
-    """Run the paper's experiment and print Tables II-V, published figures beside ours."""
+    """Run the paper's experiment and print Tables II-V with the published numbers beside ours."""
 
     payload: tuple[str, ...] = ("a", "b", "c", "d")
     """Payload configurations."""
     preset: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")
     """Sensor presets."""
     trials: int = 6
-    """Random trials per payload; half as many are periodic."""
+    """Random trials per payload; half as many periodic trials are added."""
     seed: int = 0
-    """Seed of trajectories, noise and calibration errors."""
+    """Random seed of trajectories, noise and calibration errors."""
     staged_only: bool = False
-    """The paper's own method alone, without the calibrations and fits beside it."""
+    """Run only the paper's own method, without the additional calibrations and fits."""
     jobs: Jobs = 2
     scheduler: Scheduler = None
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for paper.json, tables.txt, the estimates and plots; a run that was interrupted goes on there."""
+    """Folder for paper.json, tables.txt, the estimates and plots; an interrupted run resumes there."""
     force: Force = False
     recordings: bool = False
-    """Write the recordings, too (needs --out)."""
+    """Also write the recordings (needs --out)."""
 
     def check(self) -> None:
-        """Raise an InputError for a payload that does not exist, or a number that is out of range."""
+        """Raise InputError if a payload does not exist or a number is out of range."""
         for payload in self.payload:
             payload_path(payload)
         check_range(self, "jobs", 1)
@@ -536,24 +535,23 @@ class Paper(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Files):
-    """Make one HTML page of a result folder (`paper`, `estimate`, `calibrate`, `diagnose`, `campaign`): tables, plots,
-    provenance."""
+    """Make one HTML page with tables, plots and provenance from a result folder (`paper`, `estimate`, `calibrate`,
+    `diagnose`, `campaign`)."""
 
     dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """Folder of `mocobot paper`, `calibrate`, `diagnose` or `campaign --out`, or one with files of `mocobot estimate
-    --out`."""
+    """Folder that one of these commands wrote with --out; for estimates, the folder that holds their files."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
-    """Page to write; DIR/report.html if not given."""
+    """Page to write; DIR/report.html if omitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compare:
-    """Compare two estimates, calibrations or diagnoses: what changed beyond its errors."""
+    """Compare two estimates, calibrations or diagnoses, and report what changed by more than its standard errors."""
 
     a: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="A")]
     """JSON file of an estimate, calibration or diagnosis, or the folder that holds it."""
     b: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="B")]
-    """Another one of the same kind."""
+    """Second result, of the same kind as A."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for comparison.json, report.txt and comparison.png."""
     json: Json = None
@@ -564,47 +562,46 @@ class Compare:
 
 @dataclass(frozen=True, kw_only=True)
 class Effects:
-    """List the physical effects that `simulate --effect` hides in a team: parameters, units and ranges."""
+    """List the physical effects that `simulate --effect` can hide in a team: parameters, units and ranges."""
 
     name: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME...")] = ()
-    """Effects to list; all if none is named."""
+    """Effects to list; all if omitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SimulateOptions(Options):
-    """How trials are simulated."""
+    """Options of the simulation of trials."""
 
     effects: Annotated[
         AnyWords, tyro.conf.UseAppendAction, tyro.conf.arg(name="effect", metavar="NAME:KEY=VALUE,...")
     ] = ()
-    """Effect to hide in the team: joint_friction:robot=2,joint=1,coulomb=0.05. May be given several times; `mocobot
-    effects` lists them."""
+    """Effect to hide in the team; `mocobot effects` lists all. Example: joint_friction:robot=2,joint=1,coulomb=0.05."""
     units: Annotated[AnyPath | None, tyro.conf.arg(metavar="TEAM.json")] = None
-    """How every robot deviates from its design, such as the truth of another trial; needs calibrated sensors."""
+    """Deviations of every robot from its design, for example the truth of another trial; needs calibrated sensors."""
     model: Annotated[AnyPath | None, tyro.conf.arg(metavar="DIR")] = None
-    """Extended model to simulate in place of a payload on robots as designed."""
+    """Extended model to simulate instead of a payload on robots as designed."""
     vias: int | None = None
-    """Vias of a random trial, or of a free one's fast part; 80 if not given."""
+    """Number of vias of a random trial, or of the fast part of a free trial; 80 if omitted."""
     duration_s: float | None = None
-    """Length of a periodic motion [s]; 60 if not given."""
+    """Length of a periodic motion [s]; 60 if omitted."""
     preset: AnyName = "nominal"
-    """Sensors: ideal, nominal or uncalibrated."""
+    """Sensor preset: ideal, nominal or uncalibrated."""
     seed: int = 0
-    """Seed of trajectory, noise and calibration errors."""
+    """Random seed of trajectory, noise and calibration errors."""
     level: Literal["joint", "wrist"] = "joint"
-    """What the file holds: driven angles and spring torques, or wrist positions and forces."""
+    """Signals in the file: driven angles and spring torques, or wrist positions and forces."""
     robots: int | None = None
-    """Robots of a free trial; as many as the payload has grasps if not given."""
+    """Number of robots of a free trial; if omitted, the number of grasps of the payload."""
 
     def check(self) -> None:
-        """Raise an InputError for options that exclude each other, or an effect of no known name."""
+        """Raise InputError if options exclude each other or an effect does not exist."""
         refuse_both(self, "units", "model", "the model has robots of its own, so leave one out")
         for effect in self.effects:
             if isinstance(effect, str):
                 check_effect_name(effect.partition(":")[0])
 
     def check_for(self, payload: object, kinds: Sequence[str]) -> None:
-        """Raise an InputError for what says nothing about these trials, or about this payload."""
+        """Raise InputError for an option that does not apply to these trials or to this payload."""
         needed = {"vias": ("random", "free"), "duration_s": ("periodic",), "robots": ("free",)}
         check_motion(self, kinds, needed)
         if payload is None:
@@ -619,45 +616,45 @@ class SimulateOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class Simulate(SimulateOptions):
-    """Simulate one trial, or several of one team, and write recordings with the ground truth in sidecars."""
+    """Simulate one or several trials of a team; write recordings, and the ground truth in a separate file beside."""
 
     out: Annotated[Path | None, tyro.conf.arg(metavar="REC.parquet|DIR")] = None
-    """Recording to write, the truth beside it as REC.truth.json; with --trials a folder: trial1_random.parquet, ...,
-    each with its truth."""
+    """Recording to write, with the truth beside it as REC.truth.json; with --trials, a folder of such files, named
+    trial1_random.parquet and so on."""
     trials: Annotated[str | None, tyro.conf.arg(metavar="KIND,KIND,...")] = None
-    """Several trials of one team: random,random,periodic,static."""
+    """Simulate several trials of one team, such as random,random,periodic,static."""
     trajectory: TrialKind = "random"
-    """Kind of motion; free: every arm alone, holding nothing."""
+    """Kind of motion; free: every arm moves alone and holds nothing."""
     payload: str | None = None
-    """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if neither
-    this nor a model is given."""
+    """Payload configuration, or path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if omitted,
+    unless a model is given."""
     force: Force = False
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kind of every trial."""
+        """List the kind of every trial."""
         return (self.trajectory,) if self.trials is None else kinds_of(self.trials, get_args(TrialKind))
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayOptions(Options):
-    """What a replay shows."""
+    """Options of a replay."""
 
     map: LogMap = None
     estimate: Annotated[AnyPath | None, tyro.conf.arg(metavar="EST.json")] = None
-    """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
+    """Estimate to show, written by `mocobot estimate --out`; if omitted, an estimate is made from each recording."""
     calibration: Calibrated = None
     truth: AnyFlag = False
-    """Show the truth beside each recording, too (REC.truth.json)."""
+    """Also show the truth that is stored beside each recording (REC.truth.json)."""
     diagnosis: Annotated[AnyPath | None, tyro.conf.arg(metavar="DIR")] = None
-    """Mark what a diagnosis names, as `mocobot diagnose --out` writes it."""
+    """Mark the causes of a diagnosis, written by `mocobot diagnose --out`."""
     payload: Annotated[AnyName | None, tyro.conf.arg(metavar="NAME|FILE.xml")] = None
-    """Geometry of the payload; that of the recording's label, or bars between the grasps, if not given."""
+    """Geometry of the payload; if omitted, that of the recording's label, or bars between the grasps."""
     web: bool = False
-    """Serve to a browser instead of opening the viewer."""
+    """Serve the replay to a browser instead of opening the viewer."""
 
     def check_for(self, path: object, model: object) -> None:
-        """Raise an InputError for what excludes each other, or one robot of joints does not take."""
+        """Raise InputError if options exclude each other or do not apply to a single robot."""
         if path is not None and self.web:
             raise InputError("out and web are both given; choose a file or a browser")
         if model is not None:
@@ -668,10 +665,10 @@ class ReplayOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class Replay(Files, ReplayOptions):
-    """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
+    """Watch recordings in Rerun: the scene in motion by the measured angles, estimate and truth, all signals."""
 
     rec: Logs
-    """Recordings (Parquet); several are shown side by side. Logs of a robot's joints with --model."""
+    """Recordings (Parquet), shown side by side; with --model, joint logs of one robot."""
     model: Model = None
     out: Annotated[Path | None, tyro.conf.arg(metavar="OUT.rrd")] = None
     """Write a file for the Rerun viewer instead of opening it."""
@@ -684,4 +681,4 @@ OLD_NAMES = {
     "out-dir": "out",
     "save": "out",
 }
-"""Earlier spellings of options, which commands still take where they have the newer one."""
+"""Earlier names of options, which commands that have the new option still accept."""

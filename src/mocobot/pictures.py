@@ -1,4 +1,4 @@
-"""Pictures without a screen: teams at rest, teams as estimated, and models in any state."""
+"""Off-screen pictures of teams at rest, of estimated teams, and of models in any state."""
 
 from estimator.files import make_folder
 from mocobot_view.camera import Camera, Marks

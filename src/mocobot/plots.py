@@ -1,4 +1,4 @@
-"""Pictures of campaigns and of comparisons."""
+"""Draw pictures of campaigns and comparisons."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,16 +17,16 @@ from mocobot_sim.plots_plain import plain_numbers, plain_words
 Json = Mapping[str, Any]
 COLOURS = {"calibrated": LIGHT["after"], "uncalibrated": LIGHT["before"], "units": LIGHT["after"]}
 APART = 1.03
-"""By how much a background's points are moved to the right, so that bars do not hide each other."""
+"""Factor by which the points of each further background are shifted to the right, so that bars do not overlap."""
 MARKERS = {"calibrated": "o", "uncalibrated": "s", "units": "o"}
 
 
 @plain_words()
 def save_campaign(summary: Json, folder: Path) -> list[Path]:
-    """Draw what there is something to draw of, and say where.
+    """Draw the pictures for which the summary has data, and return their paths.
 
     Args:
-        summary: of a campaign.
+        summary: summary of a campaign (``mocobot.campaign.summary``).
         folder: existing folder for ``limits.png``, ``found.png``, ``confusion.png`` and ``reliability.png``.
     """
     out = []
@@ -57,7 +57,7 @@ def _picture(path: Path, size: tuple[float, float], draw: Callable[[Axes], None]
 
 
 def _limit_rows(summary: Json) -> list[tuple[str, str]]:
-    """Cause and parameter, each once."""
+    """List every pair of cause and parameter once."""
     pairs = ((entry["cause"], name) for entry in summary["limits"] for name in entry["parameters"])
     return list(dict.fromkeys(pairs))
 
@@ -144,12 +144,12 @@ def _reliable(axis: Axes, summary: Json) -> None:
 
 
 FARTHEST = 30.0
-"""Standard errors at which the picture ends; what is farther off is drawn there as an arrow. Chosen."""
+"""Largest difference in the picture [standard errors]; arrows mark larger ones. Chosen."""
 
 
 @plain_words()
 def save_comparison(found: Any, path: Path) -> None:
-    """Draw a row for each number, with a band of two standard errors; changed groups are in another colour."""
+    """Draw one row per number, with a band of two standard errors; changed groups have another colour."""
     rows = [(group, k) for group in found.groups for k in range(len(group.entries))]
     figure = Figure(figsize=(9.0, 1.4 + 0.22 * len(rows)), layout="constrained")
     FigureCanvasAgg(figure)

@@ -1,4 +1,4 @@
-"""Progress bars on standard error."""
+"""Show progress bars on standard error."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -8,11 +8,13 @@ from tqdm import tqdm
 
 @contextmanager
 def bar(total: int | None, what: str, unit: str) -> Iterator[Callable[[int], object]]:
-    """Show a bar while the block runs, on terminals only; yields a function that takes the progress made.
+    """Show a progress bar while the block runs, on terminals only.
+
+    Yields a function that takes the number of units done since its last call.
 
     Args:
-        total: how many units there are, or None where unknown.
-        what: what is being done.
+        total: number of units, or None if unknown.
+        what: name of the work.
         unit: name of one unit.
     """
     with tqdm(total=total, desc=what, unit=unit, dynamic_ncols=True, leave=False, disable=None) as shown:
@@ -21,16 +23,16 @@ def bar(total: int | None, what: str, unit: str) -> Iterator[Callable[[int], obj
 
 @contextmanager
 def share_bar(what: str, unit: str) -> Iterator[Callable[[float, float, str], object]]:
-    """Show a bar of work whose amount shows when it begins, on terminals only.
+    """Show a progress bar for work whose amount is known only once it runs, on terminals only.
 
-    Yields a function that takes what is done, what there is to do, and a name for the stage that runs.
+    Yields a function that takes the amount done, the total amount and the name of the current stage.
 
     Args:
-        what: what is being done.
-        unit: of the work.
+        what: name of the work.
+        unit: unit of the amounts.
     """
     form = "{desc}: {percentage:3.0f}%|{bar}| {n:.1f} of {total:g} " + unit + " [{elapsed}<{remaining}]"
-    # Little smoothing: the time per unit is much the same all along, while what is done arrives in bursts.
+    # Little smoothing, because progress arrives in bursts while the time per unit hardly changes.
     with tqdm(
         desc=what, bar_format="{desc}", dynamic_ncols=True, smoothing=0.05, leave=False, disable=None
     ) as shown:
@@ -45,9 +47,9 @@ def share_bar(what: str, unit: str) -> Iterator[Callable[[float, float, str], ob
 
 @contextmanager
 def stages() -> Iterator[tuple[Callable[[str], object], Callable[[int], object]]]:
-    """Show a bar of work whose length nobody knows, on terminals only.
+    """Show a progress bar for work of unknown length, on terminals only.
 
-    Yields a function that takes the name of the stage that begins, and one that takes the progress made.
+    Yields two functions: one takes the name of the stage that begins, the other the number of steps done.
     """
     with tqdm(desc="start", unit="step", dynamic_ncols=True, leave=False, disable=None) as shown:
 

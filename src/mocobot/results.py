@@ -1,17 +1,17 @@
-"""Results: the same data as the packages below make, with text and files, and where each comes from.
+"""Base classes of results, which add text and files to the data of the other packages, and their provenance.
 
-Provenance, in every result's file or in provenance.json of a folder:
+Keys of the provenance, in the file of every result or in provenance.json of its folder:
 
 mocobot, python           versions
-commit                    of the checkout that the package runs from, "+changed" behind it where sources differ from the
-                          commit; null for an installed package
+commit                    commit of the checkout that the package runs from, followed by "+changed" if its sources were
+                          edited; null for an installed package
 platform                  system, machine and C library
 packages                  {name: version} of the libraries that the numbers depend on
-command                   such as "estimate"
-options                   {name: value}: everything the result depends on, defaults included
-files                     list of {name, path, bytes, sha256}: inputs, the path as the user gave it
+command                   name of the command, such as "estimate"
+options                   {name: value}: all options that affect the result, including defaults
+files                     list of {name, path, bytes, sha256}: inputs, with the path as the user gave it
 
-Nothing in it depends on when, where or by whom the command was run, so the same inputs give the same bytes.
+Nothing depends on the time, place or user of the run, so the same inputs give the same bytes.
 """
 
 import hashlib
@@ -31,42 +31,41 @@ from mocobot.checks import check_folder
 from mocobot_sim.scene.models import models_dir
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
-"""Libraries that a result's numbers pass through."""
+"""Libraries that can affect the numbers of a result."""
 NO_MATTER = ("out", "json", "pictures", "force", "strict", "jobs", "scheduler", "rec")
-"""Options that are not listed: results do not depend on where they go, on what they replace, on the exit code or on the
-number of processes, and recordings are listed as files."""
+"""Options that the provenance omits, because the result does not depend on them; recordings are listed as files."""
 FORMAT, VERSION, NAME = "mocobot-provenance", 1, "provenance.json"
 SOURCES = ("src", "models", "pyproject.toml")
 CODE = ("discrepancy", "estimator", "mocobot", "mocobot_logs", "mocobot_sim")
-"""Packages that outcomes come from."""
+"""Packages of this project that can affect a result."""
 GIT_S = 20.0
 Kind = TypeVar("Kind")
 
 
 def public(kind: type[Kind], below: Any, **more: Any) -> Kind:
-    """A result of a package below as a subclass of its dataclass."""
+    """Convert a result of another package into ``kind``, a subclass of its dataclass, with further fields ``more``."""
     return kind(**{field.name: getattr(below, field.name) for field in fields(below)} | more)
 
 
 class Folder:
-    """A result that fills a folder: ``write_into`` of its class writes all into an existing one."""
+    """Base class of results that are written as a folder; subclasses implement ``write_into``."""
 
     result: ClassVar[str]
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys."""
+        """Return the result as strict JSON values, with units in the keys."""
         raise NotImplementedError
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> object:
-        """Write everything into an existing folder, with further keys in the JSON."""
+        """Write all files into an existing folder; ``more`` are further keys of the JSON."""
         raise NotImplementedError
 
     def write(self, folder: Path | str, *, pictures: bool = True) -> None:
-        """Write a folder, which ``mocobot report`` makes a page of; an earlier result of the kind is replaced.
+        """Write the result as a folder, from which ``mocobot report`` makes a page.
 
         Args:
-            folder: to be created or replaced.
-            pictures: whether pictures are drawn, too.
+            folder: folder to create, or an earlier result of the same kind to replace.
+            pictures: whether to draw pictures.
 
         Raises:
             InputError: the folder holds something else, or cannot be written.
@@ -77,12 +76,12 @@ class Folder:
 
 
 def provenance(command: str, options: Any, inputs: Sequence[Path] = ()) -> dict[str, Any]:
-    """Say what a result was made with and from, as plain JSON values with the keys documented above.
+    """Return the provenance of a result as plain JSON values; the module's docstring lists the keys.
 
     Args:
         command: name of the command.
-        options: its dataclass, or values by name; paths and tuples become strings and lists.
-        inputs: files the result was made from, or folders of such files.
+        options: dataclass of options, or values by name; paths and tuples become strings and lists.
+        inputs: input files, or folders of such files.
 
     Raises:
         InputError: an input cannot be read.
@@ -102,13 +101,12 @@ def provenance(command: str, options: Any, inputs: Sequence[Path] = ()) -> dict[
 
 
 def folder_provenance(made_with: Mapping[str, Any], folder: Path, written: Iterable[Path]) -> dict[str, Any]:
-    """The content of a result folder's ``provenance.json``.
+    """Return the content of ``provenance.json`` of a result folder.
 
     Args:
-        made_with: what ``provenance`` says.
-        folder: that of the result.
-        written: files of this result inside it; they are listed under ``written`` like ``files``, with paths from the
-            folder on.
+        made_with: return value of ``provenance``.
+        folder: folder of the result.
+        written: files of the result in that folder; ``written`` lists them like ``files``, with relative paths.
 
     Raises:
         InputError: a file cannot be read.
@@ -119,12 +117,12 @@ def folder_provenance(made_with: Mapping[str, Any], folder: Path, written: Itera
 
 
 def _files(path: Path) -> list[Path]:
-    """A file, or all files of a folder."""
+    """List a file itself, or all files of a folder."""
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
 def version_of(package: str) -> str | None:
-    """Version of an installed package, or None."""
+    """Version of a package, or None if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -132,7 +130,7 @@ def version_of(package: str) -> str | None:
 
 
 def commit_of(root: Path) -> str | None:
-    """Commit of the checkout at ``root``, or None where that is not the top of one."""
+    """Commit of the git checkout at ``root``; None if ``root`` is not the top folder of one."""
     if not (root / "src" / "mocobot" / Path(__file__).name).is_file():
         return None
     top, head = _git(root, "rev-parse", "--show-toplevel"), _git(root, "rev-parse", "HEAD")
@@ -143,7 +141,7 @@ def commit_of(root: Path) -> str | None:
 
 
 def _git(root: Path, *arguments: str) -> str | None:
-    """Output of git, or None where it fails; it must not take locks, nor look where a hook's variables point."""
+    """Run git and return its output, or None on failure; without locks or the variables of a git hook."""
     env = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     try:
         done = subprocess.run(
@@ -156,7 +154,7 @@ def _git(root: Path, *arguments: str) -> str | None:
 
 
 def _plain(value: Any) -> Any:
-    """Plain JSON of an option."""
+    """Convert the value of an option to plain JSON."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -166,7 +164,7 @@ def _plain(value: Any) -> Any:
 
 @cache
 def code_digest() -> str:
-    """SHA-256 of the code and the models that outcomes come from."""
+    """SHA-256 of the code and the models that can affect a result."""
     top, found = Path(__file__).resolve().parents[1], hashlib.sha256()
     sources = [path for name in CODE for path in sorted((top / name).rglob("*.py"))]
     models = sorted(path for path in models_dir().rglob("*") if path.suffix in (".xml", ".toml"))
@@ -177,7 +175,7 @@ def code_digest() -> str:
 
 
 def run_key(options: Mapping[str, Any]) -> str:
-    """Sixteen digits that stand for options, code, models and versions: a run may go on with outcomes of the same."""
+    """Hash options, code, models and versions to 16 digits; a run may reuse partial results with the same key."""
     versions = {name: version_of(name) for name in PACKAGES}
     words = json.dumps([dict(options), versions, code_digest()], sort_keys=True, default=str)
     return hashlib.sha256(words.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""The robots: design numbers, kinematics of the arm, deviations from the design, control gains."""
+"""The robots: design parameters, arm kinematics, deviations from the design, control gains."""
 
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
 from estimator.arm.design import OmnidDesign

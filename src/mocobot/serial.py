@@ -1,4 +1,4 @@
-"""Any robot in MJCF or URDF: the calls of ``mocobot`` that take a model, with the model where scripts have it."""
+"""Calls for a single robot in MJCF or URDF."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["JointInspection", "JointLog", "SerialModel", "diagnose", "inspect", 
 
 
 def inspect(log: Path | str, model: GivenModel, **options: Any) -> JointInspection:
-    """``mocobot.inspect`` with a model."""
+    """Inspect a joint log of one robot; see ``mocobot.inspect``."""
     found = _inspect(log, model, **options)
     assert isinstance(found, JointInspection)
     return found
@@ -27,5 +27,5 @@ def inspect(log: Path | str, model: GivenModel, **options: Any) -> JointInspecti
 def diagnose(
     model: GivenModel, logs: GivenLogs, *, reference: GivenLogs | Iterable[Any] = (), **options: Any
 ) -> Diagnosis:
-    """``mocobot.diagnose`` with a model."""
+    """Diagnose joint logs of one robot; see ``mocobot.diagnose``."""
     return _diagnose(logs, model, reference, **options)

@@ -1,4 +1,4 @@
-"""One HTML page of a result folder: what it is made of, and what it is called."""
+"""Make one HTML page from a result folder; this module has the names of its files."""
 
 from pathlib import Path
 
@@ -14,10 +14,10 @@ SOUGHT = (
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse what is no folder.
+    """Check that a folder exists.
 
     Raises:
-        InputError: there is none, or it is a file.
+        InputError: the path does not exist or is a file.
     """
     with system_errors(folder, "read"):
         if not folder.exists():

@@ -1,4 +1,4 @@
-"""One calibration: whether to trust it, the robots as they are, what was carried, what stays open."""
+"""Report of a calibration: trustworthiness, robots, payloads, recordings and open questions."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +21,7 @@ FITS = (
     Key("after", "calibrated", "after", "square"),
     Key("held_out", "left out", "c1", "diamond"),
 )
-"""Fits of a recording, by the attribute of ``CalibratedTrial``."""
+"""Legend of a recording's fits; the group of each entry is an attribute of ``CalibratedTrial``."""
 NOISE = Key("", "noise alone", "text", "dash")
 ASSUMED = Key("", "as assumed beforehand", "text", "dash")
 COLOURS = ("r1", "r2", "r3", "r4", "r5", "r6")
@@ -29,7 +29,7 @@ APART = 0.2
 
 
 def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
-    """Data of ``assets/calibration.html``."""
+    """Return the data of ``assets/calibration.html``."""
     say("calibration")
     c: Calibration = result.found
     return {
@@ -65,7 +65,7 @@ def _tiles(c: Calibration) -> list[tuple[str, str, str]]:
 
 
 def deviation_tables(calibration: Calibration) -> list[Markup]:
-    """One table per robot: legs, or axes, side by side, and what was assumed beforehand."""
+    """Make one table of deviations per robot, with legs or axes side by side and the prior standard deviations."""
     out = []
     for robot in range(calibration.robots):
         rows: list[list[Entry]] = []
@@ -94,7 +94,7 @@ def deviation_tables(calibration: Calibration) -> list[Markup]:
 
 
 def payload_table(calibration: Calibration) -> Markup:
-    """Mass, centre of mass, principal moments and grasps of every payload."""
+    """Tabulate mass, centre of mass, principal moments and grasps of every payload."""
     found = [carried(payload, calibration.scale_sd) for payload in calibration.payloads]
     rows: list[list[Entry]] = [["mass", "kg", *(measurement(f.mass_kg, f.mass_se_kg) for f in found)]]
     rows += vector("p_1c", "mm", [(f.p_1c, f.p_1c_se_m) for f in found], 1e3)
@@ -112,7 +112,7 @@ def payload_table(calibration: Calibration) -> Markup:
 
 
 def trial_table(calibration: Calibration) -> Markup:
-    """chi²/n of loops and balance of every recording: as designed, calibrated, left out."""
+    """Tabulate chi²/n of loops and balance of every recording: as designed, calibrated, and left out of the fit."""
     names = short_names([trial.name for trial in calibration.trials])
     rows: list[list[Entry]] = []
     for name, trial in zip(names, calibration.trials, strict=True):
@@ -129,7 +129,7 @@ def trial_table(calibration: Calibration) -> Markup:
 
 
 class Deviation(NamedTuple):
-    """One deviation of one robot that is not held: its row in a chart, and what it is."""
+    """One estimated deviation of a robot, with its row in a chart."""
 
     row: int
     name: str
@@ -146,7 +146,7 @@ def _deviations(calibration: Calibration, robot: int) -> Iterator[Deviation]:
         columns = (calibration.units.x[robot, at], calibration.sd[robot, at], calibration.prior_sd[robot, at])
         for entry, value, se, prior in zip(group.entries, *columns, strict=True):
             if se > 0:
-                # A zero of theta_x has no prior in the fit itself; parallel flanges take that of the other encoders.
+                # Zeros of theta_x have no prior in the fit; with parallel flanges, use that of the other encoders.
                 known = float(prior) or calibration.prior.encoder_zero_rad
                 name, numbers = f"{shown.name} {entry}", (float(value), float(se), known)
                 yield Deviation(row, name, shown.unit, shown.scale, *numbers)
@@ -156,7 +156,7 @@ Of = Callable[[Deviation], tuple[float, float, str]]
 
 
 def _of_robots(c: Calibration, words: Sequence[str], across: Axis, rules: Sequence[float], of: Of) -> Chart:
-    """A row for each kind of deviation with a dot for each of every robot; ``of`` gives x, half a bar, and a text."""
+    """Plot one row per kind of deviation with a dot per deviation; ``of`` returns x, half a bar and a text."""
     names, data = kind_names([group.name for group in shown_groups(c)]), []
     keys = [Key(f"r{k + 1}", f"robot {k + 1}", COLOURS[k % len(COLOURS)], "circle") for k in range(c.robots)]
     for robot, key in enumerate(keys):
@@ -173,7 +173,7 @@ def _of_robots(c: Calibration, words: Sequence[str], across: Axis, rules: Sequen
 
 
 def _deviation_chart(c: Calibration) -> Chart:
-    """Every deviation in prior standard deviations, with bars of two standard errors."""
+    """Plot every deviation in prior standard deviations, with bars of two standard errors."""
     every = [d.value / d.prior for robot in range(c.robots) for d in _deviations(c, robot)]
     most = 1.08 * max([2.0, *map(abs, every)])
     across = axis("deviation over prior sd", range=[-most, most], zerolinewidth=1.5)
@@ -186,7 +186,7 @@ def _deviation_chart(c: Calibration) -> Chart:
 
 
 def _certainty_chart(c: Calibration) -> Chart:
-    """Standard errors over prior standard deviations."""
+    """Plot standard errors over prior standard deviations."""
     every = [d.se / d.prior for robot in range(c.robots) for d in _deviations(c, robot)]
     across = log_axis("standard error over prior sd", [1.0, *every])
     label = "Standard error of every deviation over its prior standard deviation; at 1 the data said nothing."
@@ -198,13 +198,13 @@ def _certainty_chart(c: Calibration) -> Chart:
 
 
 def fits_of(calibration: Calibration, kind: int, key: Key) -> list[tuple[int, float]]:
-    """Number and chi²/n of every recording that has loops (kind 0), or balance (1), by one of ``FITS``."""
+    """Return index and chi²/n of every recording with loop rows (kind 0) or balance rows (kind 1), for one fit."""
     pairs = [getattr(trial, key.group) if trial.count[kind] else None for trial in calibration.trials]
     return [(k, pair[kind]) for k, pair in enumerate(pairs) if pair is not None]
 
 
 def _fit_charts(calibration: Calibration) -> list[Chart]:
-    """chi²/n of every recording: loops, balance."""
+    """Plot chi²/n of every recording, for loops and for balance."""
     short = short_names([trial.name for trial in calibration.trials])
     charts = []
     titles = ("Loops: where robots have each other's grasps", "Balance: wrenches and motion")
@@ -224,7 +224,7 @@ def _fit_charts(calibration: Calibration) -> list[Chart]:
 
 
 def _share_chart(calibration: Calibration) -> Chart | None:
-    """What every recording contributes to what is known of each kind of parameter."""
+    """Plot the share of every recording in the information on each kind of parameter."""
     kinds, series = shares_of(calibration)
     if not series:
         return None
@@ -249,9 +249,9 @@ def _share_chart(calibration: Calibration) -> Chart | None:
 
 
 def shares_of(calibration: Calibration) -> tuple[list[str], list[tuple[str, list[float]]]]:
-    """Kinds of parameters, and every recording's name with its share in what is known of each kind."""
+    """Return the kinds of parameters, and every recording's name with its share of the information on each kind."""
     trials = [trial for trial in calibration.trials if trial.shares]
-    # Where all arms are alike, masses but for one of them stand for nothing of their own.
+    # Hide the masses that ``shown_groups`` omits: with equal arms, only one of them is independent.
     shown = {group.name for group in shown_groups(calibration)}
     hidden = {*MASSES, "tilt"} - shown
     kinds = [kind for kind in (trials[0].shares if trials else {}) if kind not in hidden]
@@ -261,7 +261,7 @@ def shares_of(calibration: Calibration) -> tuple[list[str], list[tuple[str, list
 
 
 def kind_names(kinds: list[str]) -> list[str]:
-    """Deviations, grasps and inertial parameters in words."""
+    """Return the names of kinds of parameters in words."""
     from estimator.calibrate.calibration import GRASPS, INERTIAL
 
     names = {GRASPS: "grasps", INERTIAL: "mass, centre of mass, inertia"}

@@ -1,4 +1,4 @@
-"""A blind campaign: its summary (``campaign.json``) as sentences, tables and plots, for text and page."""
+"""Sentences, tables and plots from the summary of a blind campaign (``campaign.json``), for text and page."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -13,14 +13,14 @@ BACKGROUNDS = {
     "uncalibrated": ("Uncalibrated robots", "before", "square"),
     "units": ("The given robots", "after", "circle"),
 }
-"""What robots they are, their colour and marker."""
+"""Name, colour and marker of each kind of robots."""
 APART = 1.03
-"""By how much a background's points are moved to the right, so that bars do not hide each other."""
+"""Factor by which the points of each further background are shifted to the right, so that bars do not overlap."""
 Json = Mapping[str, Any]
 
 
 def sentences(summary: Json) -> list[str]:
-    """The answer."""
+    """Summarise the campaign in sentences."""
     sets = summary["sets"]
     out = [
         f"{sets['diagnosed']} sets diagnosed, of {sets['clean']} in which nothing was hidden and {sets['hidden']} in "
@@ -45,12 +45,12 @@ def sentences(summary: Json) -> list[str]:
 
 
 def background_words(background: str) -> str:
-    """What robots they are."""
+    """Return the name of a kind of robots."""
     return BACKGROUNDS[background][0]
 
 
 def share_words(share: Json) -> str:
-    """``7 of 12 (28 to 85 %)``: counts and interval."""
+    """Format counts and interval of a share, such as ``7 of 12 (28 to 85 %)``."""
     if not share["of"]:
         return "none"
     low, high = (100.0 * value for value in share["interval"])
@@ -58,7 +58,7 @@ def share_words(share: Json) -> str:
 
 
 def tables(summary: Json) -> list[tuple[str, list[str], list[list[str]]]]:
-    """Title, heads and rows of every table that has rows."""
+    """Return title, column heads and rows of every table with rows."""
     every = [
         (
             "Detection limits: median over teams and places, and range",
@@ -139,7 +139,7 @@ def _number(value: float | None, scale: float = 1.0, unit: str = "") -> str:
 
 
 def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
-    """Data of ``assets/campaign.html``."""
+    """Return the data of ``assets/campaign.html``."""
     say("campaign")
     values = result.found
     charts = [_found_chart(values)] if values["found"] else []
@@ -184,7 +184,7 @@ def _reliability_chart(bins: Sequence[Json]) -> Chart:
 
 
 def _shares(x: Sequence[float], entries: Sequence[Json], key: Key, text: Sequence[str]) -> Trace:
-    """Shares that were right [%], with their intervals."""
+    """Plot the shares of right answers [%] with their intervals."""
     shares = [entry["right"] for entry in entries]
     at = [100 * share["hits"] / share["of"] for share in shares]
     low, high = ([100 * share["interval"][k] for share in shares] for k in (0, 1))

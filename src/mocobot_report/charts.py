@@ -1,6 +1,6 @@
-"""Interactive plots as plotly's JSON, without colours of their own: the page's theme gives them.
+"""Interactive plots as plotly JSON without colours, which the theme of the page provides.
 
-A trace names its colour of the palette in ``meta`` and the legend's entry that hides it in ``legendgroup``.
+``meta`` of a trace names its colour in the palette, ``legendgroup`` the legend entry that hides it.
 """
 
 import base64
@@ -23,9 +23,9 @@ Trace = dict[str, Any]
 
 @dataclass(frozen=True)
 class Key:
-    """One entry of a legend."""
+    """Entry of a legend."""
 
-    group: str  # the lines it shows and hides; empty for what cannot be hidden
+    group: str  # lines that it shows and hides; empty if they cannot be hidden
     label: str
     colour: str  # name in the palette
     symbol: str = "line"  # or "dash", "band", or the name of a marker
@@ -36,16 +36,16 @@ class Chart:
     """A plot with caption and legend."""
 
     title: str  # a bracketed unit is printed with superscripts
-    label: str  # what it shows, for those who do not see it
+    label: str  # description for screen readers
     data: Sequence[Trace]
     layout: Mapping[str, Any]  # properties of plotly's layout
     height: int  # [px]
     keys: Sequence[Key] = ()
-    note: str = ""  # below the title
-    narrow: Mapping[str, float] = field(default_factory=dict)  # on phones, by dotted path in the layout
+    note: str = ""  # text below the title
+    narrow: Mapping[str, float] = field(default_factory=dict)  # for phones, by dotted path in the layout
 
     def to_json(self) -> dict[str, Any]:
-        """For the page's script; arrays that traces share as ``x`` stand in ``arrays``, once."""
+        """Return the JSON for the page's script; arrays that several traces share as ``x`` are stored in ``arrays``."""
         arrays: list[Any] = []
         data = []
         for trace in self.data:
@@ -59,38 +59,38 @@ class Chart:
 
 
 def literal(text: str, most: int = 200) -> str:
-    """Text of others for a plot: shortened in the middle, and not read as markup."""
+    """Shorten a user's text in the middle and escape its markup, for use in a plot."""
     if len(text) > most:
         text = f"{text[: most // 2]}…{text[len(text) - (most - 1) // 2 :]}"
     return escape(text, quote=False)
 
 
 def axis(title: str, **more: Any) -> Axis:
-    """An axis with a title; a bracketed unit is printed with superscripts."""
+    """Make an axis with a title; a unit in brackets gets superscripts."""
     return {"title": {"text": spelled_text(title)}, **more}
 
 
 def log_axis(title: str, values: Iterable[float | None], **more: Any) -> Axis:
-    """A logarithmic axis of all positive values, with labels that do not crowd."""
+    """Make a logarithmic axis that covers all positive values, with labels that do not overlap."""
     seen = [v for v in values if v is not None and v > 0] or [1e-3, 1.0]
     low, high = float(np.log10(min(seen))) - 0.15, float(np.log10(max(seen))) + 0.15
     if high - low < 2.5:  # 1, 2, 5, 10, 20, 50 ...
         powers = range(int(np.floor(low)), int(np.ceil(high)) + 1)
         at = [m * 10.0**p for p in powers for m in (1, 2, 5) if low <= np.log10(m * 10.0**p) <= high]
         ticks: Axis = {"tickvals": at, "ticktext": [f"{v:g}" for v in at]}
-    else:  # plotly writes powers larger than other labels
+    else:  # plotly draws powers larger than other labels
         step = 1 if high - low < 7 else 2
         ticks = {"tickfont": {"size": 9.5}, "exponentformat": "power", "minexponent": 3, "dtick": step}
     return axis(title, type="log", range=[low, high], **ticks, **more)
 
 
 def row_axis(names: Sequence[str], most: int = 26) -> Axis:
-    """A vertical axis of named rows: the first, at 0, on top; names of up to ``most`` letters."""
+    """Make a vertical axis of named rows, the first at 0 on top; names are shortened to ``most`` letters."""
     return {**_named([literal(name, most) for name in names]), "range": [len(names) - 0.4, -0.6]}
 
 
 def column_axis(names: Sequence[str]) -> Axis:
-    """A horizontal axis of named columns, the first at 0; names may hold markup."""
+    """Make a horizontal axis of named columns, the first at 0; names may contain markup."""
     return {**_named(names), "range": [-0.6, len(names) - 0.4], "showgrid": False, "tickangle": 0}
 
 
@@ -100,7 +100,7 @@ def _named(names: Sequence[str]) -> Axis:
 
 
 def rule(*, x: float | None = None, y: float | None = None, of: str = "y", thin: bool = False) -> Shape:
-    """A dashed line across a plot at ``x``, or at ``y`` of the vertical axis ``of``."""
+    """Make a dashed line across a plot at ``x``, or at ``y`` of the vertical axis ``of``."""
     shape: Shape = {"type": "line"}
     if x is not None:
         shape |= {"x0": x, "x1": x, "xref": "x", "y0": 0, "y1": 1, "yref": "y domain"}
@@ -112,7 +112,7 @@ def rule(*, x: float | None = None, y: float | None = None, of: str = "y", thin:
 def dots(
     x: Iterable[float | None], y: Iterable[float | None], key: Key, text: Iterable[str], *, size: int = 9, **more: Any
 ) -> Trace:  # fmt: skip
-    """Points of one entry of a legend, with a text of others for each."""
+    """Make the points of a legend entry, each with a hover text, which is escaped."""
     return {
         "type": "scatter", "x": list(x), "y": list(y), "mode": "markers", "name": literal(key.label),
         "legendgroup": key.group, "meta": key.colour, "marker": {"symbol": key.symbol, "size": size},
@@ -121,7 +121,7 @@ def dots(
 
 
 def line(x: ArrayLike, y: ArrayLike, key: Key, hover: str, *, width: float = 1.2, **more: Any) -> Trace:
-    """A line of one entry of a legend, in single precision; NaN breaks it."""
+    """Make the line of a legend entry in single precision; NaN interrupts it."""
     return {
         "type": "scatter", "x": _packed(x), "y": _packed(y), "name": literal(key.label), "legendgroup": key.group,
         "meta": key.colour, "hovertemplate": f"{hover}<extra></extra>", "mode": "lines", "line": {"width": width},
@@ -130,12 +130,12 @@ def line(x: ArrayLike, y: ArrayLike, key: Key, hover: str, *, width: float = 1.2
 
 
 def _packed(values: ArrayLike) -> dict[str, str]:
-    """A typed array as plotly reads it."""
+    """Encode an array as a plotly typed array."""
     return {"dtype": "f4", "bdata": base64.b64encode(np.asarray(values, "<f4").tobytes()).decode("ascii")}
 
 
 def bars(shares: Sequence[float], key: Key, text: Iterable[str], width: float, **more: Any) -> Trace:
-    """Horizontal bars [%] of one entry of a legend, one per row, with a text of others for each."""
+    """Make horizontal bars [%] of a legend entry, one per row, each with a hover text, which is escaped."""
     return {
         "type": "bar", "x": [100.0 * share for share in shares], "y": list(range(len(shares))), "orientation": "h",
         "width": width, "meta": key.colour, "name": literal(key.label), "legendgroup": key.group,
@@ -147,9 +147,16 @@ def row_layout(
     names: Sequence[str], across: Axis, *, rules: Iterable[float] = (), row_px: int = 24, left_px: int = 120,
     most: int = 26, font_px: int = 10,
 ) -> dict[str, Any]:  # fmt: skip
-    """Layout, height and phone's layout of a chart with one row per name, and dashed lines at ``rules``.
+    """Return layout, height and layout on phones of a chart with one row per name and dashed lines at ``rules``.
 
-    Names have up to ``most`` letters in ``left_px`` pixels, on phones in fewer, of ``font_px``.
+    Args:
+        names: names of the rows.
+        across: horizontal axis.
+        rules: positions of dashed lines.
+        row_px: height of a row [px].
+        left_px: width of the names [px]; phones use less.
+        most: largest number of letters of a name.
+        font_px: font size of the names on phones [px].
     """
     layout = {
         "xaxis": across, "yaxis": row_axis(names, most), "margin": {"l": left_px}, "barmode": "stack",
@@ -160,43 +167,43 @@ def row_layout(
 
 
 POINTS, FEWEST, MOST = 4800, 300, 1200
-"""Points of a line over all trials of a page, and how many one trial's line has at least and at most: about two per
-pixel of one of two plots side by side."""
+"""Number of points of a line over all trials of a page, and its limits for one trial. Chosen: about two points per
+pixel if two plots stand side by side."""
 ROW_PX, FOOT_PX = 122, 56
 
 
 def points_of_each(trials: int) -> int:
-    """Points that a line keeps at most, so that a page of many trials stays small."""
+    """Return the largest number of points of a line, so that a page of many trials stays small."""
     return min(MOST, max(FEWEST, POINTS // max(trials, 1)))
 
 
 @dataclass(frozen=True)
 class Line:
-    """One line, or a set of points."""
+    """One line or set of points."""
 
     key: Key
-    time: Array  # shape (n,); NaN breaks the line
+    time: Array  # shape (n,); NaN interrupts the line
     values: Array  # shape (n,)
-    points: bool = False  # markers in place of a line
+    points: bool = False  # draw markers instead of a line
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One of several plots above each other."""
+    """One of several stacked plots."""
 
-    title: str  # of the vertical axis
+    title: str  # title of the vertical axis
     unit: str
     lines: Sequence[Line]
-    limits: tuple[float, float] | None = None  # of the vertical axis; None for all that there is
-    band: tuple[Array, Array] | None = None  # times and half heights, shape (n,) each; NaN breaks it
-    rule: float | None = None  # where a dashed line runs
-    log: bool = False  # a logarithmic axis from the lower limit on
+    limits: tuple[float, float] | None = None  # limits of the vertical axis; None for automatic
+    band: tuple[Array, Array] | None = None  # times and half heights, shape (n,); NaN interrupts it
+    rule: float | None = None  # height of a dashed line
+    log: bool = False  # whether the vertical axis is logarithmic
 
 
 def stacked_chart(
     title: str, label: str, panels: Sequence[Panel], *, keys: Sequence[Key] = (), note: str = ""
 ) -> Chart:
-    """Panels above each other over one time axis [s]; zooming one in time zooms all."""
+    """Stack panels over one time axis [s]; zooming in time affects all of them."""
     names = [f"y{k}" if k > 1 else "y" for k in range(1, len(panels) + 1)]
     grid = {"rows": len(panels), "columns": 1, "ygap": 0.15, "subplots": [[f"x{name}"] for name in names]}
     across = axis("time [s]", anchor=names[-1], zeroline=False)
@@ -229,7 +236,7 @@ def _trace(panel: Panel, one: Line, name: str) -> Trace:
 
 
 def around_zero(time: Array, half: Array) -> str:
-    """The outline of a band as SVG; where its height does not change, only ends are kept."""
+    """Return the outline of a band around zero as an SVG path; constant stretches keep only their ends."""
     out = []
     for piece in np.split(np.arange(len(time)), np.flatnonzero(np.isnan(time))):
         k = piece[~np.isnan(time[piece])]
@@ -243,13 +250,13 @@ def around_zero(time: Array, half: Array) -> str:
 
 
 def thinned(time: Array, values: Array, step_s: float | None = None, most: int = MOST) -> tuple[Array, Array]:
-    """The smallest and the largest value of every stretch of time, at their own times; NaN rows at pauses.
+    """Decimate series for plotting: keep the minimum and maximum of every interval, and add NaN rows at pauses.
 
     Args:
-        time: shape (n,), increasing.
-        values: shape (n, C); all columns share the times that are kept.
-        step_s: between samples; a longer one is a pause. None where there is none.
-        most: rows to keep at most, apart from ends of what pauses part.
+        time: increasing times [s], shape (n,).
+        values: values, shape (n, C); all columns share the kept times.
+        step_s: sample period [s]; a step over 1.5 times as long is a pause. None for a series without pauses.
+        most: largest number of rows to keep, not counting the ends of pauses.
 
     Returns:
         Times, shape (m,), and values, shape (m, C).

@@ -1,4 +1,4 @@
-"""A diagnosis: verdict, causes and what else they might be, what they are worth, what stays undecided."""
+"""Report of a diagnosis: verdict, causes and their rivals, benefit of fixing them, and open questions."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
@@ -79,11 +79,11 @@ MEANING = {
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
 MOST_NAMED = 2
-"""Causes that the title names."""
+"""Largest number of causes in the title. Chosen."""
 
 
 def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
-    """Data of ``assets/diagnosis.html``."""
+    """Return the data of ``assets/diagnosis.html``."""
     say("diagnosis")
     found: Diagnosed = result.found
     values = found.values
@@ -117,14 +117,14 @@ def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
 
 
 def _is_robot(result: Result) -> bool:
-    """Whether logs of one robot's joints were diagnosed, not a team's recordings."""
+    """Whether the diagnosis is of a single robot instead of a team."""
     options = (result.provenance or {}).get("options")
     named = isinstance(options, dict) and options.get("model") is not None
     return named or is_of_joints(result.found.values)
 
 
 def _title(values: Values, *, robot: bool) -> str:
-    """What was diagnosed, and what was found."""
+    """Write the title: the number of trials and the named causes."""
     names = [name_of(cause) for cause in values["causes"]]
     found = ", ".join(names[:MOST_NAMED])
     if len(names) > MOST_NAMED:
@@ -138,7 +138,7 @@ def _title(values: Values, *, robot: bool) -> str:
 
 
 def _verdict_kind(values: Values) -> str:
-    """Green stands beside no figure that contradicts it."""
+    """Return the colour of the verdict: warn instead of good if something remains or the search did not finish."""
     kind = KINDS[values["verdict"]]
     doubt = values["remains"] or not values.get("finished", True)
     return "warn" if doubt and kind == "good" else kind
@@ -152,7 +152,7 @@ def _meaning(values: Values) -> str:
 
 
 def _said(values: Values) -> dict[str, Any]:
-    """Sentences of the verdict's box: a list, and what follows it."""
+    """Return the sentences in the box of the verdict: a list and a closing sentence."""
     if values["causes"]:
         return {"list": [sentence_of(cause) for cause in values["causes"]], "then": ""}
     if values["verdict"] == "miscalibrated":
@@ -200,7 +200,7 @@ def _share(share: float | None) -> Num:
 
 
 def _causes(causes: Sequence[Values]) -> dict[str, Any]:
-    """Rows on what is named, what supports it, and what else it might be."""
+    """Make the tables of the named causes: parameters, support and rivals."""
     units = one_each(
         (_parameter(cause, name)[1], entry["value"])
         for cause in causes
@@ -209,7 +209,7 @@ def _causes(causes: Sequence[Values]) -> dict[str, Any]:
     sizes: Rows = []
     support: Rows = []
     for cause in causes:
-        # A number without an error that is 0 is of a form that the cause does not have.
+        # A zero without standard error belongs to a variant of the cause that does not apply.
         there = [number for number in numbers_of(cause) if number[2]["value"] or number[2]["se"] is not None]
         for k, (name, at, entry) in enumerate(there):
             words, unit = _parameter(cause, name)
@@ -233,14 +233,14 @@ def _causes(causes: Sequence[Values]) -> dict[str, Any]:
 
 
 def _parameter(cause: Values, name: str) -> tuple[str, str]:
-    """A parameter's name in words and its unit: a law brings its own, others carry theirs in the name."""
+    """Return a parameter's name in words and its unit, which a law states separately and others have in the name."""
     law = cause.get("law")
     words = name.removesuffix("_rad").replace("_", " ")
     return parameter(name) if law is None else (words, law["units"][name])
 
 
 def _rivals(causes: Sequence[Values]) -> tuple[Rows, Rows, list[str]]:
-    """What else each cause might be, what fits worse still, and what would tell the nearest apart."""
+    """Make rows of the near and the far rivals of each cause, and advice on how to distinguish the near ones."""
     rows: Rows = []
     farther: Rows = []
     advice: dict[str, None] = {}
@@ -260,7 +260,7 @@ def _rivals(causes: Sequence[Values]) -> tuple[Rows, Rows, list[str]]:
 
 
 def _apart(rivals: Sequence[Values]) -> tuple[list[Values], list[Values]]:
-    """What could be there instead and the nearest of what could not, which the report names, too; and the others."""
+    """Split rivals into those that the text report also names (plausible or nearest) and the others."""
     near: list[Values] = []
     far: list[Values] = []
     for rival in rivals:
@@ -271,7 +271,7 @@ def _apart(rivals: Sequence[Values]) -> tuple[list[Values], list[Values]]:
 
 
 def _rival(rival: Values) -> list[Entry]:
-    """Its row but for whose it is."""
+    """Make the cells of a rival, without the name of the cause."""
     said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
     other = Markup("{} <em>{}</em>").format(cause_name(name_of(rival), rival["cause"]), said)
     chance = Num(chance_of(rival["probability"]))
@@ -279,7 +279,7 @@ def _rival(rival: Values) -> list[Entry]:
 
 
 def _shapes(causes: Sequence[Values]) -> list[tuple[str, str]]:
-    """Numbers that change a cause's columns and were chosen, not fitted."""
+    """List the shape parameters of causes, which were chosen instead of fitted."""
     entries = []
     for cause in causes:
         named = [(*_parameter(cause, name), number) for name, number in cause["shape"].items()]
@@ -301,7 +301,7 @@ def _scatter(scatter: Sequence[Values]) -> Rows:
 
 
 def _places_off(scatter: Sequence[Values]) -> list[str]:
-    """The places of every kind that are farthest off."""
+    """Name the places with the largest deviations, for every kind."""
     told = [(kind_of(entry), farthest(entry)) for entry in scatter]
     return [tidy(f"{kind[:1].upper()}{kind[1:]}: farthest off are {where}.") for kind, where in told if where]
 
@@ -322,7 +322,7 @@ ERROR = Key("before", "error", "before", "square")
 
 
 def _gain(values: Values, names: Sequence[str]) -> dict[str, Any] | None:
-    """Closed loop, errors and estimates; None where the JSON has nothing of them."""
+    """Make the section on the closed loop, errors and estimates; None if the JSON has none of them."""
     gain, named, known = values["gain"], bool(values["causes"]), something_is_off(values)
     if gain is None:
         return None
@@ -354,7 +354,7 @@ def _errors(errors: Values, shown: Collection[str]) -> dict[str, Any]:
 
 
 def _closed_loop(gain: Values, short: Mapping[str, str], shown: Mapping[str, Key]) -> dict[str, Any]:
-    """The response to the commands, or torques that the motion predicts: sentences, rows and charts."""
+    """Make sentences, rows and charts on the response to the commands, or on the predicted torques."""
     removed, range_said = None, ""
     if gain["removed"] is not None and "after" in shown:
         low, high = gain["removed"]["interval"]
@@ -362,7 +362,7 @@ def _closed_loop(gain: Values, short: Mapping[str, str], shown: Mapping[str, Key
         count = sum(t["before"] is not None and t["after"] is not None for t in gain["trials"])
         if low is not None and high is not None and count > 1:
             range_said = f" (95 % interval over {count} trials: {percent(low)} to {percent(high)})"
-    # Later parts of a long recording are not simulated again.
+    # Only the first part of a long recording is simulated again.
     trials = [short[trial["name"]] for trial in gain["trials"]]
     keys = [*(f"{channel}_rms" for channel in gain["units"]), "chi2_per_n"]
     heads = _heads(shown)
@@ -380,7 +380,7 @@ def _closed_loop(gain: Values, short: Mapping[str, str], shown: Mapping[str, Key
 
 
 def _response(gain: Values, shown: Mapping[str, Key]) -> Rows:
-    """Error of every channel, absolute and as a share of its motion."""
+    """Tabulate the error of every channel, absolute and relative to its motion."""
     held = [gain["held_out"][which] for which in shown]
     rows: Rows = []
     for channel, (unit, scale) in response_units(gain).items():
@@ -392,7 +392,7 @@ def _response(gain: Values, shown: Mapping[str, Key]) -> Rows:
 
 
 def _trials_chart(gain: Values, key: str, names: Sequence[str], shown: Mapping[str, Key]) -> Chart:
-    """One dot per trial, before and after, the noise floor dashed; ``key`` names the error."""
+    """Plot one dot per trial, before and after, with the noise floor dashed; ``key`` names the error."""
     trials, channel = gain["trials"], key.removesuffix("_rms")
     unit, scale, floor, title = "", 1.0, 1.0, "chi²/n"
     if channel != key:
@@ -416,7 +416,7 @@ def _trials_chart(gain: Values, key: str, names: Sequence[str], shown: Mapping[s
 
 
 def _estimates(estimates: Values) -> Rows:
-    """The payload's estimate before and after."""
+    """Tabulate the payload estimate before and after."""
     rows: Rows = []
 
     def row(name: str, unit: str, read: Callable[[Values], Any], scale: float = 1.0) -> None:
@@ -434,7 +434,7 @@ def _estimates(estimates: Values) -> Rows:
 
 
 def _rollouts(rolled: Values | None) -> dict[str, Any] | None:
-    """Free rollouts and the closed loop of a robot of joints; None where the JSON has nothing of them."""
+    """Make the section on free rollouts and the closed loop of a single robot; None if the JSON has none."""
     if rolled is None:
         return None
     loop = rolled["commanded"]
@@ -475,7 +475,7 @@ def _errors_heads(after: Any) -> list[str]:
 
 
 def _joint_row(rolled: Values, j: int, before: Any, after: Any, removed: Any) -> list[Entry]:
-    """A joint's name and errors, and where something is named the share that is removed."""
+    """Make the cells of a joint: name, errors and, if causes are named, the share of error that they remove."""
     unit, scale = shown_units(rolled)[rolled["units"][j]]
     sides = [side and side[j] for side in ([before] if after is None else [before, after])]
     errors = [value(None if side is None else scale * side, 3) for side in sides]
@@ -484,7 +484,7 @@ def _joint_row(rolled: Values, j: int, before: Any, after: Any, removed: Any) ->
 
 
 def _limits(limits: Sequence[Values]) -> Rows:
-    """One row per cause and parameter: smallest and largest limit over the places."""
+    """Tabulate smallest and largest detection limit over the places, per cause and parameter."""
     sizes: dict[tuple[str, str], list[float | None]] = {}
     kinds = {entry["cause"]: kind_of(entry) for entry in limits}
     for entry in limits:
@@ -510,7 +510,7 @@ def _limits(limits: Sequence[Values]) -> Rows:
 
 
 def _models(folder: Path) -> dict[str, Any] | None:
-    """Folders with models that lie beside the diagnosis, and their files."""
+    """List the folders with models beside the diagnosis, and their files."""
     there = {name: files for name in (EXTENDED, AS_FOUND) if (files := _files(folder / name))}
     if not there:
         return None
@@ -531,7 +531,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _pictures(result: Result) -> tuple[list[tuple[str, Callable[[], Any]]], str]:
-    """The team with what is named, by the first recording that is still there; or why there is no picture."""
+    """Request a picture of the causes in the first recording that still exists, or say why there is none."""
     estimates = (result.found.values["gain"] or {}).get("estimates")
     if not estimates:
         return [], ""
@@ -548,7 +548,7 @@ def _pictures(result: Result) -> tuple[list[tuple[str, Callable[[], Any]]], str]
 
 
 def _grasped(values: Values) -> PayloadEstimate:
-    """The grasps of a diagnosis' estimate; a picture needs no more."""
+    """Build an estimate with the grasps of a diagnosis only, which suffices for a picture."""
     grasps = values["grasps"]
     count = len(grasps)
     none = np.zeros((count, count))

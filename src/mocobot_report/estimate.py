@@ -1,4 +1,4 @@
-"""One estimate: payload and grasps with standard errors, doubts, and what one rigid payload leaves over."""
+"""Report of an estimate: payload and grasps with standard errors, doubts, and residuals of the rigid-body model."""
 
 import contextlib
 from collections.abc import Callable, Sequence
@@ -63,7 +63,7 @@ Rows = list[list[Entry]]
 
 
 def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
-    """Data of ``assets/estimate.html``."""
+    """Return the data of ``assets/estimate.html``."""
     e: PayloadEstimate = result.found
     say(f"estimate {result.path.name}")
     found = sources(result)
@@ -99,7 +99,7 @@ def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
 
 
 def _tiles(e: PayloadEstimate) -> list[tuple[str, str, str]]:
-    """Name, value and its error; what is not determined has neither."""
+    """Return name, value and error of every tile; undetermined quantities have no error."""
     found: dict[str, tuple[str, str]] = {}
     if e.mass:
         share = f"standard error {percent(e.mass.se / e.mass.mass)}" if e.mass.mass else ""
@@ -149,7 +149,7 @@ def _payload(e: PayloadEstimate) -> Rows:
 
 
 def _grasps(e: PayloadEstimate) -> tuple[Rows, Rows]:
-    """Position and rotation of every grasp frame in every other."""
+    """Tabulate position and rotation of every pair of grasp frames."""
     positions: Rows = []
     rotations: Rows = []
     assert e.grasps is not None
@@ -185,7 +185,7 @@ def _steps(e: PayloadEstimate) -> Rows:
 
 
 def _pictures(found: Sequence[Source], e: PayloadEstimate, truth: BodyFacts | None) -> list[Any]:
-    """The team at one instant of the first recording that is still there."""
+    """Request a picture of the team in the first recording that still exists."""
     for source in found:
         with contextlib.suppress(InputError):
             return [("The team as estimated", partial(estimate_shot, source.recording(), e, truth))]
@@ -193,7 +193,7 @@ def _pictures(found: Sequence[Source], e: PayloadEstimate, truth: BodyFacts | No
 
 
 def _truth(found: Sequence[Source], e: PayloadEstimate) -> tuple[BodyFacts | None, str]:
-    """The truth beside the first recording that has one, and that recording's name."""
+    """Read the truth beside the first recording that has one; also return the recording's name."""
     for source in found:
         if source.path is not None:
             with contextlib.suppress(InputError):
@@ -202,7 +202,7 @@ def _truth(found: Sequence[Source], e: PayloadEstimate) -> tuple[BodyFacts | Non
 
 
 def _errors(e: PayloadEstimate, truth: BodyFacts) -> Rows:
-    """Truth, error, error in percent and in standard errors, for every number that both have."""
+    """Tabulate truth, error, error in percent and in standard errors, for every quantity of the truth."""
     rows: Rows = []
 
     def row(name: str, unit: str, true: float, found: tuple, scale: float = 1.0, of: float = 0.0) -> None:
@@ -250,7 +250,7 @@ APART = 0.17
 
 
 def _moment_chart(e: PayloadEstimate, truth: BodyFacts | None) -> Chart | None:
-    """Principal moments of every recording, relative to the pooled ones, with standard errors."""
+    """Plot principal moments from every recording relative to the pooled estimate, with standard errors."""
     found = {Path(r.name).name: r.inertia.principal for r in e.recordings if r.inertia is not None}
     if e.inertia is None or not found:
         return None
@@ -269,7 +269,7 @@ def _moment_chart(e: PayloadEstimate, truth: BodyFacts | None) -> Chart | None:
 
 
 def _grasp_charts(e: PayloadEstimate) -> list[Chart]:
-    """Positions of the grasps from every recording alone, relative to the pooled ones, with standard errors."""
+    """Plot grasp positions from every recording relative to the pooled estimate, with standard errors."""
     found = {Path(r.name).name: r.grasps for r in e.recordings if r.grasps is not None}
     if e.grasps is None or not found:
         return []
@@ -287,14 +287,14 @@ def _pooled_chart(
     words: tuple[str, str, str], rows: Sequence[tuple[str, Array, Array]], keys: Sequence[Key], scales: Array,
     extra: Sequence[tuple[Key, Trace]] = (),
 ) -> Chart:  # fmt: skip
-    """Differences from the first row, which is the pooled one, with horizontal bars of two standard errors.
+    """Plot differences from the first row, the pooled estimate, with horizontal bars of two standard errors.
 
     Args:
-        words: title, label and the values' unit.
-        rows: name, values and standard errors of each, shape (3,).
-        keys: one per component.
-        scales: of differences, shape (3,).
-        extra: more points.
+        words: title, label and unit of the values.
+        rows: name, values and standard errors of each row, shape (3,).
+        keys: legend entry of each component.
+        scales: factors on the differences, shape (3,).
+        extra: additional points with their legend entries.
     """
     title, label, unit = words
     data = []
@@ -314,7 +314,7 @@ def _pooled_chart(
 
 
 def _excitation_chart(e: PayloadEstimate) -> Chart:
-    """Signal over noise of every direction of every step."""
+    """Plot the signal-to-noise ratio of every parameter direction of every step."""
     steps = [s for s in e.steps if s.singular_values]
     found = [(k, step, s) for k, step in enumerate(steps) for s in step.singular_values]
     x = [max(s / step.noise if step.noise > 0 else 1e6, 1e-3) for _, step, s in found]
@@ -334,7 +334,7 @@ SEGMENT_S = 10.0
 
 @dataclass(frozen=True)
 class Left:
-    """One quantity that is zero if all is well."""
+    """A residual, which is zero for a perfect model."""
 
     name: str
     unit: str
@@ -346,7 +346,11 @@ class Left:
 def _signals(
     found: Sequence[Source], e: PayloadEstimate, say: Callable[[str], object]
 ) -> dict[str, Any] | None:
-    """What every recording that is still there leaves over, and what is missing; None where none is named."""
+    """Make charts of the residuals of every recording that still exists, and list what is missing.
+
+    Returns:
+        Data of the template; None if the provenance names no recording.
+    """
     if not found:
         return None
     panels: list[dict[str, Any]] = []
@@ -385,7 +389,7 @@ def _left(trial: ReplayTrial) -> list[Left]:
 
 
 def _panel(name: str, left: Sequence[Left], most: int) -> dict[str, Any]:
-    """Charts of one recording: gaps robot by robot, wrenches over time and as spectra."""
+    """Make the charts of one recording: gaps by robot, wrench residuals over time and as spectra."""
     gaps, balance = [one for one in left if one.keys is not LINES], [one for one in left if one.keys is LINES]
     over_time = []
     if gaps:
@@ -402,7 +406,7 @@ def _panel(name: str, left: Sequence[Left], most: int) -> dict[str, Any]:
 
 
 def _robot_by_robot(left: Sequence[Left], name: str, most: int) -> Chart:
-    """One plot per robot, on one scale per quantity: on top of each other the last would hide the others."""
+    """Make one plot per robot with a common scale per quantity; in a single plot the curves would hide each other."""
     panels = []
     for one in left:
         time, values = thinned(one.time, one.values, most=most)
@@ -417,7 +421,7 @@ def _robot_by_robot(left: Sequence[Left], name: str, most: int) -> Chart:
 
 
 def _spectrum(one: Left) -> Chart:
-    """Amplitude density of each component."""
+    """Plot the amplitude spectral density of each component."""
     step = float(np.median(np.diff(one.time)))
     segment = min(len(one.time), round(SEGMENT_S / step))
     frequency, power = welch(one.values, 1.0 / step, nperseg=segment, axis=0)

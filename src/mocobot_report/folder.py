@@ -1,4 +1,4 @@
-"""What a folder holds that a report can be made of, and the recordings that it was made from."""
+"""Read the results in a folder for a report, and find the recordings from which they were made."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.payload import read_estimate
 
 KINDS = ("paper", "estimate", "calibration", "diagnosis", "campaign")
-"""Kinds of results, in the order of a page."""
+"""Kinds of results, in the order of the page."""
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
 Json = dict[str, Any]
@@ -43,33 +43,33 @@ class Result:
     kind: str  # one of KINDS
     path: Path
     found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, or a campaign's summary
-    provenance: Json | None  # how it was made
-    files: tuple[Path, ...]  # that it was read from
+    provenance: Json | None
+    files: tuple[Path, ...]  # files from which it was read
 
 
 @dataclass(frozen=True)
 class Paper:
-    """What ``mocobot paper --out`` wrote."""
+    """Results that ``mocobot paper --out`` wrote."""
 
     scores: Mapping[str, Mapping[str, Any]]  # by preset, then payload
-    trials: tuple[Json, ...]  # summaries of the simulated trials; empty where there are none
-    estimates: Mapping[tuple[str, str], PayloadEstimate]  # by (payload, preset), those that are there
+    trials: tuple[Json, ...]  # summaries of the simulated trials, possibly empty
+    estimates: Mapping[tuple[str, str], PayloadEstimate]  # existing estimates by (payload, preset)
 
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """What ``mocobot diagnose --out`` wrote."""
+    """Result that ``mocobot diagnose --out`` wrote."""
 
-    values: Json  # as discrepancy.result.json documents it
-    traces: tuple[Trace, ...]  # residuals of every trial; empty where the folder has none
+    values: Json  # JSON with the keys of discrepancy.result.json
+    traces: tuple[Trace, ...]  # residuals of every trial; empty if the folder has none
     channels: tuple[Channel, ...]
 
 
 def read_folder(folder: Path) -> list[Result]:
-    """Read all results that a folder holds, in the order of a page.
+    """Read all results in a folder, in the order of the page.
 
     Raises:
-        InputError: there is no such folder, it holds no result, or one of them cannot be read.
+        InputError: the folder does not exist or holds no result, or a result cannot be read.
     """
     check_folder(folder)
     with system_errors(folder, "read"):
@@ -129,7 +129,7 @@ def _trials(path: Path) -> tuple[Json, ...]:
 
 
 def _provenance_beside(path: Path) -> tuple[Json | None, list[Path]]:
-    """What ``provenance.json`` says, and that file if it is there."""
+    """Read ``provenance.json`` beside a result; also list that file if it exists."""
     file = path.with_name("provenance.json")
     if not file.is_file():
         return None, []
@@ -159,7 +159,7 @@ def _calibration(path: Path, values: Json) -> Result:
 def _diagnosis(path: Path, values: Json) -> Result:
     parse_diagnosis(values, path)
     with complete(path, "not a complete diagnosis"):
-        # The text touches most keys that a report has to show.
+        # Formatting the text checks that most keys of the report exist.
         values = as_now(values)
         format_verdict(values, verbose=True)
     file = path.with_name(RESIDUALS)
@@ -184,15 +184,15 @@ READERS: Mapping[str, Callable[[Path, Json], Result]] = {
 INCOMPLETE = (
     LookupError, TypeError, ValueError, AttributeError, OverflowError, StopIteration, UndefinedError,
 )  # fmt: skip
-"""What reading values raises where one is missing or of another kind."""
+"""Exceptions that reading raises if a value is missing or has the wrong type."""
 
 
 @contextmanager
 def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
-    """A block that reads a file's values; where one is missing or of another kind, the file is what is wrong.
+    """Context manager around reading the values of a file: turn missing or invalid values into an InputError.
 
     Raises:
-        InputError: a key is missing, or a value is not what it must be.
+        InputError: a key is missing or a value is invalid.
     """
     try:
         yield
@@ -204,17 +204,17 @@ def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Source:
-    """A recording that a result was made from."""
+    """A recording from which a result was made."""
 
     name: str
     path: Path | None
-    why: str = ""  # it is not used, a sentence without its end
+    why: str = ""  # reason why it is not used, without a full stop
 
     def recording(self) -> Recording:
-        """Read it.
+        """Read the recording.
 
         Raises:
-            InputError: it is not used, or cannot be read.
+            InputError: the recording was not found or cannot be read.
         """
         if self.path is None:
             raise InputError(self.why)
@@ -222,10 +222,10 @@ class Source:
 
 
 def sources(result: Result) -> list[Source]:
-    """Recordings that a result's provenance lists.
+    """Find the recordings that the provenance of a result lists.
 
-    Each is sought where the user named it (from the current folder on), beside the result, and under its name there;
-    the hash must be the same.
+    The search covers the path that the user gave (from the current folder and from that of the result), the folder of
+    the result and its parent. The hash must match.
     """
     files = (result.provenance or {}).get("files")
     listed = [entry for entry in files if isinstance(entry, dict)] if isinstance(files, list) else []
@@ -238,7 +238,7 @@ def _source(entry: Json, folder: Path) -> Source:
     for path in (Path(given), folder / given, folder / name, folder.parent / name):
         try:
             same = file_sha256(path) == entry.get("sha256")
-        except (OSError, ValueError):  # a name with a NUL
+        except (OSError, ValueError):  # the name contains NUL
             continue
         if same:
             return Source(name, path)

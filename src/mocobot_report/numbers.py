@@ -1,4 +1,4 @@
-"""Numbers, units and sentences as the page prints them."""
+"""Format numbers, units and sentences for the page."""
 
 import math
 import re
@@ -11,11 +11,11 @@ SUPERSCRIPTS = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
 LEAST = 0.001
-"""Probabilities are not known better than that."""
+"""Smallest probability that is printed as a number, because probabilities are not known more accurately. Chosen."""
 
 
 def plain(value: float | None, digits: int = 3) -> str:
-    """``0.00123``, ``11.7``, ``5.6 x 10^-5`` with superscripts; a dash where there is no number."""
+    """Format a number: ``0.00123``, ``11.7``, ``5.6 x 10^-5`` with superscripts, or a dash if there is none."""
     if value is None or not math.isfinite(value):
         return NONE
     if value == 0:
@@ -28,7 +28,7 @@ def plain(value: float | None, digits: int = 3) -> str:
 
 
 def measured(value: float | None, se: float | None) -> tuple[str, str]:
-    """Value and standard error, both to the second digit of the error; without one, four digits and an empty text."""
+    """Format value and standard error to the second digit of the error; without an error, to four digits and ""."""
     if value is None or not math.isfinite(value):
         return NONE, ""
     if se is None or not math.isfinite(se) or se <= 0:
@@ -41,14 +41,14 @@ def measured(value: float | None, se: float | None) -> tuple[str, str]:
 
 
 def with_error(value: float | None, se: float | None, unit: str = "") -> str:
-    """``11.67196 +- 0.00019 kg`` in one text."""
+    """Format value, standard error and unit in one text, such as ``11.67196 +- 0.00019 kg``."""
     shown, error = measured(value, se)
     text = f"{shown} {PLUS_MINUS}{THIN}{error}" if error else shown
     return f"{text}{THIN}{unit}" if unit and shown != NONE else text
 
 
 def percent(share: float | None) -> str:
-    """A share, ``99 %``; more digits near 0 and 100 %."""
+    """Format a share in percent, such as ``99 %``, with more digits near 0 and 100 %."""
     if share is None or not math.isfinite(share):
         return NONE
     value = 100.0 * share
@@ -59,25 +59,25 @@ def percent(share: float | None) -> str:
 
 
 def probability(value: float) -> str:
-    """A probability in percent; never 0 or 100 %, since none is known that well."""
+    """Format a probability in percent, limited to ``LEAST`` from 0 and 100 %."""
     if value < LEAST:
         return f"<{THIN}{100 * LEAST:g}{THIN}%"
     return f">{THIN}{100 * (1 - LEAST):g}{THIN}%" if value > 1.0 - LEAST else percent(value)
 
 
 def without_percent(text: str) -> str:
-    """The number alone, for columns whose head has the unit."""
+    """Remove the percent sign, for columns with the unit in their head."""
     return text.removesuffix(f"{THIN}%")
 
 
 def about(value: float) -> str:
-    """A ratio of two digits, thousands apart: ``53 000``."""
+    """Format a ratio with two digits and separated thousands, such as ``53 000``."""
     rounded = float(f"{value:.1e}")
     return f"{rounded:,.0f}".replace(",", THIN) if rounded >= 10 else plain(value, 2)
 
 
 def size(count: int) -> str:
-    """``1.4 MB``."""
+    """Format a number of bytes, such as ``1.4 MB``."""
     for unit, scale in (("MB", 1e6), ("kB", 1e3)):
         if count >= scale:
             return f"{count / scale:.1f}{THIN}{unit}"
@@ -85,17 +85,17 @@ def size(count: int) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """``1 trial``, ``2 trials``."""
+    """Format a count with its noun, such as ``1 trial`` or ``2 trials``."""
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def kinds_of(kinds: Sequence[str]) -> str:
-    """``2 random, 1 static``."""
+    """Count the kinds of trials, such as ``2 random, 1 static``."""
     return ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
 
 
 def spelled(unit: str) -> str:
-    """A unit as printed: ``kg m^2`` with a superscript, ``um`` with a Greek letter."""
+    """Format a unit for print: ``kg m^2`` with a superscript, ``um`` with a Greek letter."""
     unit = re.sub(r"\bu(?=(m|rad|N m|s)\b)", "µ", unit)
     for ascii_power, shown in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
         unit = unit.replace(ascii_power, shown)
@@ -103,12 +103,12 @@ def spelled(unit: str) -> str:
 
 
 def spelled_text(text: str) -> str:
-    """Text whose bracketed unit is printed with superscripts and does not break."""
+    """Format the units in brackets of a text, so that they have superscripts and do not wrap."""
     return re.sub(r"\[(.*?)\]", lambda m: f"[{spelled(m[1])}]", text)
 
 
 def tidy(sentence: str, *, inside: bool = False) -> str:
-    """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital unless it goes on."""
+    """Typeset a sentence of a result: signs for ``+-`` and powers, and a capital letter unless ``inside`` another."""
     text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("+-(", f"{PLUS_MINUS}(")
     text = text.replace("chi2/n", "chi²/n")
     text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
@@ -117,7 +117,7 @@ def tidy(sentence: str, *, inside: bool = False) -> str:
 
 
 def short_names(names: list[str]) -> list[str]:
-    """Trials without their folders and suffix, with running numbers where two are alike."""
+    """Shorten names of trials to file names without suffix; equal names get a number."""
     out: list[str] = []
     for name in names:
         stem = re.split(r"[/\\]", name)[-1].removesuffix(".parquet") or "trial"

@@ -1,4 +1,4 @@
-"""The report of a result folder: the answer, a part for every result, provenance, a glossary."""
+"""HTML report of a result folder: answer, one part per result, provenance and glossary."""
 
 import base64
 import gzip
@@ -34,22 +34,22 @@ PARTS: Mapping[str, Callable[[Result, Say], Context]] = {
     "paper": paper.context, "estimate": estimate.context, "calibration": calibration.context,
     "diagnosis": diagnosis.context, "campaign": campaign.context,
 }  # fmt: skip
-"""What gives the data of each kind's template: a ``title``, ``pictures`` that it wants, and its own names."""
+"""Function per kind of result that returns the data of its template: ``title``, ``pictures`` and further names."""
 
 
 def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: None) -> Path:
     """Write the report of a result folder.
 
     Args:
-        folder: what ``mocobot paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign`` wrote.
+        folder: folder that ``mocobot paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign`` wrote.
         out: file to write; ``report.html`` in the folder if None. An existing file is replaced.
-        say: takes the name of every stage that begins.
+        say: called with the name of each stage that begins.
 
     Returns:
-        The file.
+        Path of the file.
 
     Raises:
-        InputError: the folder holds no result, or one that cannot be read, or the file cannot be written.
+        InputError: the folder holds no readable result, or the file cannot be written.
     """
     results = read_folder(folder)
     out = folder / NAME if out is None else out
@@ -63,7 +63,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
 
 @dataclass
 class _Part:
-    """One part of the page below the answer, with its sections' ids and titles."""
+    """Part of the page below the answer, with ids and titles of its sections."""
 
     id: str
     name: str
@@ -73,39 +73,39 @@ class _Part:
 
 @dataclass
 class _Page:
-    """What templates share: running ids, figures, and the parts so far."""
+    """State that the templates share: counters of ids, figures, and the parts so far."""
 
     parts: list[_Part] = field(default_factory=list)
     figures: dict[str, Any] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
 
     def identity(self, kind: str) -> str:
-        """An id that the page has once; the same for the same inputs."""
+        """Make an id that is unique on the page and reproducible."""
         self.counts[kind] = self.counts.get(kind, 0) + 1
         return f"{kind}-{self.counts[kind]}"
 
     def section(self, title: str, name: str | None) -> str:
-        """The id of a section of the last part."""
+        """Add a section to the last part and return its id."""
         name = name or self.identity("part")
         self.parts[-1].sections.append((name, title))
         return name
 
     def figure(self, chart: Chart) -> str:
-        """The id of a chart."""
+        """Add a chart to the page and return its id."""
         name = self.identity("figure")
         self.figures[name] = chart.to_json()
         return name
 
     def link(self, section: Markup) -> Markup:
-        """A section with links to the glossary."""
+        """Add links to the glossary to a section."""
         return link_terms(section)
 
 
 def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None) -> bytes:
-    """The page of a folder's results, HTML in UTF-8; the same files give the same bytes.
+    """Make the page of a folder's results as UTF-8 HTML; equal files give equal bytes.
 
     Raises:
-        InputError: a file has gone, or changed its meaning, since the folder was read.
+        InputError: a file was deleted or changed after the folder was read.
     """
     contexts: list[Context] = []
     for result in results:
@@ -150,7 +150,7 @@ LONGEST_TITLE = 160
 
 
 def title_of(titles: Sequence[str]) -> str:
-    """All results by what they are, the same once, as far as that fits a heading."""
+    """Join the distinct titles of the results, up to ``LONGEST_TITLE`` characters."""
     first, *others = dict.fromkeys(titles)
     shown = [first]
     for title in others:
@@ -172,17 +172,17 @@ def _whole(page: _Page, title: str, answer: Markup) -> bytes:
 
 
 _NOT_HTML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
-"""Characters that a page may not hold."""
+"""Characters that HTML does not allow."""
 
 
 def _packed(text: str) -> Markup:
-    """Text that the page's script unpacks: gzip in base 85, with commas for ``<``, which HTML would read."""
+    """Compress text for the page's script: gzip in base 85, with commas instead of ``<``, which is markup in HTML."""
     packed = base64.b85encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
     return Markup(packed.replace("<", ","))
 
 
 def _variables(colours: Mapping[str, str]) -> Markup:
-    """CSS custom properties."""
+    """Format colours as CSS custom properties."""
     return Markup("".join(f"--{name}:{value};" for name, value in colours.items()))
 
 
@@ -199,7 +199,7 @@ WIDTH, HEIGHT, QUALITY = 1120, 700, 84
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as data in the page, or, without a source, why there is none."""
+    """A picture as a data URI; without a source, ``says`` explains why there is none."""
 
     caption: str
     says: str
@@ -209,9 +209,9 @@ class Picture:
 
 
 def render_pictures(contexts: Sequence[Context]) -> None:
-    """Replace the pictures that parts want, (caption, function that makes a shot), by pictures.
+    """Replace the requested pictures (caption, function that makes a shot) by rendered pictures.
 
-    All are rendered in one process. Where nothing can be rendered, one sentence takes the place of each part's.
+    One process renders all of them. If it cannot render, one sentence replaces the pictures of each part.
     """
     shots: list[Shot] = []
     for context in contexts:
@@ -235,8 +235,8 @@ def render_pictures(contexts: Sequence[Context]) -> None:
 
 
 def _jpeg(pixels: Any) -> str:
-    """An image as a data URI."""
-    from PIL import Image  # an extra: without it nothing is rendered
+    """Encode an image as a JPEG data URI."""
+    from PIL import Image  # an optional dependency, present whenever pictures are rendered
 
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "JPEG", quality=QUALITY, optimize=True)
@@ -250,7 +250,7 @@ def _called(result: Result) -> str:
 
 
 def _option(value: Any) -> str:
-    """The value of a command's option as people write it."""
+    """Format the value of an option as on the command line."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
@@ -259,7 +259,7 @@ def _option(value: Any) -> str:
 
 
 def _files(listed: Iterable[Any]) -> list[list[Entry]]:
-    """Name, size and hash of each."""
+    """Tabulate name, size and hash of files."""
     rows: list[list[Entry]] = []
     for entry in listed:
         if isinstance(entry, Mapping):
@@ -272,7 +272,7 @@ def _files(listed: Iterable[Any]) -> list[list[Entry]]:
 
 @cache
 def terms() -> list[dict[str, Any]]:
-    """The glossary of ``assets/glossary.toml``, with an id for each term."""
+    """Read the glossary ``assets/glossary.toml``, and give each term an id."""
     file = files("mocobot_report").joinpath("assets/glossary.toml")
     found = tomllib.loads(file.read_text(encoding="utf-8"))["term"]
     filled = {"{clean_chi2}": f"{SETTINGS.clean_chi2:g}", "{named}": f"{100 * SETTINGS.named:g}"}
@@ -284,19 +284,19 @@ def terms() -> list[dict[str, Any]]:
 
 
 UNLINKED = ("a", "button", "code", "h1", "h2", "h3", "h4", "label", "legend", "style", "svg", "summary")
-"""Elements whose text gets no links."""
+"""HTML elements whose text gets no links to the glossary."""
 
 
 @cache
 def _spelled() -> tuple[dict[str, dict[str, Any]], re.Pattern[str]]:
-    """Terms by how texts write them, and what finds any of them."""
+    """Return the glossary terms by spelling, and a pattern that matches any spelling."""
     known = {spelling.lower(): term for term in terms() for spelling in term["spellings"]}
     longest_first = sorted(map(re.escape, known), key=len, reverse=True)
     return known, re.compile(rf"(?<!\w)(?:{'|'.join(longest_first)})(?!\w)", re.IGNORECASE)
 
 
 def link_terms(html: Markup) -> Markup:
-    """Link every term of the glossary at its first place in a section's HTML."""
+    """Link the first occurrence of every glossary term in a section's HTML."""
     known, spelled = _spelled()
     done: set[str] = set()
 
@@ -322,7 +322,7 @@ def link_terms(html: Markup) -> Markup:
 
 
 def glossary_of(pieces: Sequence[str]) -> Markup:
-    """Terms that are linked, with their meanings."""
+    """Make the list of the linked terms with their meanings."""
     linked = {name for piece in pieces for name in re.findall(r'href="#(term-[^"]*)"', piece)}
     entries = [
         Markup('<dt id="{}">{}</dt><dd>{}</dd>').format(term["id"], term["name"], term["meaning"])

@@ -1,6 +1,6 @@
-"""Colours of the page and of its plots, light and dark.
+"""Colours of the page and its plots, for a light and a dark theme.
 
-Series follow Okabe and Ito's colour-blind safe set, each made darker or lighter until it stands out.
+Series use the colour-blind safe set of Okabe and Ito, darkened or lightened for contrast.
 """
 
 from collections.abc import Mapping
@@ -40,16 +40,16 @@ _THEMES = {
     "r5": ("#8a6a00", "#e3c04a"),
     "r6": ("#59616d", "#b8c1cc"),
 }
-"""Every colour on a light and on a dark page."""
+"""Every colour in the light and in the dark theme."""
 LIGHT = {name: light for name, (light, _) in _THEMES.items()}
 DARK = {name: dark for name, (_, dark) in _THEMES.items()}
 
 
 def template(colours: Mapping[str, str]) -> dict[str, Any]:
-    """All that plots have in common, as a plotly template in the colours of a theme.
+    """Make the plotly template of all plots in the colours of a theme.
 
     Args:
-        colours: ``LIGHT`` or ``DARK``. A trace names its own colour in ``meta``.
+        colours: ``LIGHT`` or ``DARK``; each trace names its own colour in ``meta``.
     """
     text, soft, card, line = (colours[name] for name in ("text", "soft", "card", "line"))
     clear = "rgba(0,0,0,0)"

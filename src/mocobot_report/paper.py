@@ -1,4 +1,4 @@
-"""The paper's experiment: largest errors, Tables II-V beside ours, trials, estimates against the truth."""
+"""Report of the paper's experiment: largest errors, Tables II-V beside ours, trials, estimates against the truth."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -32,7 +32,7 @@ COLUMNS = {
     "uncalibrated": ("uncalibrated", "square"), ONE_FIT: ("nominal", "circle-open"),
     SELF_CALIBRATED: ("c1", "triangle-up"), TRANSFER: ("c1", "triangle-up-open"),
 }  # fmt: skip
-"""Colour and marker of each column of the paper's tables: the paper, presets, fits."""
+"""Colour and marker of each column of the tables: the paper, presets and fits."""
 OTHER_COLOURS, OTHER_MARKERS = ("c1", "c2"), ("triangle-up", "circle-open", "x")
 SENSORS = {
     "ideal": "exact sensors",
@@ -43,7 +43,7 @@ SENSORS = {
     TRANSFER: "the uncalibrated team as one payload has calibrated it, carrying the others",
 }
 LEAST = 1e-7
-"""Errors below this share of a unit are drawn at it: a logarithmic axis has no zero."""
+"""Smallest drawn error [unit of the axis]; smaller ones are drawn there, as a logarithmic axis has no zero. Chosen."""
 NARROW = {"margin.l": 46, "xaxis.tickfont.size": 9}
 MICRO = 1e6
 EXTREMES = {
@@ -51,11 +51,11 @@ EXTREMES = {
     "rod error [µm]": ("rod_error_m", MICRO), "weld error [µm]": ("weld_error_m", MICRO),
     "weld angle [µdeg]": ("weld_error_deg", MICRO),
 }  # fmt: skip
-"""Columns of the trials' checks: key and scale."""
+"""Columns of the table of trials, with key and scale of each."""
 
 
 def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
-    """Data of ``assets/paper.html``."""
+    """Return the data of ``assets/paper.html``."""
     say("paper's tables")
     paper: Paper = result.found
     summary, payloads = summary_table(paper.scores), list(next(iter(paper.scores.values())))
@@ -84,7 +84,7 @@ def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
 
 
 def _ratio(summary: PaperTable, preset: str) -> str | None:
-    """How many times smaller or larger the largest errors are than the published ones."""
+    """State by which factors the largest errors are smaller or larger than the published ones."""
     k = summary.columns.index(preset)
     pairs = [(row.cells[0].value, row.cells[k].value) for row in summary.rows]
     ratios = [published / ours for published, ours in pairs if published and ours]
@@ -99,7 +99,7 @@ def _ratio(summary: PaperTable, preset: str) -> str | None:
 
 
 def _beyond_calibration(paper: Paper, column: str) -> dict[str, str] | None:
-    """The largest errors of a team that was calibrated, in the encoders' frames; None for other columns."""
+    """Return the largest errors of a calibrated team in the frames of the encoders; None for other columns."""
     entries = [entry for entry in paper.scores[column].values() if entry is not None]
     shares = [entry[SPRING_SCALE] for entry in entries if SPRING_SCALE in entry]
     table = summary_table(paper.scores)
@@ -122,7 +122,7 @@ def _beyond_calibration(paper: Paper, column: str) -> dict[str, str] | None:
 
 
 def _trust(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """Whether the simulated physics held in all trials; None where nothing says so."""
+    """Check the constraint errors of the simulation in all trials; None without data."""
     if not trials:
         return None
     worst = {key: max(t[key] for t in trials) for key in ("rod_error_m", "weld_error_m", "weld_error_deg")}
@@ -138,7 +138,7 @@ def _trust(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
 
 
 def _tables(paper: Paper) -> dict[str, Any]:
-    """Tables II-V and their charts."""
+    """Make Tables II-V and their charts."""
     two, three, four, five = paper_tables(paper.scores)
     above, one_set = "whisker: mean + standard deviation", "one set of six static holds"
     frames = "each grasp frame turned by the zero of its last gimbal axis, which nothing measured can tell"
@@ -192,13 +192,13 @@ def _cell(cell: Cell) -> Num:
 
 
 def _keys(columns: Sequence[str]) -> list[Key]:
-    """Legend of the columns; presets that nobody knows yet get what is left."""
+    """Make the legend of the columns; unknown presets get the remaining colours and markers."""
     left = zip(cycle(OTHER_COLOURS), cycle(OTHER_MARKERS))
     return [Key(name, name, *(COLUMNS[name] if name in COLUMNS else next(left))) for name in columns]
 
 
 def _table_chart(table: PaperTable, title: str, note: str) -> Chart:
-    """One column per row of a table of one unit, one dot per preset; whiskers reach up by the spread."""
+    """Plot one column per row of a table with one unit, and one dot per preset; whiskers show the spread upward."""
     legend, rows, unit = _keys(table.columns), table.rows, spelled_text(f"[{table.rows[0].unit}]")
     data, seen = [], []
     for k, key in enumerate(legend):
@@ -212,7 +212,7 @@ def _table_chart(table: PaperTable, title: str, note: str) -> Chart:
             + f" {unit}"
             for row, c in zip(rows, cells, strict=True)
         ]
-        # Downward a whisker has no meaning on a logarithmic axis.
+        # On a logarithmic axis, a downward whisker has no meaning.
         up = {"array": spreads, "arrayminus": [0.0] * len(rows), "thickness": 1.3, "width": 3}
         aside = _aside(k, legend, min(0.16, 0.85 / len(legend)))
         data.append(dots([n + aside for n in range(len(rows))], values, key, text))
@@ -224,7 +224,7 @@ def _table_chart(table: PaperTable, title: str, note: str) -> Chart:
 
 
 def _summary_chart(table: PaperTable) -> Chart:
-    """The largest errors in percent or degrees, one line per quantity."""
+    """Plot the largest errors in percent or degrees, one row per quantity."""
     rows = [row for row in table.rows if row.unit in ("%", "deg")]
     names = [f"{row.quantity} [{row.unit}]" + (f", {row.frames}" if row.frames else "") for row in rows]
     wide = any(row.frames for row in rows)
@@ -244,7 +244,7 @@ def _summary_chart(table: PaperTable) -> Chart:
 
 
 def _trial_chart(estimates: Mapping[tuple[str, str], PayloadEstimate]) -> Chart | None:
-    """Errors of the principal moments from every single recording."""
+    """Plot the errors of the principal moments from every single recording."""
     payloads = list(dict.fromkeys(payload for payload, _ in estimates))
     legend, seen = _keys(list(dict.fromkeys(preset for _, preset in estimates))), []
     data: list[Trace] = []
@@ -281,14 +281,14 @@ def _drawn(value: float | None) -> float | None:
 
 
 def _aside(k: int, legend: Sequence[Key], apart: float) -> float:
-    """How far the dots of an entry of the legend stand from the middle of their column."""
+    """Return the offset of the dots of legend entry k from the middle of their column."""
     return apart * (k - (len(legend) - 1) / 2)
 
 
 def _by_payload(
     columns: Sequence[tuple[str, str]], title: str, seen: Iterable[float | None]
 ) -> dict[str, Any]:
-    """Columns of (payload, quantity) over a logarithmic axis: the payload named once, every second one shaded."""
+    """Make the axes for columns (payload, quantity): each payload named once, every second one shaded."""
     names, shaded = [], []
     for k, (payload, group) in enumerate(groupby(columns, key=lambda column: column[0])):
         each, start = list(group), len(names)
@@ -304,7 +304,7 @@ def _by_payload(
 
 
 def _against_truth(paper: Paper, payload: str) -> tuple[list[str], list[list[Entry]]]:
-    """Presets, and rows of truth and estimates for one payload."""
+    """Return the presets, and rows of truth and estimates for one payload."""
     truth = payload_truth(payload)
     found = {preset: e for (p, preset), e in paper.estimates.items() if p == payload}
     rows: list[list[Entry]] = [["mass", "kg", value(truth.mass, 5), *map(mass, found.values())]]
@@ -321,7 +321,7 @@ def _against_truth(paper: Paper, payload: str) -> tuple[list[str], list[list[Ent
 
 
 def _trials(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """Tiles of the worst, and a row for each trial."""
+    """Make tiles with the largest values, and one row per trial."""
     if not trials:
         return None
     worst = {key: max(t[key] for t in trials) for key, _ in EXTREMES.values()}

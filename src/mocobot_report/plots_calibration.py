@@ -1,4 +1,4 @@
-"""Pictures of a calibration: parameters against priors, what recordings leave over, what each of them contributes."""
+"""Pictures of a calibration: parameters against priors, misfit of recordings, information from each recording."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
 
 @plain_words()
 def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
-    """Draw everything into an existing folder and return the paths."""
+    """Draw all pictures into an existing folder and return their paths."""
     figures = {
         folder / "deviations.png": _deviations(calibration),
         folder / "recordings.png": _recordings(calibration),
@@ -33,7 +33,7 @@ def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
 
 
 def _deviations(calibration: Calibration) -> Figure:
-    """One panel per kind: every robot's entries with two standard errors, the prior as a band."""
+    """Draw one panel per kind of deviation, with bars of two standard errors and the prior as a band."""
     groups = shown_groups(calibration)
     columns = 2
     rows = -(-len(groups) // columns)

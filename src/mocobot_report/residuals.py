@@ -1,4 +1,4 @@
-"""A diagnosis' residuals and evidence: over time, against quantities, by place, along single sources."""
+"""Charts of a diagnosis' residuals and evidence: over time, against quantities, by place, and along single sources."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import zip_longest
@@ -36,25 +36,25 @@ Values = Mapping[str, Any]
 BAND = Key("", "±2 standard deviations of clean data", "band", "band")
 CLEAN = Key("", "clean data", "text", "dash")
 LOG_FROM = 8.0
-"""Multiples of clean noise above which an axis is logarithmic."""
+"""Residual above which an axis is logarithmic [multiples of clean noise]. Chosen."""
 QUANTITIES = {
     "speed": "m/s", "velocity": "m/s", "position": "m", "acceleration": "m/s²", "load": "N m", "force": "N",
     "temperature": "°C",
 }  # fmt: skip
-"""Units of what a misfit of a team may depend on."""
+"""Units of the quantities against which a team's misfit is plotted."""
 OF_JOINTS = {"speed": "typical speeds"}
-"""Those that differ for a robot of joints."""
+"""Entries of ``QUANTITIES`` that differ for a single robot."""
 
 
 def misfits(*, named: bool, lines: bool = False) -> tuple[Key, Key]:
-    """The misfit as simulated, and that within tolerances with the causes that are named, if any; dots or lines."""
+    """Make legend entries for the misfit as simulated, and for that with tolerances and the named causes, if any."""
     after = "with causes and tolerances" if named else "with tolerances"
     square, circle = ("line", "line") if lines else ("square", "circle")
     return Key("before", "as simulated", "before", square), Key("after", after, "after", circle)
 
 
 def residuals(found: Diagnosed, names: Sequence[str], say: Callable[[str], object]) -> dict[str, Any] | None:
-    """Charts and rows of ``residuals.npz``; None without it."""
+    """Make charts and table rows from ``residuals.npz``; None without that file."""
     traces = found.traces
     if not traces:
         return None
@@ -84,7 +84,7 @@ def residuals(found: Diagnosed, names: Sequence[str], say: Callable[[str], objec
 
 
 def _components(grouped: Sequence[Group]) -> list[Key]:
-    """A legend of components, each labelled as in the last group that has it; a group of one has none."""
+    """Make the legend of the components, each with the label of the last group that has it."""
     several = [group.components for group in grouped if len(group.columns) > 1]
     labels = [next(filter(None, each[::-1])) for each in zip_longest(*several)] or ["value"]
     return [Key(f"c{k + 1}", shown, f"c{k % 3 + 1}") for k, shown in enumerate(labels)]
@@ -93,7 +93,7 @@ def _components(grouped: Sequence[Group]) -> list[Key]:
 def _channels(
     trace: Trace, values: Array, grouped: Sequence[Group], units: Mapping[str, Shown], most: int
 ) -> list[Panel]:
-    """One panel for each group of channels, with a band of clean data."""
+    """Make one panel per group of channels, with a band of clean data."""
     keys, n, panels = _components(grouped), trace.moving, []
     for group in grouped:
         columns, (unit, scale) = list(group.columns), units[group.unit]
@@ -114,7 +114,7 @@ def _physical(title: str, panels: Sequence[Panel], grouped: Sequence[Group], nam
 
 
 def _lines(trace: Trace, values: Array, keys: Sequence[Key], most: int) -> list[Line]:
-    """Columns over time: the series as lines, means of holds as points."""
+    """Plot columns over time: the time series as lines, the means over holds as points."""
     n = trace.moving
     time, shown = thinned(trace.time[:n], values[:n], 1.0 / trace.rate_hz, most)
     columns = range(values.shape[1])
@@ -125,7 +125,7 @@ def _lines(trace: Trace, values: Array, keys: Sequence[Key], most: int) -> list[
 
 
 def _multiples(trace: Trace, name: str, grouped: Sequence[Group], named: bool) -> Chart:
-    """Running rms of each group of channels over clean noise."""
+    """Plot the running rms of each group of channels relative to clean noise."""
     keys, panels = misfits(named=named, lines=True), []
     for group in grouped:
         lines, top = [], 1.0
@@ -144,7 +144,7 @@ def _multiples(trace: Trace, name: str, grouped: Sequence[Group], named: bool) -
 def _rms(
     traces: Sequence[Trace], grouped: Sequence[Group], units: Mapping[str, Shown], *, named: bool
 ) -> list[list[Entry]]:
-    """Physical and whitened rms of every channel, over all trials."""
+    """Tabulate physical and whitened rms of every channel over all trials."""
     kinds = ("before", "after") if named else ("before",)
     rows: list[list[Entry]] = []
     for group in grouped:
@@ -158,14 +158,14 @@ def _rms(
 
 
 def _root(traces: Sequence[Trace], kind: str, column: int) -> float:
-    """Rms of one channel over all trials."""
+    """Return the rms of one channel over all trials."""
     return float(np.sqrt(np.mean(np.concatenate([getattr(t, kind)[:, column] for t in traces]) ** 2)))
 
 
 def _dependence(
     traces: Sequence[Trace], group: Group, quantity: str | None, units: Mapping[str, str], keys: Sequence[Key]
 ) -> Chart:
-    """Whitened rms of a group of channels against a quantity; against frequency where that is None."""
+    """Plot the whitened rms of a group of channels against a quantity, or against frequency if it is None."""
     what, unit = quantity or "frequency", units.get(quantity, "") if quantity else "Hz"
     style = {"mode": "lines+markers", "marker": {"size": 5}} if quantity else {}
     data, seen, columns = [], [1.0], list(group.columns)
@@ -186,7 +186,7 @@ def _dependence(
 
 
 def places(values: Values, names: Sequence[str]) -> dict[str, Any]:
-    """Misfit by channel and trial, and where it points."""
+    """Make charts of the misfit by channel and trial, and of its share along single sources."""
     keys = misfits(named=bool(values["causes"]))
     before, after = values["residual"]["nominal"]["signature"], values["residual"]["signature"]
     charts = []
@@ -203,7 +203,7 @@ def places(values: Values, names: Sequence[str]) -> dict[str, Any]:
 
 
 def _misfit(title: str, before: Values, after: Values, shown: Values, keys: Sequence[Key]) -> Chart:
-    """chi²/n of every channel or trial, before and after, by the names that are shown for some."""
+    """Plot chi²/n of every channel or trial, before and after; ``shown`` maps names to labels."""
     rows = list(before)
     names = [shown.get(row, row) for row in rows]
     data, seen = [], [1.0]
@@ -218,7 +218,7 @@ def _misfit(title: str, before: Values, after: Values, shown: Values, keys: Sequ
 
 
 def _along(title: str, shares: Values, colour: str) -> Chart:
-    """Share of the squared residual along single sources."""
+    """Plot the share of the squared residual along single sources."""
     text = [percent(share) for share in shares.values()]
     more = {"cliponaxis": False, "textposition": "auto", "insidetextanchor": "end"}
     data = bars(list(shares.values()), Key("", "", colour, "band"), text, 0.62, **more)
@@ -240,7 +240,7 @@ RELATIONS = (
 
 
 def evidence(values: Values) -> list[Chart]:
-    """The evidence for the strongest candidates, before and after what is named is in the model; on one scale."""
+    """Plot the evidence for the strongest candidates, without and with the named causes in the model, on one scale."""
     titles = {"before": "Nothing is named yet", "after": "What is named is in the model"}
     panels = [(title, drawn(values["evidence"][key] or [])) for key, title in titles.items()]
     seen = [entry[key] for _, entries in panels for entry in entries for key in ("nats", "needed")]

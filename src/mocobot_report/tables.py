@@ -1,4 +1,4 @@
-"""Tables of the page and of notebooks: cells with errors and units, rendered by ``assets/table.html``."""
+"""Tables for the page and for notebooks, with errors and units in their cells; ``assets/table.html`` renders them."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ from mocobot_report.numbers import (
 
 @dataclass(frozen=True)
 class Num:
-    """A number in a table, with its error or spread, and a unit where the column has none; right-aligned."""
+    """Right-aligned number in a table, with its error or spread, and a unit if the column has none."""
 
     text: str
     error: str = ""
@@ -36,12 +36,12 @@ class Num:
 
 
 Entry = str | Num
-"""A cell; HTML in it is ``Markup``, other text is escaped."""
+"""A cell of a table; text is escaped unless it is ``Markup``."""
 
 
 @cache
 def templates() -> Environment:
-    """The page's templates; every text is escaped, an unknown name is an error."""
+    """Load the templates of the page; they escape all text, and an unknown name is an error."""
     made = Environment(
         loader=PackageLoader("mocobot_report", "assets"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, auto_reload=False,
@@ -55,19 +55,18 @@ def table(
     caption: str, head: Sequence[str], rows: Sequence[Sequence[Entry]], *, note: str = "", headers: int = 1,
     groups: bool = False, stack: bool = False,
 ) -> Markup:  # fmt: skip
-    """A table in a box of its own that scrolls if it is too wide.
+    """Make a table in a box that scrolls if the table is too wide.
 
-    A column ``unit`` right after the row headers is written behind them, so that narrow screens show the numbers.
+    A column ``unit`` directly after the row headers moves into them, so that narrow screens show the numbers.
 
     Args:
-        caption: what it shows.
-        head: names of the columns; a unit in brackets is kept together.
-        rows: entries; the first ``headers`` of each are row headers.
+        caption: caption of the table.
+        head: names of the columns; a unit in brackets does not wrap.
+        rows: cells; the first ``headers`` cells of each row are row headers.
         note: second line of the caption.
-        headers: number of leading columns that head their rows.
-        groups: an empty first entry continues the group above.
-        stack: on narrow screens every row is a heading, with its entries and their columns' names below; for tables
-            whose rows have long names.
+        headers: number of leading columns with row headers.
+        groups: whether an empty first cell continues the group above.
+        stack: whether narrow screens show every row as a heading with its cells below, for rows with long names.
     """
     if len(head) > headers and head[headers] == "unit":
         head = [*head[:headers], *head[headers + 1 :]]
@@ -84,7 +83,7 @@ def table(
 
 
 def _with_unit(name: Entry, unit: Entry) -> Markup:
-    """A row's header with its unit behind it."""
+    """Append a unit to a row header."""
     shown, text = (entry.text if isinstance(entry, Num) else entry for entry in (name, unit))
     return Markup('{} <span class="unit">{}</span>' if text else "{}").format(shown, text)
 
@@ -93,28 +92,28 @@ SYMBOL = re.compile(r"\b([RpIT])_?(1c|\d\d|\d|xx|yy|zz|xy|xz|yz|b)\b")
 
 
 def quantity(text: str) -> Markup:
-    """The name of a quantity, such as ``p_1c x``, with its indices lowered."""
+    """Typeset the name of a quantity, such as ``p_1c x``, with subscripts."""
     return Markup(SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", str(Markup.escape(text))))
 
 
 def bullets(sentences: Sequence[str]) -> Markup:
-    """A list of sentences; nothing where there are none."""
+    """Make a bullet list of sentences; empty without sentences."""
     items = Markup("").join(Markup("<li>{}</li>").format(sentence) for sentence in sentences)
     return Markup("<ul>{}</ul>").format(items) if items else Markup("")
 
 
 def value(number: float | None, digits: int = 3, *, mark: bool = False) -> Num:
-    """A number of so many significant digits."""
+    """Make a cell with a number of ``digits`` significant digits."""
     return Num(plain(number, digits), mark=mark)
 
 
 def measurement(number: float | None, se: float | None, unit: str = "") -> Num:
-    """Value and standard error, rounded to the error's second digit."""
+    """Make a cell with value and standard error, rounded to the second digit of the error."""
     return Num(*measured(number, se), unit=unit)
 
 
 def component(values: ArrayLike | None, errors: ArrayLike | None, k: int, scale: float = 1.0) -> Num:
-    """One component of a measured vector; a dash where it is not known."""
+    """Make a cell with component k of an estimated vector; a dash if it is unknown."""
     if values is None or errors is None:
         return Num(NONE)
     return measurement(scale * float(np.asarray(values)[k]), scale * float(np.asarray(errors)[k]))
@@ -124,7 +123,7 @@ def vector(
     name: str, unit: str, found: Sequence[tuple[ArrayLike | None, ArrayLike | None]], scale: float = 1.0,
     parts: str = "xyz",
 ) -> list[list[Entry]]:  # fmt: skip
-    """Three rows: a component's name, the unit, and the component of every measured vector and error in ``found``."""
+    """Make three rows with name, unit and the components of the estimated vectors with errors in ``found``."""
     return [
         [quantity(f"{name} {part}"), unit, *(component(values, errors, k, scale) for values, errors in found)]
         for k, part in enumerate(parts)
@@ -132,24 +131,24 @@ def vector(
 
 
 def mass(e: PayloadEstimate) -> Num:
-    """The mass [kg]."""
+    """Make a cell with the mass [kg]."""
     return measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE)
 
 
 def place(e: PayloadEstimate, k: int) -> Num:
-    """One coordinate of the centre of mass in {1} [mm]."""
+    """Make a cell with coordinate k of the centre of mass in {1} [mm]."""
     return component(e.p_1c, e.p_1c_se_m, k, 1e3)
 
 
 def moment(e: PayloadEstimate, k: int) -> Num:
-    """One principal moment of inertia [kg m²]."""
+    """Make a cell with principal moment of inertia k [kg m²]."""
     if e.inertia is None:
         return Num(NONE)
     return component(e.inertia.principal.moments, e.inertia.principal.moments_se, k)
 
 
 def distance(e: PayloadEstimate, i: int, j: int) -> Num:
-    """Distance of two grasps [mm]; robots counted from 1."""
+    """Make a cell with the distance between grasps i and j [mm]; robots count from 1."""
     if e.grasps is None or max(i, j) > e.robots:
         return Num(NONE)
     pair = e.grasps.pair(i, j)
@@ -157,24 +156,24 @@ def distance(e: PayloadEstimate, i: int, j: int) -> Num:
 
 
 def cause_name(words: str, cause: str) -> Markup:
-    """A cause in words, and softly what the command line calls it."""
+    """Write a cause in words, followed by its name on the command line."""
     return Markup('{} <code class="id">{}</code>').format(tidy(words), cause)
 
 
 def numbers_of(cause: Mapping[str, Any]) -> list[tuple[str, str, Mapping[str, Any]]]:
-    """Parameters of a cause: name, place and value; the place only of one that all joints have, for every joint."""
+    """List name, place and value of a cause's parameters; the place is empty unless the cause has several places."""
     members = cause.get("members", ())
     places = [(m["place"], m) for m in members] if len(members) > 1 else [("", cause)]
     return [(name, place, entry) for place, of in places for name, entry in of["parameters"].items()]
 
 
 def sentence_of(cause: Mapping[str, Any]) -> str:
-    """What a cause does, and what else it may be with a chance that counts."""
+    """Return the sentence of a cause, followed by its plausible rivals."""
     others = [entry["name"] for entry in cause.get("told", ()) if entry["name"] != cause["name"]]
     also = f" It may as well be {' or '.join(others)}." if others else ""
     return tidy(f"{cause['sentence']}{also}")
 
 
 def chance_of(chance: float) -> str:
-    """A probability in percent, without the sign."""
+    """Format a probability in percent, without the percent sign."""
     return without_percent(probability(chance))

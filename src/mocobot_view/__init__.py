@@ -1,1 +1,1 @@
-"""Replay and pictures."""
+"""Replays and pictures of recordings, estimates and diagnoses."""

@@ -1,4 +1,4 @@
-"""The layout of a replay: the scene left, text and series right."""
+"""Layout of a replay in the viewer: scene on the left, text and plots on the right."""
 
 import uuid
 from collections.abc import Sequence
@@ -17,19 +17,19 @@ from mocobot_view.robot import robot_shapes
 
 TIMELINE = "time"
 
-# The viewer's own legend lies on top of a plot's first seconds, and shows six of nine lines where there is room.
+# Own legends ("keys") replace the viewer's, which hides the first seconds of a plot and has room for few lines.
 
 PARTS = {"joints": ("1", "2", "3"), "axes": ("x", "y", "z"), "robots": ("",)}
-"""Keys, and what the lines of one robot are."""
+"""Legends by name, with the labels of the lines of one robot."""
 NAME, DOT, GAP = 2.4, 1.0, 0.6
-"""Widths of a robot's name, of a dot, and between robots; in any unit."""
+"""Widths of a robot's name, of a dot, and of the gap between robots, in arbitrary units. Chosen."""
 ROBOT = NAME + 3 * DOT + GAP
 MIDDLE = 0.3, 0.6
-"""What is in the middle of the strip, so narrow that its width counts; dots are at 0, and their names hang below."""
+"""Vertical range of a legend, narrow so that its width sets the scale; dots are at 0 with labels below. Chosen."""
 
 
 def log_keys(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
-    """Log all keys below the series in the trial's root."""
+    """Log all legends below the series in the root of the trial."""
     for key, parts in PARTS.items():
         places, labels, tones, radii = [], [], [], []
         for robot in range(1, trial.robots + 1):
@@ -54,7 +54,7 @@ def log_keys(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
 
 
 def key_view(trial: ReplayTrial, key: str) -> rrb.Spatial2DView:
-    """A key as a strip as wide as the plots below it."""
+    """Make the view of a legend, a strip as wide as the plots below it."""
     return rrb.Spatial2DView(
         origin=f"/{_path(trial, key)}",
         name="key",
@@ -70,30 +70,30 @@ def _path(trial: ReplayTrial, key: str) -> str:
 FOVY_DEG = 55.0
 """Vertical angle of view of the viewer's 3D views [deg]."""
 AZIMUTH, ELEVATION = 135.0, -36.0
-"""Direction of view that is preferred [deg]."""
+"""Preferred direction of view [deg]. Chosen."""
 INSTANTS = 50
-"""Instants of a trial at which everything must be in sight."""
+"""Number of instants of a trial at which the view must show everything. Chosen."""
 
 
 def scene_eye(trial: ReplayTrial, aspect: float) -> rrb.EyeControls3D:
-    """All robots and the payload over the whole trial, from where the robots hide each other least.
+    """Place the eye so that it sees robots and payload during the whole trial, with little occlusion.
 
     Args:
-        trial: what is shown.
-        aspect: width over height of the narrowest view that must hold it.
+        trial: trial to show.
+        aspect: width over height of the narrowest view that must show everything.
     """
     return _eye(clearest(_seen(trial), trial.bases.p_Wb, AZIMUTH, ELEVATION, aspect, FOVY_DEG))
 
 
 def path_eye(trial: ReplayTrial, robot: int, aspect: float) -> rrb.EyeControls3D:
-    """A robot's whole wrist path, measured and commanded, in its {b}; robots count from 0."""
+    """Place the eye so that it sees a robot's whole wrist path, measured and commanded, in {b}; robots count from 0."""
     ref = trial.recording.ref
     paths = [trial.bodies.wrist[:, robot]] if ref is None else [trial.bodies.wrist[:, robot], ref[:, robot]]
     return _eye(framing(np.concatenate(paths), AZIMUTH, ELEVATION, aspect, FOVY_DEG))
 
 
 def _seen(trial: ReplayTrial) -> Array:
-    """Corners of the boxes around robots and payload and the tips of the forces in the world [m], shape (K, 3)."""
+    """Return corners of boxes around robots and payload, and tips of force arrows, in the world [m], shape (K, 3)."""
     standing = _box(robot_shapes(trial.recording.metadata.design).standing.triangles.vertices)
     every = slice(None, None, max(1, len(trial.time) // INSTANTS))
     points = []
@@ -115,7 +115,7 @@ def _seen(trial: ReplayTrial) -> Array:
 
 
 def _box(vertices: Array) -> Array:
-    """Corners of the box around points, shape (8, 3)."""
+    """Return the corners of the bounding box of points, shape (8, 3)."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     return 0.5 * (low + high) + 0.5 * CORNERS * (high - low)
 
@@ -127,24 +127,24 @@ def _eye(camera: Camera) -> rrb.EyeControls3D:
 
 
 TRAIL_S = 3.0
-"""Length of the visible wrist paths."""
+"""Duration of the visible part of the wrist paths [s]. Chosen."""
 BACKGROUND = (100, 108, 120)
 SCENE_ASPECT = {1: 0.7, 2: 1.5}
-"""Width over height of the scene, by the number of trials, in a window 800 wide and a bit higher than that; 1 for more
-trials."""
+"""Width over height of the scene by number of trials, 1 for more trials. Measured in a window 800 px wide and slightly
+higher."""
 KEY_SHARE = 0.07
-"""Height of a key over that of its plots, in a column of full height."""
+"""Height of a legend relative to one plot, in a column of full height. Chosen."""
 ALL_PLOTS = uuid.UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
-"""The viewer keeps the range of time that linked plots share with a view of this id (GLOBAL_VIEW_ID in its sources;
-nothing in its interface sets that range). Unset, it is 30 s before and after the cursor for trials of over 60 s."""
+"""Id of the view with which the viewer stores the shared time range of linked plots (GLOBAL_VIEW_ID in its sources).
+Its interface cannot set that range; the default shows only 30 s around the cursor for trials longer than 60 s."""
 
 
 def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blueprint:
-    """Ready layout; several trials stand side by side, each with its own scene and series.
+    """Make the layout; several trials stand side by side, each with its own scene and plots.
 
     Args:
-        trials: what is shown.
-        tab: name of the tab that is open at first; None for the summary of one trial, the joints of several.
+        trials: trials to show.
+        tab: name of the initial tab; None for the summary of a single trial, or the joints of several.
     """
     aspect = SCENE_ASPECT.get(len(trials), 1.0)
     if len(trials) == 1:
@@ -169,7 +169,7 @@ def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blue
 
 
 def playing(body: rrb.Container) -> rrb.Blueprint:
-    """A layout that plays from the start, its panels out of the way."""
+    """Make a layout that starts playing with collapsed panels."""
     return rrb.Blueprint(
         body,
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all"),
@@ -181,11 +181,11 @@ def playing(body: rrb.Container) -> rrb.Blueprint:
 
 
 def scene_view(trial: ReplayTrial, aspect: float = 1.0) -> rrb.Spatial3DView:
-    """The 3D view of one trial, seen from above, everything in sight.
+    """Make the 3D view of one trial, seen from above, with everything in sight.
 
     Args:
-        trial: what is shown.
-        aspect: width over height of the narrowest view that must hold it.
+        trial: trial to show.
+        aspect: width over height of the narrowest view that must show everything.
     """
     window = rrb.VisibleTimeRange(
         TIMELINE,
@@ -199,7 +199,7 @@ def scene_view(trial: ReplayTrial, aspect: float = 1.0) -> rrb.Spatial3DView:
 def world_view(
     name: str, contents: list[str], eye: rrb.EyeControls3D, overrides: dict[Any, Any] | None = None
 ) -> rrb.Spatial3DView:
-    """A 3D view of what is below a name, over a floor with a grid."""
+    """Make a 3D view of the entities below a name, over a floor with a grid."""
     return rrb.Spatial3DView(
         origin=f"/{name}",
         contents=contents,
@@ -214,7 +214,7 @@ def world_view(
 
 
 def plot_view(origin: str, title: str, axis_y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
-    """Series below a path, on the time that all plots share."""
+    """Make a plot of the series below a path, on the time axis that all plots share."""
     return rrb.TimeSeriesView(
         origin=origin,
         name=title,
@@ -225,7 +225,7 @@ def plot_view(origin: str, title: str, axis_y: rrb.ScalarAxis | None = None) -> 
 
 
 def trail_paths(trial: ReplayTrial) -> list[str]:
-    """Entities that hold wrist paths piece by piece, to be seen over a window of time."""
+    """List the entities with the segments of the wrist paths, which are visible for ``TRAIL_S``."""
     return [f"{trial.name}/omnid{i + 1}/base/wrist" for i in range(trial.robots)]
 
 
@@ -268,7 +268,7 @@ def _series(trial: ReplayTrial, key_share: float) -> list[rrb.Container | rrb.Vi
 
 
 def _paths(trial: ReplayTrial) -> rrb.Grid:
-    """Close views of every wrist's whole path, in its {b}."""
+    """Make close views of the whole path of every wrist in its {b}."""
     whole = rrb.VisibleTimeRange(
         TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite()
     )
@@ -290,7 +290,7 @@ def _paths(trial: ReplayTrial) -> rrb.Grid:
 
 
 def _missing(trial: ReplayTrial) -> set[str]:
-    """Series that this trial does not have."""
+    """Return the names of the series that this trial lacks."""
     given = {
         ("omega", "velocity", "force", "moment"): trial.data,
         ("grasp_position_mm", "grasp_rotation_mrad"): trial.motion,
@@ -302,7 +302,7 @@ def _missing(trial: ReplayTrial) -> set[str]:
 
 def _plot(trial: ReplayTrial, quantity: str, title: str) -> rrb.TimeSeriesView:
     top = None
-    if trial.motion is not None and quantity.startswith("grasp_"):  # distances: from zero up
+    if trial.motion is not None and quantity.startswith("grasp_"):  # distances start at zero
         gap = trial.motion.gap_position_m if "position" in quantity else trial.motion.gap_rotation_rad
         top = 1e3 * float(gap.max()) or None
     axis_y = None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top))
@@ -310,7 +310,7 @@ def _plot(trial: ReplayTrial, quantity: str, title: str) -> rrb.TimeSeriesView:
 
 
 def _share_range(body: rrb.Container, end_s: float) -> None:
-    """Let all linked plots show the time from 0 to ``end_s``: the first of them holds the range for all."""
+    """Let all linked plots show the time from 0 to ``end_s`` [s]; the first plot stores the range for all."""
     plot = next(view for view in _views(body) if isinstance(view, rrb.TimeSeriesView))
     plot.id = ALL_PLOTS
     boundary = rrb.TimeRangeBoundary.absolute

@@ -1,4 +1,4 @@
-"""Where a picture is taken from, and what is drawn into it beside the model: lines, arrows, ellipsoids, words."""
+"""Camera of a picture, and marks drawn over the model: lines, arrows, ellipsoids, labels."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
     from matplotlib.transforms import Bbox
 
 MARGIN = 0.04
-"""Share of the picture that stays free at each side."""
+"""Empty margin at each side, as a share of the picture. Chosen."""
 NEAREST = 0.1
-"""Least distance of the camera from the nearest point, over the points' spread."""
+"""Smallest distance of the camera from the nearest point, relative to the spread of the points. Chosen."""
 TURNS = (0.0, *(sign * turn for turn in range(15, 180, 15) for sign in (-1, 1)), 180.0)
-"""Other directions that ``clearest`` tries [deg]; the first of equal ones is taken."""
+"""Azimuth offsets that ``clearest`` compares [deg]; the first of equally good ones wins."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
 @dataclass(frozen=True)
 class Camera:
-    """From where to look: MuJoCo's free camera.
+    """Pose of MuJoCo's free camera.
 
     Attributes:
         lookat: point in the middle of the picture [m], three numbers.
-        distance: from there [m].
+        distance: distance of the camera from that point [m].
         azimuth, elevation: direction of view [deg].
     """
 
@@ -46,7 +46,7 @@ class Camera:
     elevation: float
 
     def axes(self) -> Array:
-        """Right, up and forward in the world, rows of shape (3, 3)."""
+        """Return the directions right, up and forward in the world as rows, shape (3, 3)."""
         a, e = np.deg2rad([self.azimuth, self.elevation])
         forward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
         right = np.array([np.sin(a), -np.cos(a), 0.0])
@@ -54,9 +54,9 @@ class Camera:
 
 
 def corners(model: mujoco.MjModel, qpos: Array) -> Array:
-    """Corners of the boxes around all that is visible of a model and moves or stands on the floor [m], shape (K, 3)."""
+    """Return the corners of the bounding boxes of all visible geoms except planes [m], shape (K, 3)."""
     data = posed(model, qpos)
-    seen = np.isin(model.geom_group, VISIBLE_GROUPS) & (model.geom_rbound > 0)  # planes have no bound
+    seen = np.isin(model.geom_group, VISIBLE_GROUPS) & (model.geom_rbound > 0)  # planes are unbounded
     boxes = model.geom_aabb[seen]
     local = boxes[:, None, :3] + CORNERS * boxes[:, None, 3:]
     R = data.geom_xmat[seen].reshape(-1, 3, 3)
@@ -64,13 +64,14 @@ def corners(model: mujoco.MjModel, qpos: Array) -> Array:
 
 
 def framing(points: ArrayLike, azimuth: float, elevation: float, aspect: float, fovy_deg: float) -> Camera:
-    """The nearest camera of a direction that has all points in the picture, with a margin around.
+    """Place the camera as near as possible so that all points lie in the picture, with a margin.
 
-    Across the picture a point at (x, y, z) in the camera's axes is inside if |x - c| <= t (d + z), with t the tangent
-    of half the angle of view: two points decide on d. Everything is then shifted into the middle of the picture.
+    A point at (x, y, z) in the axes of the camera lies in the picture if |x - c| <= t (d + z). Here t is the tangent
+    of half the angle of view, d the distance and c the shift of the camera. Two points determine d; the shift then
+    centres the points.
 
     Args:
-        points: what must be seen [m], shape (K, 3).
+        points: points that must be visible [m], shape (K, 3).
         azimuth, elevation: direction of view [deg].
         aspect: width over height of the picture.
         fovy_deg: vertical angle of view [deg].
@@ -90,16 +91,16 @@ def framing(points: ArrayLike, azimuth: float, elevation: float, aspect: float, 
 def clearest(
     points: ArrayLike, feet: Array, azimuth: float, elevation: float, aspect: float, fovy_deg: float
 ) -> Camera:
-    """The camera of ``framing`` from where robots hide each other least, as near to a direction as that allows.
+    """Choose the camera of ``framing`` from which the robots hide each other least.
 
     Args:
         points, elevation, aspect, fovy_deg: as for ``framing``.
-        feet: where the robots stand [m], shape (N, 3).
-        azimuth: direction of view that is preferred [deg].
+        feet: positions of the robots on the floor [m], shape (N, 3).
+        azimuth: preferred direction of view [deg].
     """
 
     def apart(camera: Camera) -> float:
-        """Least distance of two robots in the picture, widths counting double, because robots are tall."""
+        """Smallest distance of two robots in the picture; widths count double, because robots are tall."""
         at = [2.0, 1.0] * pixels(camera, feet, aspect, 1.0, fovy_deg)
         return min((float(np.linalg.norm(a - b)) for a, b in combinations(at, 2)), default=0.0)
 
@@ -107,7 +108,7 @@ def clearest(
 
 
 def _middle(across: Array, depth: Array) -> float:
-    """Shift c that leaves as much room on one side as on the other: max (x - c) / depth = -min (x - c) / depth."""
+    """Find the shift c that centres the points: max (x - c) / depth = -min (x - c) / depth."""
 
     def excess(c: float) -> float:
         seen = (across - c) / depth
@@ -118,13 +119,16 @@ def _middle(across: Array, depth: Array) -> float:
 
 
 def pixels(camera: Camera, points: ArrayLike, width: float, height: float, fovy_deg: float) -> Array:
-    """Where points lie in a picture: columns from the left and rows from the top, NaN if behind; shape (K, 2).
+    """Project points into a picture.
 
     Args:
-        camera: from where.
-        points: [m], shape (K, 3).
-        width, height: of the picture.
+        camera: camera of the picture.
+        points: points in the world [m], shape (K, 3).
+        width, height: size of the picture [px].
         fovy_deg: vertical angle of view [deg].
+
+    Returns:
+        Columns from the left and rows from the top [px], shape (K, 2); NaN for points behind the camera.
     """
     x, y, z = camera.axes() @ (np.reshape(np.asarray(points, dtype=float), (-1, 3)) - camera.lookat).T
     depth = np.where(z + camera.distance > 0, z + camera.distance, np.nan)
@@ -134,12 +138,12 @@ def pixels(camera: Camera, points: ArrayLike, width: float, height: float, fovy_
 
 @dataclass(frozen=True)
 class Label:
-    """A word at a point.
+    """A short text at a point.
 
     Attributes:
-        text: a few letters.
-        point: where [m], three numbers.
-        rgb: its colour, components from 0 to 255.
+        text: text of a few letters.
+        point: position in the world [m], three numbers.
+        rgb: colour, components from 0 to 255.
     """
 
     text: str
@@ -149,13 +153,13 @@ class Label:
 
 @dataclass
 class Marks:
-    """Lines, arrows and ellipsoids drawn into a picture, in the world.
+    """Lines, arrows, ellipsoids and labels to draw into a picture, in world coordinates.
 
     Attributes:
         lines: rows of two end points [m], radius [m] and colour (red, green, blue, opacity): 11 numbers each.
-        arrows: the same for arrows from the first point to the second.
+        arrows: rows of the same form, for arrows from the first point to the second.
         ellipsoids: rows of centre [m], rotation matrix row by row, semi-axes [m] and colour: 19 numbers each.
-        labels: words, in front of everything.
+        labels: texts, drawn in front of everything.
     """
 
     lines: list[list[float]] = field(default_factory=list)
@@ -176,25 +180,25 @@ class Marks:
     def ellipsoid(
         self, centre: ArrayLike, semi_axes: ArrayLike, rgba: Sequence[float], R: ArrayLike | None = None
     ) -> None:
-        """Add an ellipsoid: centre and semi-axes [m], shapes (3,), and its axes in the world, shape (3, 3)."""
+        """Add an ellipsoid with centre and semi-axes [m], shapes (3,), and rotation R to the world, shape (3, 3)."""
         turn = np.eye(3) if R is None else np.asarray(R, dtype=float)
         size = np.broadcast_to(np.asarray(semi_axes, dtype=float), 3)
         self.ellipsoids.append([*np.asarray(centre, dtype=float), *turn.ravel(), *size, *rgba])
 
     def points(self) -> NDArray[np.float64]:
-        """Ends of lines and arrows, centres of ellipsoids, and labels [m], shape (K, 3)."""
+        """Return the ends of lines and arrows, the centres of ellipsoids and the labels [m], shape (K, 3)."""
         rows = [row[k : k + 3] for row in (*self.lines, *self.arrows) for k in (0, 3)]
         rows += [row[:3] for row in self.ellipsoids] + [list(label.point) for label in self.labels]
         return np.array(rows, dtype=float).reshape(-1, 3)
 
     def label(self, text: str, point: ArrayLike, rgb: tuple[int, int, int]) -> None:
-        """Add a word at a point [m], shape (3,)."""
+        """Add a text at a point [m], shape (3,)."""
         x, y, z = (float(part) for part in np.asarray(point, dtype=float))
         self.labels.append(Label(text, (x, y, z), rgb))
 
 
 SIZE = 0.028
-"""Height of the letters over that of the picture, with at least so many pixels:"""
+"""Height of the letters relative to that of the picture, but at least ``LEAST_PX`` pixels. Chosen."""
 LEAST_PX = 9.0
 HALO, HALO_SHARE = "white", 0.25
 
@@ -202,14 +206,14 @@ HALO, HALO_SHARE = "white", 0.25
 def with_labels(
     picture: NDArray[np.uint8], labels: Sequence[Label], at: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """The picture with words in front of everything.
+    """Write labels into a picture, without overlaps.
 
     Args:
-        picture: shape (height, width, 3).
-        labels: what to write.
-        at: columns and rows of their middles, NaN for what is behind the camera; shape (K, 2).
+        picture: picture of shape (height, width, 3).
+        labels: texts to write, K entries.
+        at: column and row of the middle of each text [px], NaN if behind the camera; shape (K, 2).
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # an extra
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # an optional dependency
     from matplotlib.figure import Figure
     from matplotlib.patheffects import withStroke
 
@@ -224,7 +228,7 @@ def with_labels(
     figure = Figure(figsize=(width / 100.0, height / 100.0), dpi=100.0)
     canvas = FigureCanvasAgg(figure)
     figure.figimage(picture)
-    points = 0.72 * max(SIZE * height, LEAST_PX)  # of 1/72 inch, 100 pixels an inch
+    points = 0.72 * max(SIZE * height, LEAST_PX)  # font size in 1/72 inch at 100 dpi
     taken: list[Bbox] = []
     for label, x, y in sorted(inside, key=lambda entry: -entry[2]):
         text = figure.text(
@@ -238,7 +242,7 @@ def with_labels(
 
 
 def _make_room(text: Text, taken: list[Bbox], canvas: FigureCanvasAgg, width: int, height: int) -> None:
-    """Move a word into the picture, and up over the words that are there."""
+    """Move a text into the picture, and up until it overlaps no earlier text."""
     renderer = canvas.get_renderer()
     rim = 0.5 * HALO_SHARE * float(text.get_fontsize()) * 100.0 / 72.0
     for _ in range(len(taken) + 1):

@@ -1,4 +1,4 @@
-"""A log of joints in Rerun: the robot moving, and every joint's position, command, torque and the model's torque."""
+"""Replay of a joint log in Rerun: robot motion, and position, command, torque and model torque of every joint."""
 
 from __future__ import annotations
 
@@ -22,31 +22,33 @@ from mocobot_view.shapes import Shape, Triangles, body_shape, capsule, join
 from mocobot_view.stream import begin, log_lines, log_shape, send_poses
 
 POSE_HZ, SERIES_HZ = 60.0, 500.0
-"""Poses and samples a second that are drawn, at most."""
+"""Largest rates of drawn poses and of samples in the series [Hz]. Chosen."""
 SMOOTH_HZ, SMOOTH_SHARE = 20.0, 0.1
-"""Low-pass of the positions that the model's torques are computed from; a share of the rate where that is less."""
+"""Cut-off of the low-pass filter of positions for the model torques: the smaller of SMOOTH_HZ [Hz] and SMOOTH_SHARE
+times the sample rate. Chosen."""
 BONE_M, BONE_RGBA = 0.02, (0.75, 0.77, 0.80, 1.0)
-"""What is drawn between the joints of a model that shows nothing."""
-_POINT = 1e-6  # shorter bones are none [m]
+"""Radius [m] and colour of the rods that are drawn for a model without visible geometry. Chosen."""
+_POINT = 1e-6  # shorter rods are not drawn [m]
 _TURN = [1, 2, 3, 0]  # MuJoCo's quaternions are (w, x, y, z), the viewer's (x, y, z, w)
 
 
 @dataclass(frozen=True, eq=False)
 class JointReplay:
-    """All that is drawn of one log.
+    """Data of the replay of one log.
 
     Attributes:
-        name: root of its entities, unique among the logs shown together.
-        log: the samples.
-        joints: names of the joints.
-        units: of their positions and of their torques.
-        shapes: of every body that shows something, in its frame.
-        time: of the poses [s], shape (P,).
-        position, quaternion: of those bodies in the world, by name, shape (P, 3) and (P, 4), (x, y, z, w).
-        reach: centre [m], (3,), and radius [m] of a ball around the robot in all poses.
-        series_time: of the series [s], shape (S,).
-        asked: torques that the model asks for without friction, shape (S, J).
-        every: samples of the log from one of the series to the next.
+        name: root of its entities, unique among the replays shown together.
+        log: the log.
+        joints: names of the J joints.
+        units: units of position and torque of every joint.
+        shapes: shape of every visible body in its frame, by name.
+        time: times of the poses [s], shape (P,).
+        position, quaternion: poses of those bodies in the world, by name: positions [m], shape (P, 3), and
+            quaternions (x, y, z, w), shape (P, 4).
+        reach: centre [m], shape (3,), and radius [m] of a ball that contains the robot in all poses.
+        series_time: times of the series [s], shape (S,).
+        asked: inverse-dynamics torques of the model without friction [N m or N], shape (S, J).
+        every: number of log samples per sample of the series.
     """
 
     name: str
@@ -64,17 +66,17 @@ class JointReplay:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a viewer should know, sentences."""
+        """Sentences for the viewer."""
         return self.log.notes
 
 
 def joint_replay(model: SerialModel, log: JointLog, name: str) -> JointReplay:
-    """Work out everything that is drawn of a log.
+    """Compute the data of the replay of a log.
 
     Args:
-        model: the robot.
-        log: of its joints.
-        name: what to call it.
+        model: model of the robot.
+        log: log of its joints.
+        name: name of the replay.
     """
     shapes = _shapes(model.model)
     step = max(1, round(log.rate_hz / POSE_HZ))
@@ -101,7 +103,7 @@ def joint_replay(model: SerialModel, log: JointLog, name: str) -> JointReplay:
 
 
 def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, float]]:
-    """Positions and quaternions (x, y, z, w) of all bodies, shape (P, B, 3) and (P, B, 4), and what they reach."""
+    """Compute positions and quaternions (x, y, z, w) of all bodies, (P, B, 3) and (P, B, 4), and a ball around them."""
     data = mujoco.MjData(model)
     position = np.empty((len(q), model.nbody, 3))
     quaternion = np.empty((len(q), model.nbody, 4))
@@ -115,13 +117,13 @@ def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, 
 
 
 def _shapes(model: mujoco.MjModel) -> dict[int, Shape]:
-    """By body; bones where nothing that moves shows anything."""
+    """Return the shapes by body; rods are added if no body with a joint has visible geometry."""
     shapes = {b: shape for b in range(model.nbody) if (shape := body_shape(model, [b])) is not None}
     return shapes if {int(b) for b in model.jnt_bodyid} & set(shapes) else shapes | _bones(model)
 
 
 def _bones(model: mujoco.MjModel) -> dict[int, Shape]:
-    """A rod from every body to each of its children, or to its centre of mass where it is the last."""
+    """Make rods from every body to its children, or to its centre of mass if it has none."""
     bones = {}
     for b in range(1, model.nbody):
         children = model.body_pos[np.flatnonzero(model.body_parentid == b)]
@@ -133,7 +135,7 @@ def _bones(model: mujoco.MjModel) -> dict[int, Shape]:
 
 
 def _rod(end: Array) -> Triangles:
-    """A capsule from the origin to a point."""
+    """Make a capsule from the origin to a point [m]."""
     length = float(np.linalg.norm(end))
     z = end / length
     x = np.linalg.svd(z[None])[2][1]
@@ -143,7 +145,7 @@ def _rod(end: Array) -> Triangles:
 
 MEASURED, ASKED, COMMANDED = colours.of_robot(1), colours.of_robot(2), colours.COMMAND
 SHOWN = 4
-"""Joints whose plots stand below each other in a tab."""
+"""Number of joints in one tab of plots. Chosen."""
 
 
 def log_joint_replay(
@@ -151,12 +153,12 @@ def log_joint_replay(
     replays: Sequence[JointReplay],
     progress: Callable[[int], object] | None = None,
 ) -> None:
-    """Log replays side by side, each below the root of its name, all on one timeline that starts at 0.
+    """Log replays side by side, each below a root with its name, on one timeline that starts at 0.
 
     Args:
-        stream: where to.
-        replays: what is shown.
-        progress: called with 1 after each.
+        stream: target stream.
+        replays: replays to show.
+        progress: called with 1 after each replay.
     """
     columns = [_column(replay) for replay in replays]
     layout = playing(columns[0] if len(columns) == 1 else rrb.Horizontal(*columns))

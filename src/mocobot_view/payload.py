@@ -1,8 +1,8 @@
-"""What is known of a payload, and of the team that holds it: grasps, placement, facts, files, geometry.
+"""Grasps, placement, inertial parameters, files and geometry of a payload and its team, for drawing.
 
-No sensor says where a base stands: robots and payload are placed by the grasps and the joint angles. The world W lies
-on the floor under robot 1, its axes those of {b1}. All bases are taken as level, but for tilts that a calibration has
-found: any other is what a diagnosis looks for, not what a picture assumes.
+No sensor measures the pose of a base, so grasps and joint angles determine the poses of robots and payload. The
+origin of the world W lies on the floor under robot 1, with the axes of {b1}. All bases are taken as level, except for
+tilts from a calibration.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ from mocobot_sim.trial.truth import truth_path
 from mocobot_view.shapes import Shape, body_shape, capsule, join
 
 SPACING_M = 1.2
-"""Distance of robots in a row, where nothing tells how they stand."""
+"""Distance between robots that are drawn in a row, because their poses are unknown [m]. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Bases:
     """Base frames {b} in the world.
 
     Attributes:
-        R_Wb: orientations, turned about z only where nothing is known of a tilt, shape (N, 3, 3).
+        R_Wb: orientations, rotated only about z unless a tilt is known, shape (N, 3, 3).
         p_Wb: positions [m], shape (N, 3).
     """
 
@@ -59,7 +59,7 @@ class Bases:
 
 @dataclass(frozen=True)
 class PayloadMotion:
-    """The payload's frame {1} in the world, and how far each robot's flange is from its grasp.
+    """Motion of the payload's frame {1} in the world, and the gap between each robot's flange and its grasp.
 
     Attributes:
         R_W1: orientations, shape (Q, 3, 3).
@@ -75,17 +75,17 @@ class PayloadMotion:
 
     @property
     def quaternion(self) -> Array:
-        """Orientations as (x, y, z, w), shape (Q, 4)."""
+        """Orientations as quaternions (x, y, z, w), shape (Q, 4)."""
         return Rotation.from_matrix(self.R_W1).as_quat()
 
 
 def place_bases(R_bi: Array, p_bi: Array, grasps: Grasps, height_m: float) -> Bases:
-    """Bases that the grasps and the mean of what the joints say ask for.
+    """Compute the poses of the bases from the grasps and the joint angles, averaged over the samples.
 
     Args:
         R_bi: orientation of each flange in its {b}, shape (Q, N, 3, 3).
         p_bi: wrist positions in {b} [m], shape (Q, N, 3).
-        grasps: how the payload is held.
+        grasps: grasps of the payload.
         height_m: height of {b1} over the floor [m].
     """
     R_b1b, p_b1b = [np.eye(3)], [np.zeros(3)]
@@ -101,12 +101,14 @@ def place_bases(R_bi: Array, p_bi: Array, grasps: Grasps, height_m: float) -> Ba
 def placed(
     R_bi: Array, p_bi: Array, grasps: Grasps | None, height_m: float, arms: Arms, at: slice = slice(None)
 ) -> tuple[Bases, PayloadMotion | None]:
-    """Bases as they stand, and the payload at the samples ``at``; a row of robots and None without grasps.
+    """Compute the poses of the bases, and the motion of the payload at the samples ``at``.
+
+    Without grasps, the robots stand in a row and the motion is None.
 
     Args:
-        R_bi, p_bi, grasps, height_m: as for ``place_bases``, which takes bases as level.
-        arms: the robots; a calibration may say how far their bases are tilted.
-        at: samples at which the payload is wanted.
+        R_bi, p_bi, grasps, height_m: as for ``place_bases``, for level bases.
+        arms: the robots; a calibration may state the tilts of their bases.
+        at: samples at which the motion of the payload is computed.
     """
     motion = None
     if grasps is None:
@@ -122,16 +124,16 @@ def placed(
 
 
 def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> PayloadMotion:
-    """The payload where all robots together hold it: the mean over robots of what each says.
+    """Compute the pose of the payload as the mean over the poses that each robot implies.
 
-    Shapes of ``R_bi`` and ``p_bi`` as for ``place_bases``.
+    ``R_bi`` and ``p_bi`` have the shapes that ``place_bases`` expects.
     """
     R_Wi = bases.R_Wb @ R_bi
     p_Wi = np.einsum("nij,qnj->qni", bases.R_Wb, p_bi) + bases.p_Wb
     R_W1 = so3.chordal_mean(np.swapaxes(R_Wi @ np.swapaxes(grasps.R_1i, -1, -2), 0, 1))
     p_W1 = np.mean(p_Wi - np.einsum("qij,nj->qni", R_W1, grasps.p_1i), axis=1)
     held = p_W1[:, None] + np.einsum("qij,nj->qni", R_W1, grasps.p_1i)
-    # |R1 - R2|_F = 2 sqrt(2) sin(angle / 2): exact for small angles, where arccos is not.
+    # |R1 - R2|_F = 2 sqrt(2) sin(angle / 2) is accurate for small angles, unlike the arccos formula.
     chord = np.linalg.norm(R_Wi - R_W1[:, None] @ grasps.R_1i, axis=(-2, -1)) / np.sqrt(8.0)
     return PayloadMotion(
         R_W1, p_W1, 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)), np.linalg.norm(p_Wi - held, axis=-1)
@@ -139,7 +141,7 @@ def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> Pa
 
 
 def as_estimated(recording: Recording, estimate: PayloadEstimate | None) -> Recording:
-    """A recording whose robots are those of its estimate, where it says nothing of them itself and they fit."""
+    """Give a recording the robot parameters of its estimate, if it has none itself and they fit."""
     metadata, units = recording.metadata, None if estimate is None else estimate.units
     if units is None or metadata.units is not None:
         return recording
@@ -149,12 +151,12 @@ def as_estimated(recording: Recording, estimate: PayloadEstimate | None) -> Reco
 
 
 THINNEST = 0.02
-"""Least semi-axis of a drawn inertia ellipsoid over the largest, for inertias that no body has."""
+"""Smallest semi-axis of a drawn inertia ellipsoid relative to the largest, for impossible inertias. Chosen."""
 
 
 @dataclass(frozen=True)
 class BodyFacts:
-    """A payload's grasps and inertial parameters; None marks what is not known.
+    """Grasps and inertial parameters of a payload; None marks unknown quantities.
 
     Attributes:
         grasps: grasp frames in {1}.
@@ -162,7 +164,7 @@ class BodyFacts:
         p_1c: centre of mass in {1} [m], shape (3,).
         R_1c: principal axes in {1}, shape (3, 3).
         principal_kgm2: principal moments, in the order of the axes, shape (3,).
-        axes_known: False where two moments are so alike that the axes are anybody's choice.
+        axes_known: False if two moments are too similar to determine the principal axes.
     """
 
     grasps: Grasps | None
@@ -173,10 +175,10 @@ class BodyFacts:
     axes_known: bool = True
 
     def semi_axes_m(self) -> Array | None:
-        """Semi-axes of the uniform solid ellipsoid with this mass and inertia [m], shape (3,), or None.
+        """Return the semi-axes of the uniform solid ellipsoid with this mass and inertia [m], shape (3,), or None.
 
-        I_x = m (b^2 + c^2) / 5, so a^2 = 5 (I_y + I_z - I_x) / (2 m). Moments that break the triangle inequality
-        give a flat one.
+        I_x = m (b^2 + c^2) / 5, so a^2 = 5 (I_y + I_z - I_x) / (2 m). Moments that violate the triangle inequality
+        give a flat ellipsoid.
         """
         if self.mass_kg is None or self.principal_kgm2 is None or not self.mass_kg > 0:
             return None
@@ -186,17 +188,17 @@ class BodyFacts:
 
 
 def held(facts: BodyFacts | None, robots: int) -> Grasps | None:
-    """The grasps that are known: one robot alone holds the payload at {1}, whatever else is."""
+    """Return the known grasps, or None; a single robot always holds the payload at {1}."""
     if facts is not None and facts.grasps is not None:
         return facts.grasps
     return Grasps(single_robot().R_1i, single_robot().p_1i) if robots == 1 else None
 
 
 def check_robots(estimate: PayloadEstimate, recording: Recording) -> None:
-    """Refuse an estimate of another team.
+    """Check that estimate and recording have the same number of robots.
 
     Raises:
-        InputError: it is of another number of robots than the recording.
+        InputError: the numbers differ.
     """
     robots = recording.metadata.robots
     if estimate.robots != robots:
@@ -206,7 +208,7 @@ def check_robots(estimate: PayloadEstimate, recording: Recording) -> None:
 
 
 def facts_of(estimate: PayloadEstimate) -> BodyFacts:
-    """The drawable part of an estimate."""
+    """Extract the quantities of an estimate that pictures show."""
     grasps, inertia = estimate.grasps, estimate.inertia
     R_1c = None if inertia is None else inertia.principal.R_1c
     known = R_1c is not None
@@ -224,14 +226,14 @@ def facts_of(estimate: PayloadEstimate) -> BodyFacts:
 
 
 TRUTH = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2")
-"""Keys of the truth that are drawn."""
+"""Keys of the truth that pictures show."""
 
 
 def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = None) -> BodyFacts:
-    """The truth beside a simulated recording, in the frames of an estimate, if there is one.
+    """Read the truth beside a simulated recording, in the frames of the estimate if one is given.
 
     Raises:
-        InputError: there is none, or it is not one of as many robots.
+        InputError: the file is missing or invalid, or has another number of robots.
     """
     path = truth_path(recording)
     values = read_json(path, "the truth beside a simulated recording")
@@ -257,10 +259,10 @@ def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = 
 
 
 def read_estimate(path: Path) -> PayloadEstimate:
-    """Read what ``mocobot estimate --out`` wrote.
+    """Read an estimate that ``mocobot estimate --out`` wrote.
 
     Raises:
-        InputError: it cannot be read, or is not a whole estimate.
+        InputError: the file cannot be read or is not a complete estimate.
     """
     values = read_json(path, "an estimate")
     try:
@@ -268,13 +270,13 @@ def read_estimate(path: Path) -> PayloadEstimate:
         _check(estimate)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    except (IndexError, OverflowError) as error:  # pairs of robots that are not there, boundless numbers
+    except (IndexError, OverflowError) as error:  # pairs of missing robots, or infinite numbers
         raise InputError(f"{path}: not a complete estimate ({type(error).__name__}: {error})") from error
     return estimate
 
 
 def _check(estimate: PayloadEstimate) -> None:
-    """Shapes and finite numbers of what is drawn, which the estimate's own reader takes as they are."""
+    """Check shapes and finiteness of the drawn quantities, which ``PayloadEstimate.from_dict`` does not check."""
     facts: list[tuple[str, Any, tuple[int, ...]]] = [("com.p_1c_m", estimate.p_1c, (3,))]
     if type(estimate.robots) is not int or estimate.robots < 1:
         raise InputError(f"robots is {estimate.robots!r:.40}; it must be a whole number of at least 1")
@@ -313,11 +315,11 @@ def _is(value: Any, shape: tuple[int, ...]) -> bool:
 
 BAR_M, BAR_RGBA = 0.012, (0.55, 0.60, 0.70, 1.0)
 FAR_M, FAR_RAD = 0.1, np.deg2rad(15.0)
-"""Grasps further than this from the CAD's are not grasps of that payload."""
+"""Largest distance [m] and angle [rad] between estimated grasps and those of a payload's CAD. Chosen."""
 
 
 def cad_shape(payload: str | Path, robots: int) -> tuple[Shape | None, Grasps]:
-    """Geometry of a payload in {1}, and its grasps by CAD.
+    """Load the geometry of a payload in {1} and its grasps from CAD.
 
     Args:
         payload: name of a shipped payload, or path of a payload MJCF.
@@ -340,16 +342,16 @@ def cad_shape(payload: str | Path, robots: int) -> tuple[Shape | None, Grasps]:
 def drawn_payload(
     payload: str | Path | None, label: str | None, grasps: Grasps, notes: list[str]
 ) -> str | Path | None:
-    """Which payload's CAD is to be drawn in given grasps; None for bars.
+    """Choose the payload whose CAD is drawn; None means that bars are drawn.
 
     Args:
-        payload: what was asked for, a name or a payload MJCF; None for what the label names, if that fits.
-        label: the recording's payload.
-        grasps: how the payload is held.
-        notes: what a viewer should know is added.
+        payload: requested name or payload MJCF; None for the payload of the label, if its grasps fit.
+        label: payload label of the recording.
+        grasps: grasps of the payload.
+        notes: list to which sentences for the viewer are appended.
 
     Raises:
-        InputError: what was asked for is not a payload for so many robots.
+        InputError: the requested payload does not fit this number of robots.
     """
     wanted = payload if payload is not None else label if label in payload_names() else None
     if wanted is None:
@@ -370,7 +372,7 @@ def drawn_payload(
 
 
 def held_elsewhere(cad: Grasps, grasps: Grasps) -> str | None:
-    """How a payload's CAD contradicts the grasps at hand, in words, or None."""
+    """Describe how the grasps of a CAD contradict the given grasps; None if they agree."""
     X_cad, X = (RigidTransform.from_components(g.p_1i, Rotation.from_matrix(g.R_1i)) for g in (cad, grasps))
     apart = X_cad.inv() * X
     shift, turn = np.linalg.norm(apart.translation, axis=1), apart.rotation.magnitude()
@@ -382,7 +384,7 @@ def held_elsewhere(cad: Grasps, grasps: Grasps) -> str | None:
 
 
 def bars(facts: BodyFacts) -> Shape | None:
-    """A star of bars from the centre of mass, or the middle of the grasps, to every grasp; None if all coincide."""
+    """Make bars from the centre of mass, or else the mean grasp position, to every grasp; None if all coincide."""
     if facts.grasps is None:
         return None
     centre = facts.p_1c if facts.p_1c is not None else facts.grasps.p_1i.mean(axis=0)

@@ -1,6 +1,6 @@
-"""Pictures of teams: a payload as designed, an estimate, and where a diagnosis sees causes.
+"""Pictures of teams: as designed, as estimated, and with the causes of a diagnosis.
 
-A shot says what is to be rendered; a view is its picture. ``render_shots`` renders several shots in one process.
+A shot describes a picture; a view is the rendered picture. ``render_shots`` renders several shots in one process.
 """
 
 from collections.abc import Sequence
@@ -47,25 +47,25 @@ from mocobot_view.render import Picture, Shot, render_shots
 from mocobot_view.robot import LEGS, TINTED, body_of, by_place, fit_design, robot_shapes, rod_angles
 
 SAMPLES = 2000
-"""Samples, spread over a recording, from which bases are placed."""
+"""Number of samples, spread over a recording, that determine the poses of the bases. Chosen."""
 GHOST = 0.15
-"""Opacity of a payload that must not hide what is inside; MuJoCo draws what is translucent twice."""
+"""Opacity of a payload that must not hide its interior; MuJoCo draws translucent geoms twice. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTeam:
-    """A team at one instant.
+    """A team at one instant of a recording.
 
     Attributes:
         model: robots ``omnid1/`` .. ``omnidN/`` at their bases, and the payload ``payload/`` if its CAD is drawn.
-        qpos: state that the measured angles ask for.
-        time_s: the instant, since the first sample [s].
-        facts: what the estimate knows of the payload.
-        R_W1, p_W1: pose of the payload's frame {1} in the world, shapes (3, 3) and (3,) [m]; None where the grasps
-            are not known.
-        grasps: how it is held, or None.
-        has_cad: whether the payload's CAD is in the model.
-        notes: what a viewer should know, sentences.
+        qpos: state of the model for the measured angles.
+        time_s: time since the first sample [s].
+        facts: estimated quantities of the payload.
+        R_W1, p_W1: pose of the payload's frame {1} in the world, shapes (3, 3) and (3,) [m]; None if the grasps
+            are unknown.
+        grasps: grasps of the payload, or None.
+        has_cad: whether the model contains the payload's CAD.
+        notes: sentences for the viewer.
     """
 
     model: mujoco.MjModel
@@ -90,17 +90,17 @@ def measured_team(
     payload: str | Path | None = None,
     time_s: float | None = None,
 ) -> MeasuredTeam:
-    """Put robots and payload where measured angles and estimated grasps have them.
+    """Pose robots and payload by the measured angles and the estimated grasps.
 
     Args:
         recording: one trial.
-        estimate: of the payload.
-        payload: name or MJCF of the payload's geometry; None for what the recording's label names, if that fits.
-        time_s: instant since the first sample [s]; None for the middle of the recording.
+        estimate: estimate of the payload.
+        payload: name or MJCF of the payload's geometry; None for that of the recording's label, if it fits.
+        time_s: time since the first sample [s]; None for the middle of the recording.
 
     Raises:
-        InputError: the estimate is of another number of robots, the rods do not meet, or ``payload`` is not a payload
-            for these robots.
+        InputError: the estimate has another number of robots, the rods do not meet, or ``payload`` does not fit these
+            robots.
     """
     recording = as_estimated(recording, estimate)
     meta, notes = recording.metadata, []
@@ -136,7 +136,7 @@ def measured_team(
 
 
 def _model(bases: Bases, payload: str | Path | None, design: OmnidDesign, height_m: float) -> mujoco.MjModel:
-    """Robots of a design at given bases, links in their colours, and a payload that floats."""
+    """Build a model of robots at given bases, with coloured links, and a free-floating payload."""
     root = mjcf.from_path(str(models_dir() / "team.xml"))
     turns = Rotation.from_matrix(bases.R_Wb).as_quat(scalar_first=True)
     feet = bases.p_Wb - bases.R_Wb @ [0.0, 0.0, height_m]
@@ -162,7 +162,7 @@ def _model(bases: Bases, payload: str | Path | None, design: OmnidDesign, height
 def _qpos(
     model: mujoco.MjModel, angles: tuple[Array, Array, Array, Array, Array], pose: tuple[Array, Array] | None
 ) -> Array:
-    """State of a model; angles are phi, theta, wrist [m], swing and tilt of the rods, shape (N, 3) each."""
+    """Compute the state of a model from phi, theta, wrist position [m], swing and tilt of the rods, (N, 3) each."""
     qpos, shipped = model.qpos0.copy(), omnid_design()
 
     def put(joint: str, value: float) -> None:
@@ -186,13 +186,13 @@ def _qpos(
 
 
 ASPECT = 1.6
-"""Width over height of a picture that shots are framed for, if nothing else is said."""
+"""Default width over height of a picture."""
 AZIMUTH, ELEVATION, FOVY = 125.0, -24.0, 28.0
-"""Direction and angle of view [deg]; a long lens, which does not blow up what is near."""
+"""Direction and angle of view [deg]. Chosen: a narrow angle avoids enlarging near objects."""
 ABOVE = -34.0
-"""Elevation [deg] where marks at the payload are to be seen."""
+"""Elevation for pictures with marks at the payload [deg]. Chosen."""
 LONG_M = 0.17
-"""Length of a grasp frame's axes: they must stick out of the gimbal."""
+"""Length of the axes of a grasp frame [m]. Chosen: they must protrude from the gimbal."""
 NAME_AT = np.array([0.0, 0.0, 0.05])
 AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
 
@@ -206,14 +206,14 @@ RED = _rgba(colours.FAULT)
 
 
 def team_shot(payload: str | Path, aspect: float = ASPECT) -> Shot:
-    """A team as designed, at rest, holding a payload.
+    """Describe a picture of a team as designed, at rest, with a payload.
 
     Args:
         payload: name of a shipped payload, or path of a payload MJCF.
         aspect: width over height of the picture.
 
     Raises:
-        InputError: there is no such payload, or robots cannot hold it.
+        InputError: the payload does not exist, or the robots cannot hold it.
     """
     scene = build_team(payload)
     model = scene.compile()
@@ -231,14 +231,14 @@ def estimate_shot(
     time_s: float | None = None,
     aspect: float = ASPECT,
 ) -> Shot:
-    """A team as estimated, at one measured instant, with grasp frames, centre of mass and inertia ellipsoid.
+    """Describe a picture of an estimated team at one instant, with grasp frames, centre of mass and inertia.
 
     Args:
         recording: one trial.
-        estimate: of the payload.
-        truth: of the payload, drawn beside the estimate.
-        payload: name or MJCF of the payload's geometry; None for what the recording's label names, if that fits.
-        time_s: instant since the first sample [s]; None for the middle of the recording.
+        estimate: estimate of the payload.
+        truth: true payload, drawn beside the estimate.
+        payload: name or MJCF of the payload's geometry; None for that of the recording's label, if it fits.
+        time_s: time since the first sample [s]; None for the middle of the recording.
         aspect: width over height of the picture.
 
     Raises:
@@ -262,14 +262,14 @@ def diagnosis_shot(
     time_s: float | None = None,
     aspect: float = ASPECT,
 ) -> Shot:
-    """A team as estimated, with the causes of a diagnosis in red where they sit.
+    """Describe a picture of an estimated team with the causes of a diagnosis in red at their places.
 
     Args:
         recording, estimate, payload, time_s, aspect: as for ``estimate_shot``.
-        causes: of ``discrepancy.result.read.read_diagnosis``.
+        causes: causes from ``discrepancy.result.read.read_diagnosis``.
 
     Raises:
-        InputError: see ``measured_team``; or a cause sits at a robot that the recording does not have.
+        InputError: see ``measured_team``; or a cause names a robot that the recording does not have.
     """
     team = measured_team(recording, estimate, payload, time_s)
     for cause in causes:
@@ -290,7 +290,7 @@ def diagnosis_shot(
 def _shot(
     model: mujoco.MjModel, qpos: Array, marks: Marks, says: str, aspect: float, elevation: float = ELEVATION
 ) -> Shot:
-    """Look from where the robots hide each other least, with the light behind the camera's shoulder."""
+    """Choose the view in which the robots hide each other least, and turn the light with the camera."""
     model.vis.global_.fovy = FOVY
     points = np.concatenate([corners(model, qpos), marks.points()])
     data = posed(model, qpos)
@@ -306,7 +306,7 @@ def _shot(
 
 
 def _says(recording: Recording, team: MeasuredTeam, truth: BodyFacts | None, *, marked: bool = True) -> str:
-    """Words for what is to be seen."""
+    """Write the caption of a picture."""
     omnids = f"{team.robots} Omnid{'s' if team.robots != 1 else ''}"
     text = f"{omnids} at {team.time_s:.1f} s of {Path(recording.name).name}, from the measured angles"
     if team.grasps is None:
@@ -331,7 +331,7 @@ def _in_world(team: MeasuredTeam, point: Array) -> Array:
 
 
 def _bars(marks: Marks, team: MeasuredTeam, rgba: Sequence[float] = BAR_RGBA) -> None:
-    """Bars from the centre of mass to the grasps, where no CAD is known."""
+    """Draw bars from the centre of mass to the grasps, if the CAD is unknown."""
     if team.grasps is None or team.has_cad:
         return
     centre = team.facts.p_1c if team.facts.p_1c is not None else team.grasps.p_1i.mean(axis=0)
@@ -340,7 +340,7 @@ def _bars(marks: Marks, team: MeasuredTeam, rgba: Sequence[float] = BAR_RGBA) ->
 
 
 def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, thick: float) -> None:
-    """Grasp frames, centre of mass, principal axes and inertia ellipsoid."""
+    """Draw grasp frames, centre of mass and inertia ellipsoid."""
     if team.R_W1 is None:
         return
     longer = LONG_M * (1.0 if thick == 1.0 else 1.25)
@@ -357,7 +357,7 @@ def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, t
     if semi_axes is None or facts.R_1c is None:
         return
     R = team.R_W1 @ facts.R_1c
-    # Its three principal ellipses: a filled one would throw its shadow on everything.
+    # Draw the three principal ellipses, because a solid ellipsoid would cast a shadow.
     for k in range(3):
         one, other = R[:, k - 1] * semi_axes[k - 1], R[:, k - 2] * semi_axes[k - 2]
         ellipse = centre + np.cos(AROUND)[:, None] * one + np.sin(AROUND)[:, None] * other
@@ -365,7 +365,7 @@ def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, t
 
 
 def _names(marks: Marks, team: MeasuredTeam) -> None:
-    """Every robot's name at its foot, in its colour."""
+    """Write every robot's name at its foot in its colour."""
     data = posed(team.model, team.qpos)
     for i in range(1, team.robots + 1):
         marks.label(f"omnid{i}", data.body(f"omnid{i}/chassis").xpos + NAME_AT, colours.of_robot(i))
@@ -378,7 +378,7 @@ def _place(cause: NamedCause) -> str:
 
 
 def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> None:
-    """A red ball at the body of every cause, the body in red, and its name; several at one place share a mark."""
+    """Mark every cause with a red ball, a red body and its name; causes at one place share a mark."""
     data = posed(team.model, team.qpos)
     for (robot, body), here in by_place(causes).items():
         if robot is None:
@@ -400,7 +400,11 @@ WIDTH, HEIGHT = 1600, 1000
 
 
 def team_view(payload: str | Path, width: int = WIDTH, height: int = HEIGHT) -> Picture | str:
-    """The team as designed, at rest, holding a payload; see ``team_shot``."""
+    """Render a team as designed, at rest, with a payload; see ``team_shot``.
+
+    Returns:
+        Picture of shape (height, width, 3), or one sentence that explains why there is none.
+    """
     return _one(team_shot(payload, width / height), width, height)
 
 
@@ -414,7 +418,11 @@ def estimate_view(
     payload: str | Path | None = None,
     time_s: float | None = None,
 ) -> Picture | str:
-    """The team as estimated, at one measured instant; see ``estimate_shot``."""
+    """Render an estimated team at one instant; see ``estimate_shot``.
+
+    Returns:
+        Picture of shape (height, width, 3), or one sentence that explains why there is none.
+    """
     return _one(estimate_shot(recording, estimate, truth, payload, time_s, width / height), width, height)
 
 
@@ -428,7 +436,11 @@ def diagnosis_view(
     payload: str | Path | None = None,
     time_s: float | None = None,
 ) -> Picture | str:
-    """The team as estimated, causes of a diagnosis in red; see ``diagnosis_shot``."""
+    """Render an estimated team with the causes of a diagnosis in red; see ``diagnosis_shot``.
+
+    Returns:
+        Picture of shape (height, width, 3), or one sentence that explains why there is none.
+    """
     return _one(diagnosis_shot(recording, estimate, causes, payload, time_s, width / height), width, height)
 
 

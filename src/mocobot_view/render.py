@@ -1,7 +1,7 @@
-"""Pictures of models in given states, rendered by MuJoCo without a screen, where the machine can.
+"""Render models off-screen with MuJoCo, if the machine supports it.
 
-Rendering happens in a process of its own: MuJoCo chooses its renderer when it is imported, and a broken OpenGL
-installation may take the process with it. So whoever asks for pictures needs no OpenGL.
+A separate process renders, because MuJoCo chooses its renderer at import and a broken OpenGL installation can crash
+the process. The calling process needs no OpenGL.
 """
 
 import os
@@ -29,14 +29,14 @@ REMEDY = "install EGL (Debian and Ubuntu: libegl1) or OSMesa (libosmesa6)"
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One picture to be made.
+    """Description of a picture to render.
 
     Attributes:
-        model: what to look at.
-        qpos: its state, shape (nq,).
-        camera: from where.
-        marks: what to draw into it.
-        says: what is to be seen, one or two sentences.
+        model: model to show.
+        qpos: state of the model, shape (nq,).
+        camera: camera pose.
+        marks: marks to draw into the picture.
+        says: caption of one or two sentences.
     """
 
     model: mujoco.MjModel
@@ -57,14 +57,14 @@ def render(
     """Render states of a model.
 
     Args:
-        model: what to look at.
+        model: model to show.
         states: ``qpos`` of every picture, K arrays.
-        camera: from where.
-        marks: what to draw into every picture, K entries; None for nothing.
-        width, height: size in pixels.
+        camera: camera pose.
+        marks: marks of every picture, K entries; None for no marks.
+        width, height: size [px].
 
     Returns:
-        K pictures, shape (height, width, 3), or one sentence that says why there are none.
+        K pictures of shape (height, width, 3), or one sentence that explains why there are none.
     """
     drawn = marks if marks is not None else [Marks() for _ in states]
     shots = [Shot(model, qpos, camera, mark) for qpos, mark in zip(states, drawn, strict=True)]
@@ -72,22 +72,22 @@ def render(
 
 
 def render_shots(shots: Sequence[Shot], width: int = 1600, height: int = 1000) -> list[Picture] | str:
-    """Render pictures, all in one process.
+    """Render several pictures in one process.
 
-    The renderer is what MUJOCO_GL says, else EGL, else OSMesa, whichever works first.
+    The environment variable MUJOCO_GL selects the renderer; without it, EGL and then OSMesa are tried.
 
     Args:
-        shots: what to make, K entries.
-        width, height: size in pixels.
+        shots: pictures to render, K entries.
+        width, height: size [px].
 
     Returns:
-        K pictures, shape (height, width, 3), or one sentence that says why there are none.
+        K pictures of shape (height, width, 3), or one sentence that explains why there are none.
     """
     if not shots:
         return []
     if not has_plots():
         return NO_PLOTS
-    from mocobot_view.camera import with_labels  # matplotlib, an extra
+    from mocobot_view.camera import with_labels  # imports matplotlib, an optional dependency
 
     with scratch_folder() as folder:
         _write_task(folder, shots, width, height)
@@ -103,7 +103,7 @@ def render_shots(shots: Sequence[Shot], width: int = 1600, height: int = 1000) -
 
 
 def _write_task(folder: Path, shots: Sequence[Shot], width: int, height: int) -> None:
-    """Write the models, each once, and what to do with them."""
+    """Write the task of the render process: every model once, and the data of every shot."""
     models: list[mujoco.MjModel] = []
     arrays: dict[str, NDArray[np.float64] | NDArray[np.int64]] = {"size": np.array([width, height])}
     for k, shot in enumerate(shots):
@@ -125,13 +125,13 @@ def _write_task(folder: Path, shots: Sequence[Shot], width: int, height: int) ->
 
 
 def _run(folder: Path) -> NDArray[np.uint8] | str:
-    """Let another process do the task of a folder: the pictures, shape (K, height, width, 3), or why not."""
+    """Run the render process on a task; return pictures of shape (K, height, width, 3), or the reason for none."""
     chosen, failed = os.environ.get("MUJOCO_GL", ""), []
     result = folder / "result.npy"
     for renderer in (chosen,) if chosen else RENDERERS:
         env = os.environ | {"MUJOCO_GL": renderer}
         if not chosen:
-            env.pop("PYOPENGL_PLATFORM", None)  # that of another renderer stops this one
+            env.pop("PYOPENGL_PLATFORM", None)  # a value for another renderer would break this one
         try:
             done = subprocess.run(
                 [sys.executable, "-m", "mocobot_view.render_process", str(folder)],

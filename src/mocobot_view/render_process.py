@@ -1,6 +1,6 @@
-"""The process in which ``render`` renders: python -m mocobot_view.render_process FOLDER
+"""Render process that ``mocobot_view.render`` starts: python -m mocobot_view.render_process FOLDER
 
-The folder holds ``task.npz`` and the models it names; the pictures go to ``result.npy``.
+The folder holds ``task.npz`` and the models that it names; the pictures go to ``result.npy``.
 """
 
 import sys
@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 NOISE = 4
-"""Two pictures of the same may differ by so much: software renderers do not round alike each time."""
+"""Largest difference between two renderings of one scene [of 255], because software renderers round differently."""
 
 
 def main(folder: Path) -> None:
@@ -45,7 +45,7 @@ def _picture(
     plain = renderer.render()
     if not any(len(task[f"{kind}{k}"]) for kind in ("lines", "arrows", "ellipsoids")):
         return plain
-    # Marks throw no shadow: what they change is taken from a picture without any.
+    # Marks must not cast shadows, so the pixels that they change come from a rendering without shadows.
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
     bare = renderer.render()
     _mark(renderer.scene, task, k)

@@ -1,4 +1,4 @@
-"""One recording made ready to be shown: poses, signals, and what an estimate, the truth and a diagnosis say."""
+"""Data of the replay of one recording: poses, signals, estimate, truth and diagnosis."""
 
 import re
 from collections.abc import Sequence
@@ -37,12 +37,12 @@ from mocobot_view.robot import BodyMotion, body_motion, robot_shapes
 from mocobot_view.shapes import Shape
 
 CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
-"""Cut-off of the filter, and the rate at which its output is kept."""
+"""Cut-off frequency of the low-pass filter, and rate of its stored output [Hz]. Chosen."""
 
 
 @dataclass(frozen=True)
 class Balance:
-    """What the robots' wrenches leave of Newton and Euler, in {1}.
+    """Residuals of the Newton-Euler equations of the payload, in {1}.
 
     Attributes:
         force: sum of the forces minus m (a_c + g) [N], shape (P, 3).
@@ -55,12 +55,12 @@ class Balance:
 
 
 def filtered(recording: Recording, notes: list[str]) -> GraspData | None:
-    """Twists and wrenches as the estimator sees them, times from the recording's first sample on.
+    """Compute twists and wrenches as the estimator does, with times from the first sample of the recording.
 
-    Thinned to ``FILTERED_HZ``: the filter leaves 1e-4 of what that cannot carry.
+    The result is decimated to ``FILTERED_HZ``; the filter reduces frequencies that would alias to 1e-4.
 
     Returns:
-        The data points, or None (and why, in ``notes``) if the recording is too short.
+        Filtered data, or None if the recording is too short; ``notes`` then states the reason.
     """
     try:
         data = process_recording(recording, CUTOFF_HZ)
@@ -73,7 +73,7 @@ def filtered(recording: Recording, notes: list[str]) -> GraspData | None:
 
 
 def balance(data: GraspData, estimate: PayloadEstimate) -> Balance | None:
-    """Residual of the payload's motion, or None where grasps, mass or centre of mass are not known."""
+    """Compute the Newton-Euler residuals; None if grasps, mass or centre of mass are unknown."""
     grasps, mass, p_1c = estimate.grasps, estimate.mass, estimate.p_1c
     if grasps is None or mass is None or p_1c is None:
         return None
@@ -90,29 +90,29 @@ def balance(data: GraspData, estimate: PayloadEstimate) -> Balance | None:
 
 
 MISFIT_M, MISFIT_RAD = 0.01, 0.03
-"""Gaps between flanges and grasps (rms) above which something is wrong; robots that were never calibrated show 6 mm
-and 10 mrad."""
+"""Rms gaps between flanges and grasps above which the grasps do not fit [m], [rad]. Chosen: uncalibrated robots have
+6 mm and 10 mrad."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReplayTrial:
-    """All that is drawn of one recording.
+    """Data of the replay of one recording.
 
     Attributes:
-        name: root of its entities, unique among the recordings shown together.
-        recording: the samples.
-        time: since the first sample [s], shape (Q,).
+        name: root of its entities, unique among the replays shown together.
+        recording: the recording.
+        time: times since the first sample [s], shape (Q,).
         bodies: motion of the robots' bodies.
-        bases: where the robots stand.
-        motion: that of the payload, or None where its grasps are not known.
-        shape: the payload's, in {1}, or None.
+        bases: poses of the bases.
+        motion: motion of the payload; None if the grasps are unknown.
+        shape: shape of the payload in {1}, or None.
         data: filtered twists and wrenches, or None.
-        balance: residual of Newton and Euler, or None.
-        estimate: the payload's, or None.
-        facts: the drawable part of the estimate, or None.
-        truth: the payload's, or None.
-        diagnosis: what is wrong with the team, or None.
-        notes: what a viewer should know, sentences.
+        balance: Newton-Euler residuals, or None.
+        estimate: estimate of the payload, or None.
+        facts: quantities of the estimate to draw, or None.
+        truth: true quantities of the payload to draw, or None.
+        diagnosis: diagnosis of the team, or None.
+        notes: sentences for the viewer.
     """
 
     name: str
@@ -144,18 +144,18 @@ def replay_trial(
     diagnosis: WrittenDiagnosis | None = None,
     payload: str | Path | None = None,
 ) -> ReplayTrial:
-    """Work out everything that is drawn of a recording.
+    """Compute the data of the replay of a recording.
 
     Args:
         recording: one trial.
-        name: what to call it.
-        estimate: of the payload; None to estimate from this recording, as far as it goes.
-        truth: of the payload.
-        diagnosis: of these robots.
-        payload: name or MJCF of the payload's geometry; None for what the recording's label names.
+        name: name of the replay.
+        estimate: estimate of the payload; None to estimate from this recording, as far as possible.
+        truth: true payload.
+        diagnosis: diagnosis of these robots.
+        payload: name or MJCF of the payload's geometry; None for that of the recording's label.
 
     Raises:
-        InputError: estimate or diagnosis are of another number of robots, or ``payload`` is not a payload for them.
+        InputError: estimate, diagnosis or ``payload`` do not fit the number of robots.
     """
     recording = as_estimated(recording, estimate)
     meta = recording.metadata
@@ -208,14 +208,14 @@ def replay_trial(
 
 
 def distinct_names(recordings: Sequence[Path]) -> list[str]:
-    """File names without their ending, with a running number where two are alike.
+    """Make unique names from file names without suffix, for use in entity paths.
 
-    What is not a letter, a digit, a dot or a hyphen becomes an underscore: names are parts of entity paths.
+    Every character except letters, digits, dots and hyphens becomes an underscore; equal names get a number.
     """
     names: list[str] = []
     for path in recordings:
         stem = re.sub(r"[^A-Za-z0-9.-]", "_", path.stem)
-        stem = re.sub(r"^_+(?=_)", "", stem)  # two underscores in front are Rerun's own
+        stem = re.sub(r"^_+(?=_)", "", stem)  # Rerun reserves names with two leading underscores
         name, k = stem, 1
         while name in names:
             k += 1
@@ -261,11 +261,11 @@ def _shape(
     grasps: Grasps | None,
     notes: list[str],
 ) -> Shape | None:
-    """The payload's geometry: by CAD if that fits the grasps, else bars."""
+    """Choose the geometry of the payload: its CAD if that fits the grasps, else bars."""
     meta = recording.metadata
     if grasps is None:
         if payload is not None:
-            cad_shape(payload, meta.robots)  # refuse what cannot be drawn even where nothing is
+            cad_shape(payload, meta.robots)  # raises InputError if the payload does not fit
         return None
     drawn = drawn_payload(payload, meta.payload, grasps, notes)
     if drawn is not None:

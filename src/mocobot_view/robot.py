@@ -1,4 +1,4 @@
-"""One Omnid to look at: shapes of its bodies by its design, their motion from joint angles, and where causes sit."""
+"""Drawing of one Omnid: shapes of its bodies, their motion from joint angles, and the bodies where causes act."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from mocobot_view.shapes import Shape, body_shape
 LEGS = (1, 2, 3)
 GIMBAL = ("yoke", "ring", "flange")
 TINTED = ("proximal1", "proximal2", "proximal3")
-"""Bodies drawn in their robot's colour, which its series have, too."""
+"""Bodies drawn in the colour of their robot, which its plots also use."""
 PATHS: dict[str, str] = {
     **{f"proximal{k}": f"base/leg{k}/proximal" for k in LEGS},
     **{f"rod{k}": f"base/leg{k}/proximal/knee/rod" for k in LEGS},
@@ -29,8 +29,8 @@ PATHS: dict[str, str] = {
     "ring": "base/platform/yoke/ring",
     "flange": "base/platform/yoke/ring/flange",
 }
-"""Where each moving body of the MJCF is below its robot. The rest stands on the floor with the base. Links and rods
-turn in frames of their own: ``leg`` at the driven axis with x outward, ``knee`` at the link's end."""
+"""Entity path of each moving body of the MJCF below its robot; all other bodies stand on the floor with the base.
+Links and rods rotate in fixed frames: ``leg`` at the driven axis with x outward, ``knee`` at the end of the link."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class RobotShapes:
     """Shapes of one robot's bodies.
 
     Attributes:
-        standing: chassis, wheels and base, in {b}.
-        moving: shapes of the bodies in ``PATHS``, in their body frames.
+        standing: shape of chassis, wheels and base in {b}.
+        moving: shapes of the bodies in ``PATHS`` in their body frames, by name.
         base_height_m: height of {b} over the floor [m].
     """
 
@@ -50,7 +50,7 @@ class RobotShapes:
 
 @cache
 def robot_shapes(design: OmnidDesign) -> RobotShapes:
-    """The Omnid with a design's lengths."""
+    """Make the shapes of an Omnid with the lengths of a design."""
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
     fit_design(model, design)
     data = posed(model)
@@ -67,12 +67,14 @@ def robot_shapes(design: OmnidDesign) -> RobotShapes:
 
 
 def fit_design(model: mujoco.MjModel, design: OmnidDesign, prefix: str = "") -> None:
-    """Stretch links, plates and driven axes of the shipped Omnid to another design, for the eye: no mass changes.
+    """Change the lengths of the shipped Omnid in a model to those of another design, for drawing only.
+
+    Masses and inertias do not change.
 
     Args:
-        model: a model that holds the shipped Omnid.
-        design: the lengths it shall have.
-        prefix: of the Omnid's names in the model.
+        model: model that contains the shipped Omnid.
+        design: design with the wanted lengths.
+        prefix: prefix of the Omnid's names in the model.
     """
     shipped = omnid_design()
     wider = design.base_radius_m - shipped.base_radius_m
@@ -93,7 +95,7 @@ def fit_design(model: mujoco.MjModel, design: OmnidDesign, prefix: str = "") -> 
 
 
 def fixed_frames(design: OmnidDesign) -> dict[str, tuple[Array, Array]]:
-    """Frames of ``PATHS`` that do not move in their parents: position [m] (3,) and quaternion (x, y, z, w), by path."""
+    """Return the fixed frames of ``PATHS`` by path: position [m], (3,), and quaternion (x, y, z, w) in the parent."""
     frames = {}
     for k, u in zip(LEGS, LEG_DIRECTIONS, strict=True):
         azimuth = 2.0 * np.pi * (k - 1) / 3.0
@@ -108,10 +110,10 @@ def fixed_frames(design: OmnidDesign) -> dict[str, tuple[Array, Array]]:
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """How the bodies of N robots move at Q samples.
+    """Motion of the bodies of N robots at Q samples.
 
     Attributes:
-        wrist: positions of the platform in the arm's own frame [m], which is {b} where that stands level, (Q, N, 3).
+        wrist: positions of the platform in the frame of the arm, which equals {b} on a level base [m], (Q, N, 3).
         turns: quaternions (x, y, z, w) of the links, rods and gimbal bodies in their fixed frames, by name,
             shape (Q, N, 4).
     """
@@ -121,14 +123,14 @@ class BodyMotion:
 
 
 def body_motion(phi: Array, theta: Array, arms: Arms) -> BodyMotion:
-    """Solve the arms and gimbals of all robots.
+    """Compute the motion of all bodies from the joint angles.
 
-    A link turns by phi about minus its driven axis, the rod by Ry(swing) Rz(tilt) against the link.
+    A link rotates by phi about its negative driven axis, the rod by Ry(swing) Rz(tilt) relative to the link.
 
     Args:
         phi: true driven angles [rad], shape (Q, N, 3).
         theta: true gimbal angles (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
-        arms: the robots as they are, or as designed.
+        arms: robot parameters, calibrated or as designed.
 
     Raises:
         InputError: the rods do not meet at some sample.
@@ -144,18 +146,18 @@ def body_motion(phi: Array, theta: Array, arms: Arms) -> BodyMotion:
 
 
 def rod_angles(phi: Array, arms: Arms) -> tuple[Array, Array, Array]:
-    """Where the arms are, from the driven angles alone.
+    """Solve the forward kinematics of the arms, including the angles of the rods.
 
-    Seen from the knee, the rod's direction (x, y, z) in the link is
-    Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt, -sin swing cos tilt).
+    From the knee, the rod points in the direction Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt,
+    -sin swing cos tilt) of the link's frame.
 
     Args:
         phi: true driven angles [rad], shape (..., N, 3).
-        arms: the robots as they are, or as designed.
+        arms: robot parameters, calibrated or as designed.
 
     Returns:
-        Wrist positions in the arms' own frames [m], and swing and tilt of each leg's rod against its link [rad]; shapes
-        (..., 3).
+        Wrist positions in the frames of the arms [m], and swing and tilt of each leg's rod relative to its link [rad],
+        each of shape (..., N, 3).
 
     Raises:
         InputError: the rods do not meet at some sample.
@@ -173,13 +175,13 @@ def rod_angles(phi: Array, arms: Arms) -> tuple[Array, Array, Array]:
 
 
 def _turned(axes: str, *angles: Array) -> Array:
-    """Quaternions of turns about coordinate axes that turn along, one after the other; shape (..., 4)."""
+    """Return quaternions of successive rotations about body-fixed axes, shape (..., 4)."""
     rows = np.stack(angles, axis=-1)
     return Rotation.from_euler(axes, rows.reshape(-1, len(axes))).as_quat().reshape(*rows.shape[:-1], 4)
 
 
 def by_place(causes: Iterable[NamedCause]) -> dict[tuple[int | None, str | None], list[NamedCause]]:
-    """Causes by robot (None for the payload) and its body as ``body_of`` has it."""
+    """Group causes by robot (None for the payload) and by the body that ``body_of`` returns."""
     places: dict[tuple[int | None, str | None], list[NamedCause]] = {}
     for cause in causes:
         places.setdefault((cause.robot, body_of(cause)), []).append(cause)
@@ -187,7 +189,7 @@ def by_place(causes: Iterable[NamedCause]) -> dict[tuple[int | None, str | None]
 
 
 def body_of(cause: NamedCause) -> str | None:
-    """The robot's body, such as ``proximal1``; None for the base, or the payload."""
+    """Return the body where a cause acts, such as ``proximal1``; None for the base or the payload."""
     at = CAUSES[cause.name].at if cause.name in CAUSES else None
     if cause.robot is not None and cause.joint is not None:
         return GIMBAL[cause.joint - 1] if at == "gimbal joint" else f"proximal{cause.joint}"

@@ -1,4 +1,4 @@
-"""Shapes to be drawn: triangle meshes of MuJoCo's primitives, and the visible geometry of a body as one of them."""
+"""Triangle meshes of MuJoCo's primitives and of the visible geometry of bodies, for drawing."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from estimator.arrays import Array
 from mocobot_sim.scene.models import posed
 
 AROUND = 24
-"""Facets around an axis; a rod of 6 mm then deviates from round by 0.05 mm."""
+"""Number of facets around an axis. Chosen: a rod of 6 mm then deviates by 0.05 mm from a cylinder."""
 ALONG = 6
-"""Rows of facets from the equator of a half sphere to its pole."""
+"""Number of rows of facets from the equator of a half sphere to its pole. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class Triangles:
     faces: NDArray[np.uint32]
 
     def moved(self, position: ArrayLike, R: ArrayLike) -> Triangles:
-        """The mesh turned by R, shape (3, 3), and then shifted by ``position`` [m], shape (3,)."""
+        """Return the mesh rotated by R, shape (3, 3), and then shifted by ``position`` [m], shape (3,)."""
         R = np.asarray(R, dtype=float)
         return Triangles(self.vertices @ R.T + np.asarray(position), self.normals @ R.T, self.faces)
 
 
 def join(meshes: list[Triangles]) -> Triangles:
-    """One mesh of several."""
+    """Merge several meshes into one."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return Triangles(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -52,7 +52,7 @@ def join(meshes: list[Triangles]) -> Triangles:
 
 
 def box(half: ArrayLike) -> Triangles:
-    """A box with half sizes ``half`` [m], shape (3,)."""
+    """Make a box with half sizes ``half`` [m], shape (3,)."""
     corners = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float)
     up = Triangles(corners, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]], np.uint32))
     turns = [("x", 0.0), ("x", 90.0), ("x", 180.0), ("x", 270.0), ("y", 90.0), ("y", 270.0)]
@@ -63,7 +63,7 @@ def box(half: ArrayLike) -> Triangles:
 
 
 def ellipsoid(semi_axes: ArrayLike) -> Triangles:
-    """An ellipsoid with semi-axes [m], shape (3,)."""
+    """Make an ellipsoid with semi-axes [m], shape (3,)."""
     ball = _revolved(*_arc(1.0, -np.pi / 2, np.pi / 2, 2 * ALONG))
     scale = np.asarray(semi_axes, dtype=float)
     normals = ball.normals / scale
@@ -73,7 +73,7 @@ def ellipsoid(semi_axes: ArrayLike) -> Triangles:
 
 
 def capsule(radius: float, half_length: float) -> Triangles:
-    """A cylinder along z of length 2 ``half_length`` with half spheres of ``radius`` [m] on its ends."""
+    """Make a capsule along z: a cylinder of length 2 ``half_length`` [m] with half spheres of ``radius`` [m]."""
     low, low_normal = _arc(radius, -np.pi / 2, 0.0, ALONG)
     high, high_normal = _arc(radius, 0.0, np.pi / 2, ALONG)
     shift = np.array([0.0, half_length])
@@ -82,7 +82,7 @@ def capsule(radius: float, half_length: float) -> Triangles:
 
 
 def cylinder(radius: float, half_length: float) -> Triangles:
-    """A cylinder along z of length 2 ``half_length`` [m]."""
+    """Make a cylinder along z with length 2 ``half_length`` [m]."""
     low, high = -half_length, half_length
     side = _revolved(np.array([[radius, low], [radius, high]]), np.array([[1.0, 0.0], [1.0, 0.0]]))
     bottom = _revolved(np.array([[0.0, low], [radius, low]]), np.array([[0.0, -1.0], [0.0, -1.0]]))
@@ -91,14 +91,14 @@ def cylinder(radius: float, half_length: float) -> Triangles:
 
 
 def _arc(radius: float, start: float, stop: float, rows: int) -> tuple[Array, Array]:
-    """Points (distance from the axis, height) of a circle from one latitude to another, and their normals."""
+    """Return points (distance from the axis, height) of an arc from latitude ``start`` to ``stop``, and normals."""
     latitude = np.linspace(start, stop, rows + 1)
     normals = np.stack([np.cos(latitude), np.sin(latitude)], axis=1)
     return radius * normals, normals
 
 
 def _revolved(profile: Array, normals: Array) -> Triangles:
-    """The surface of a profile (distance from the z axis, height), listed upward outside, shape (P, 2)."""
+    """Make the surface of revolution of a profile (distance from the z axis, height), listed upward, shape (P, 2)."""
     azimuth = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     circle = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
 
@@ -119,9 +119,9 @@ def _revolved(profile: Array, normals: Array) -> Triangles:
 
 
 VISIBLE_GROUPS = (0, 1, 2)
-"""Geom groups that MuJoCo's own viewer shows; the others are by custom for collisions."""
+"""Geom groups that MuJoCo's viewer shows by default; the others are by convention for collisions."""
 _PLAIN = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
-"""Colour of a geom that sets none: then its material's counts."""
+"""MuJoCo's default colour, which marks a geom that takes the colour of its material."""
 _PRIMITIVES: dict[mujoco.mjtGeom, Callable[[Array], Triangles]] = {
     mujoco.mjtGeom.mjGEOM_BOX: box,
     mujoco.mjtGeom.mjGEOM_SPHERE: lambda size: ellipsoid(np.full(3, size[0])),
@@ -136,7 +136,7 @@ class Shape:
     """A coloured mesh.
 
     Attributes:
-        triangles: in the frame it belongs to [m].
+        triangles: mesh in the frame of its body [m].
         rgba: colours of the vertices, shape (V, 4), uint8.
     """
 
@@ -145,27 +145,27 @@ class Shape:
 
     @classmethod
     def of(cls, triangles: Triangles, rgba: tuple[float, float, float, float] | Array) -> Shape:
-        """A mesh in one colour, components from 0 to 1."""
+        """Make a shape in one colour with components from 0 to 1."""
         colour = np.clip(np.round(255.0 * np.asarray(rgba, dtype=float)), 0, 255).astype(np.uint8)
         return cls(triangles, np.tile(colour, (len(triangles.vertices), 1)))
 
     def in_colour(self, rgb: tuple[int, int, int]) -> Shape:
-        """The same mesh in another colour, components from 0 to 255."""
+        """Return the same mesh in another colour with components from 0 to 255."""
         return Shape(self.triangles, np.tile(np.array([*rgb, 255], dtype=np.uint8), (len(self.rgba), 1)))
 
 
 def body_shape(
     model: mujoco.MjModel, bodies: list[int], frame: tuple[Array, Array] | None = None
 ) -> Shape | None:
-    """Everything visible of some bodies that do not move against each other, or None if there is nothing.
+    """Collect the visible geometry of bodies without relative motion; None if there is none.
 
-    Planes, height fields and signed distance fields are left out; textures become their material's colour.
+    Planes, height fields and signed distance fields are left out. The colour of the material replaces textures.
 
     Args:
         model: compiled model.
         bodies: body ids.
-        frame: position [m], (3,), and rotation, (3, 3), of the frame to express it in, at ``qpos0``; None for the
-            frame of the first body.
+        frame: position [m], (3,), and rotation, (3, 3), of the frame of the result at ``qpos0``; None for the frame of
+            the first body.
     """
     data = posed(model)
     origin, R = frame or (data.xpos[bodies[0]].copy(), data.xmat[bodies[0]].reshape(3, 3).copy())
@@ -191,7 +191,7 @@ def _triangles(model: mujoco.MjModel, g: int) -> Triangles | None:
 
 
 def _mesh(model: mujoco.MjModel, m: int) -> Triangles:
-    """A mesh asset; every corner of every face gets its own normal, because MuJoCo indexes the two apart."""
+    """Convert a mesh asset; each corner of each face becomes a vertex, because MuJoCo indexes normals separately."""
     first, faces = model.mesh_vertadr[m], model.mesh_face[model.mesh_faceadr[m] :][: model.mesh_facenum[m]]
     first_normal = model.mesh_normaladr[m]
     of_normals = model.mesh_facenormal[model.mesh_faceadr[m] :][: model.mesh_facenum[m]]
@@ -203,7 +203,7 @@ def _mesh(model: mujoco.MjModel, m: int) -> Triangles:
 
 
 def _colour(model: mujoco.MjModel, g: int) -> Array:
-    """RGBA as MuJoCo draws it: the geom's own colour if it sets one, else its material's."""
+    """Return the RGBA with which MuJoCo draws a geom: its own colour if set, else that of its material."""
     material = int(model.geom_matid[g])
     own = model.geom_rgba[g]
     return model.mat_rgba[material] if material >= 0 and np.array_equal(own, _PLAIN) else own

@@ -1,4 +1,4 @@
-"""Replays as streams of Rerun: robots, payload, causes, series, summary; and where they go: file, browser, viewer."""
+"""Log replays to Rerun (robots, payload, causes, series, summary) and send them to a file, browser or viewer."""
 
 import os
 import shutil
@@ -32,7 +32,7 @@ from mocobot_view.shapes import Shape
 
 
 def time_column(time: Array) -> rr.TimeColumn:
-    """The timeline's column for times [s]: whole nanoseconds, rounded where the SDK itself would cut off."""
+    """Make the timeline's column for times [s], rounded to nanoseconds because the SDK would truncate."""
     return rr.TimeColumn(TIMELINE, duration=np.round(1e9 * time).astype("timedelta64[ns]"))
 
 
@@ -46,18 +46,18 @@ def send_poses(
 ) -> None:
     """Log the pose of an entity in its parent: positions [m], (Q, 3), and quaternions (x, y, z, w), (Q, 4).
 
-    None for what is constant, zero and unturned. Single precision: 0.1 um at 1 m, far below what an encoder resolves.
+    None stands for a zero position or no rotation. Values are in single precision, which resolves 0.1 um at 1 m.
     """
     place, turn = (None if part is None else part.astype(np.float32) for part in (position, quaternion))
     send(stream, path, time, rr.Transform3D.columns(translation=place, quaternion=turn))
 
 
 TRAIL_HZ = 25.0
-"""Pieces of a wrist path per second; it is drawn only, the samples are among the series."""
+"""Segments of a drawn wrist path per second [Hz]; the series contain all samples. Chosen."""
 
 
 def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
-    """Log all robots below the trial's root."""
+    """Log all robots below the root of the trial."""
     shapes = robot_shapes(trial.recording.metadata.design)
     for i in range(trial.robots):
         robot = f"{trial.name}/omnid{i + 1}"
@@ -81,7 +81,7 @@ def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
 
 
 def log_causes(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
-    """Mark every cause of the diagnosis where it sits; several at one place share a mark."""
+    """Mark every cause of the diagnosis at its place; causes at one place share a mark."""
     named = trial.diagnosis.causes if trial.diagnosis else ()
     for (robot, body), causes in by_place(named).items():
         position = np.zeros(3)
@@ -97,7 +97,7 @@ def log_causes(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
 def log_label(
     stream: rr.RecordingStream, path: str, position: ArrayLike, text: str, colour: Colour, show: bool = True
 ) -> None:
-    """Write text at a point of the entity's parents' frame, readable on the viewer's dark labels."""
+    """Write a text at a point in the frame of the parent entity, in a colour for the viewer's dark labels."""
     pale = [colours.pale(colour)]
     stream.log(
         path, rr.Points3D([position], labels=[text], colors=pale, radii=0.001, show_labels=show), static=True
@@ -105,7 +105,7 @@ def log_label(
 
 
 def log_shape(stream: rr.RecordingStream, path: str, shape: Shape) -> None:
-    """Log a coloured mesh once, in the frame of the entity's parents."""
+    """Log a coloured mesh as static data in the frame of the parent entity."""
     mesh = shape.triangles
     drawn = rr.Mesh3D(
         vertex_positions=mesh.vertices.astype(np.float32),
@@ -117,7 +117,7 @@ def log_shape(stream: rr.RecordingStream, path: str, shape: Shape) -> None:
 
 
 def _log_paths(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
-    """Measured and commanded wrist positions in {b}, piece by piece."""
+    """Log measured and commanded wrist positions in {b} as path segments."""
     every = slice(None, None, max(1, round(trial.recording.metadata.rate_hz / TRAIL_HZ)))
     path = trail_paths(trial)[i]
     paths, looks = [trial.bodies.wrist[:, i]], [(colours.of_robot(i + 1), 1.5)]
@@ -134,7 +134,7 @@ def _log_paths(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
 
 
 def _log_force(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
-    """Force of the robot on the payload, in {i}; it ends where the filtered data do."""
+    """Log the force of the robot on the payload in {i}, up to the end of the filtered data."""
     if trial.data is None:
         return
     path = f"{trial.name}/omnid{i + 1}/{PATHS['flange']}/force"
@@ -147,7 +147,7 @@ def _log_force(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
 
 
 def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
-    """Log the payload below the trial's root, in frame {1}; nothing where its grasps are not known."""
+    """Log the payload below the root of the trial in frame {1}; nothing if the grasps are unknown."""
     if trial.motion is None:
         return
     payload = f"{trial.name}/payload"
@@ -157,14 +157,14 @@ def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     if trial.facts is not None:
         _log_facts(stream, f"{payload}/estimate", trial.facts, "", colours.ESTIMATE, thick=1.0)
     if trial.truth is not None:
-        # Longer and thinner, so that both show where they agree.
+        # Longer and thinner than the estimate, so that both are visible if they agree.
         _log_facts(stream, f"{payload}/truth", trial.truth, " true", colours.TRUTH, thick=0.5)
 
 
 def _log_facts(
     stream: rr.RecordingStream, path: str, facts: BodyFacts, suffix: str, colour: Colour, thick: float
 ) -> None:
-    """Grasp frames, centre of mass, principal axes and inertia ellipsoid in {1}."""
+    """Log grasp frames, centre of mass, principal axes and inertia ellipsoid in {1}."""
     longer = FRAME_M * (1.0 if thick == 1.0 else 1.5)
     if facts.grasps is not None:
         for i, (p, R) in enumerate(zip(facts.grasps.p_1i, facts.grasps.R_1i, strict=True), start=1):
@@ -194,7 +194,7 @@ def _log_facts(
 def _log_axes(
     stream: rr.RecordingStream, path: str, at: Array, axes: Array, tones: Sequence[Colour], radius_m: float
 ) -> None:
-    """Three arrows from a point (3,), the columns of ``axes`` (3, 3), in {1} [m]."""
+    """Log three arrows from a point, shape (3,), along the columns of ``axes``, shape (3, 3), in {1} [m]."""
     arrows = rr.Arrows3D(origins=np.tile(at, (3, 1)), vectors=axes.T, colors=tones, radii=radius_m)
     stream.log(path, arrows, static=True)
 
@@ -203,7 +203,7 @@ XYZ = ("x", "y", "z")
 
 
 def log_series(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
-    """Log all series below ``series`` in the trial's root, one entity per quantity and robot."""
+    """Log all series below ``series`` in the root of the trial."""
     recording, data, motion, balance = trial.recording, trial.data, trial.motion, trial.balance
     _log_wrists(stream, trial)
     series: list[tuple[str, Array, Array, tuple[str, ...]]] = [
@@ -233,7 +233,7 @@ def log_series(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
 
 
 def _log_wrists(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
-    """Measured and commanded wrist positions, robot by robot, so that each pair shares a plot."""
+    """Log measured and commanded wrist positions by robot, so that both share a plot."""
     for i in range(trial.robots):
         path = f"{trial.name}/series/wrist/omnid{i + 1}"
         measured = trial.bodies.wrist[:, i]
@@ -254,7 +254,7 @@ def _per_robot(
     values: Array,
     parts: tuple[str, ...],
 ) -> None:
-    """One entity for a quantity of all robots, shape (Q, N, k): a row costs as much as three numbers."""
+    """Log a quantity of all robots, shape (Q, N, k), as one entity, because each row has a large overhead."""
     names, shades = [], []
     for robot in range(1, trial.robots + 1):
         names += [f"omnid{robot} {part}".strip() for part in parts]
@@ -271,7 +271,7 @@ def log_lines(
     shades: Sequence[Colour],
     width: float = 1.2,
 ) -> None:
-    """k lines of one entity at times [s], shape (Q, k)."""
+    """Log k lines of one entity: times [s], shape (Q,), and values, shape (Q, k)."""
     stream.log(path, rr.SeriesLines(names=names, colors=shades, widths=width), static=True)
     counts = np.full(len(values), values.shape[1])
     send(stream, path, time, rr.Scalars.columns(scalars=values.ravel()).partition(counts))
@@ -281,7 +281,7 @@ NOT_KNOWN = "not determined"
 
 
 def summary(trial: ReplayTrial) -> str:
-    """Markdown."""
+    """Write the summary of a trial in Markdown."""
     meta = trial.recording.metadata
     payload = f", payload {_plain(meta.payload)}" if meta.payload is not None else ""
     robots = "1 robot" if trial.robots == 1 else f"{trial.robots} robots"
@@ -316,7 +316,7 @@ def _estimate(trial: ReplayTrial) -> str:
     moments, moments_se = (
         (inertia.principal.moments, inertia.principal.moments_se) if inertia else (None, None)
     )
-    # One number per row: the viewer cuts what is wider than its panel.
+    # One number per row, because the viewer cuts off text wider than its panel.
     rows = [
         (
             "mass [kg]",
@@ -381,7 +381,7 @@ def _key(trial: ReplayTrial) -> str:
 def _rows(
     name: str, parts: str, values: tuple[Array | None, Array | None, Array | None], scale: float, digits: int
 ) -> list[tuple[str, str, str]]:
-    """Rows of three numbers with the standard errors and the truth, shapes (3,), as far as they are known."""
+    """Make rows of estimate, standard errors and truth, shapes (3,), each None if unknown."""
     estimate, errors, truth = (None if value is None else scale * value for value in values)
     rows = []
     for k, part in enumerate(parts):
@@ -393,19 +393,19 @@ def _rows(
 
 
 def _pose(grasps: Grasps | None, i: int) -> tuple[Array | None, Array | None]:
-    """Position [m] and turn [deg] of a grasp in {1}, shapes (3,)."""
+    """Return position [m] and rotation vector [deg] of a grasp in {1}, shapes (3,)."""
     if grasps is None:
         return None, None
     return grasps.p_1i[i], Rotation.from_matrix(grasps.R_1i[i]).as_rotvec(degrees=True)
 
 
 def _fixed(value: float, digits: int) -> str:
-    """Fixed digits, and no minus before a zero."""
+    """Format a number with fixed digits, without a minus sign before zero."""
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
 def _plain(text: str | None) -> str:
-    """Text without what Markdown or a viewer would take for markup or a control character."""
+    """Escape Markdown and replace control characters by spaces."""
     kept = "".join(c if c.isprintable() else " " for c in str(text))
     return "".join("\\" + c if c in "\\`*_[]<>|#" else c for c in kept)
 
@@ -414,12 +414,12 @@ APPLICATION = "mocobot"
 
 
 def new_stream() -> rr.RecordingStream:
-    """An empty stream; connect a file, a server or a viewer before anything is logged."""
+    """Make an empty stream; connect it to a file, server or viewer before logging."""
     return rr.RecordingStream(APPLICATION)
 
 
 def begin(stream: rr.RecordingStream, layout: rrb.Blueprint, names: Sequence[str]) -> None:
-    """Start a stream with its layout and a root for every name, z up."""
+    """Send the layout to a stream, and log a root with z up for every name."""
     stream.send_blueprint(layout, make_active=True, make_default=True)
     stream.send_recording_name(", ".join(names))
     for name in names:
@@ -432,13 +432,13 @@ def log_replay(
     progress: Callable[[int], object] | None = None,
     tab: str | None = None,
 ) -> None:
-    """Log trials side by side, each below the root of its name, all on one timeline that starts at 0.
+    """Log trials side by side, each below a root with its name, on one timeline that starts at 0.
 
     Args:
-        stream: where to.
-        trials: what is shown.
+        stream: target stream.
+        trials: trials to show.
         progress: called with 1 after each trial.
-        tab: tab that is open at first (see ``blueprint``).
+        tab: name of the initial tab (see ``blueprint``).
     """
     begin(stream, blueprint(trials, tab), [trial.name for trial in trials])
     for trial in trials:
@@ -458,23 +458,23 @@ Progress = Callable[[int], object] | None
 Content = Callable[[rr.RecordingStream], object]
 
 WEB_PORT, DATA_PORT = 9090, 9876
-"""Ports of the web viewer and of its data: Rerun's own."""
+"""Ports of the web viewer and of its data; Rerun's defaults."""
 FLUSH_S = 20.0
-"""How long a viewer may take to accept everything; a long recording takes it one."""
+"""Time limit for a viewer to accept all data [s]. Chosen: a long recording takes one second."""
 
 
 def has_display() -> bool:
-    """Whether a window could be opened."""
+    """Whether a display is available for a window."""
     return not sys.platform.startswith("linux") or bool(
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )
 
 
 def check_enabled() -> None:
-    """Find out that Rerun is switched off, when it takes everything and keeps nothing.
+    """Check that the environment does not turn Rerun off, which would silently discard all data.
 
     Raises:
-        InputError: it is.
+        InputError: Rerun is turned off.
     """
     if not rr.is_enabled(new_stream()):
         raise InputError(
@@ -483,19 +483,19 @@ def check_enabled() -> None:
 
 
 def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = None) -> None:
-    """Write a replay as an .rrd file, as ``save_content`` does.
+    """Write a replay as an .rrd file; see ``save_content``.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     save_content(lambda stream: log_replay(stream, trials, progress), path)
 
 
 def save_content(content: Content, path: Path) -> None:
-    """Write whatever logs itself into a stream as an .rrd file, which replaces an earlier one only when it is complete.
+    """Write the data that ``content`` logs as an .rrd file; it replaces an earlier file only once it is complete.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     with whole_file(path) as temporary:
         temporary.touch(exist_ok=False)  # the SDK's message would name the temporary file
@@ -505,13 +505,13 @@ def save_content(content: Content, path: Path) -> None:
             content(stream)
             stream.flush()
             stream.disconnect()
-        except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
+        except RuntimeError as error:  # the SDK's writer hides the system's error
             raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
         _check_complete(temporary)
 
 
 def show_content(content: Content) -> None:
-    """Show whatever logs itself into a stream: open the viewer, or use an open one, and return when it has everything.
+    """Show the data that ``content`` logs in a new or open viewer; return once the viewer has all data.
 
     Raises:
         InputError: the viewer does not start.
@@ -530,13 +530,13 @@ def show_content(content: Content) -> None:
 
 
 def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
-    """Serve whatever logs itself into a stream to browsers, until the process, or the returned stream, ends.
+    """Serve the data that ``content`` logs to browsers, until the process or the returned stream ends.
 
     Returns:
-        The stream, to be kept, and the address to open.
+        Stream, which the caller must keep, and address to open.
 
     Raises:
-        InputError: the servers do not start; another one may be using their ports.
+        InputError: the servers do not start, for example because their ports are in use.
     """
     stream = new_stream()
     try:
@@ -548,7 +548,7 @@ def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
         raise InputError(
             f"the replay cannot be served ({_line(error)}); is another one running on ports {WEB_PORT} and {DATA_PORT}?"
         ) from error
-    # Labels are drawn for the dark theme, whatever the browser prefers.
+    # The colours of labels need the dark theme.
     address = f"http://localhost:{WEB_PORT}?url={quote(data, safe='')}&theme=dark"
     if has_display():
         webbrowser.open(address)
@@ -556,9 +556,13 @@ def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
 
 
 def _check_complete(path: Path) -> None:
-    """The SDK writes in the background and only logs what goes wrong there, so read back what it says it wrote."""
+    """Read the written file back, because the SDK writes in the background and only logs its errors.
+
+    Raises:
+        OSError: the file is not complete.
+    """
     try:
-        with warnings.catch_warnings():  # about a missing footer, which is an error here
+        with warnings.catch_warnings():  # a missing footer is only a warning
             warnings.simplefilter("ignore")
             reader = RrdReader(path)
             whole = (

@@ -1,1 +1,1 @@
-"""What ``mocobot`` offers to Python; take it from there (docs/api.md)."""
+"""Implementation of the Python interface; import its names from ``mocobot`` (docs/api.md)."""

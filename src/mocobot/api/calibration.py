@@ -1,13 +1,13 @@
-"""Calibrate the robots of a team from what they carry.
+"""Calibrate the robots of a team from recordings of the payloads that they carry.
 
-A calibration's folder:
+Folder of a calibration:
 
 calibration.json           see ``estimator.calibrate.json``
-report.txt                 what the command prints
-omnid1.toml ...            every robot's numbers as they are
-model, or model-1 ...      the calibrated team in MuJoCo, one for each payload; ``mocobot simulate --model`` takes it
+report.txt                 text that the command prints
+omnid1.toml ...            calibrated parameters of every robot
+model, or model-1 ...      calibrated team in MuJoCo, one per payload, for ``mocobot simulate --model``
 deviations.png, recordings.png, shares.png
-                           parameters against priors, what recordings leave over, what each of them contributes
+                           parameters against priors, misfit of each recording, information from each recording
 """
 
 from __future__ import annotations
@@ -35,29 +35,29 @@ from mocobot.options import CalibrateOptions, made
 from mocobot.results import Folder, public
 
 TILT_RAD, ARM_MASS_RATIO = float(np.deg2rad(0.2)), 0.1
-"""Standard deviations of what is free on demand only, where the prior has none."""
+"""Prior standard deviations of base tilt [rad] and relative arm mass, if requested and the prior has none. Chosen."""
 WEIGHED = 1e-3
-"""Relative standard error of a weight that is given without one."""
+"""Relative standard error of a weight that is given without one. Chosen."""
 Weight = float | tuple[float, float]
 REPORT, MODEL = "report.txt", "model"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Folder, Below):
-    """The robots as they are and what they carry, printable, a table in a notebook, and a folder of files.
+    """Calibrated robots and their payloads; prints as text, shows as a table in a notebook, writes a folder.
 
-    The attributes are those of ``estimator.calibrate.calibration.Calibration``. ``simulate`` takes the ``model`` in
-    the folder.
+    The attributes are those of ``estimator.calibrate.calibration.Calibration``. ``simulate`` accepts the folder's
+    ``model``.
     """
 
     result = "calibration"
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_calibration(self)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         held = ", ".join(f"{payload.parameters[0]:.4g} kg" for payload in self.payloads)
         return f"<Calibration of {self.robots} robots from {len(self.trials)} recordings: {held}>"
 
@@ -67,22 +67,22 @@ class Calibration(Folder, Below):
         return calibration_html(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``estimator.calibrate.json``."""
+        """Return strict JSON values with units in the keys; see ``estimator.calibrate.json``."""
         return calibration_to_dict(self)
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> list[str]:
-        """Write everything that is listed at the head of this module into an existing folder.
+        """Write all files that the docstring of this module lists into an existing folder.
 
         Args:
-            folder: it.
-            pictures: whether pictures are drawn, too.
+            folder: existing folder.
+            pictures: whether to draw pictures.
             more: further keys of the JSON.
 
         Returns:
-            What could not be made, and why, one sentence each.
+            One sentence per file that could not be made, with the reason.
 
         Raises:
-            InputError: something cannot be written.
+            InputError: a file cannot be written.
         """
         from mocobot_sim.extended.extended import write_calibrated
 
@@ -91,7 +91,7 @@ class Calibration(Folder, Below):
             name = MODEL if len(self.payloads) == 1 else f"{MODEL}-{k + 1}"
             try:
                 write_calibrated(self, folder / name, k)
-            except InputError as error:  # numbers that no body has, robots that are not the simulated ones
+            except InputError as error:  # impossible inertial parameters, or robots that cannot be simulated
                 notes.append(f"there is no {name}: {error}")
         for robot in range(1, self.robots + 1):
             write_text(folder / f"omnid{robot}.toml", unit_toml(self, robot))
@@ -113,19 +113,19 @@ def calibrate(
     note: Say = quiet,
     **fields: Any,
 ) -> Calibration:
-    """Find out how every robot differs from its design, and what the team carries.
+    """Estimate how every robot differs from its design, and the payloads that the team carries.
 
     Args:
-        logs: recordings of one team with payloads, or paths of their files, or of logs that ``convert`` reads as they
-            are; several, so that each can be predicted by the others.
-        free: the same of the robots with nothing in their hands, which tell what the arms weigh.
-        options: how; ``fields`` are fields of it. Labels and weights may be mappings: ``known_mass={"c": (10.48,
-            0.005)}`` [kg], or a number where there is one payload.
-        say: takes the name of the stage that begins.
-        note: takes how a log was read, as text.
+        logs: recordings of one team with payloads, or paths of recordings or of logs that ``convert`` reads without
+            further options. With several, each can be predicted from the others.
+        free: recordings of the same robots without a payload, which determine the weight of the arms.
+        options: options of the calibration; ``fields`` replace its fields. Labels and weights may be mappings, such as
+            ``known_mass={"c": (10.48, 0.005)}`` [kg]; for a single payload, a number suffices.
+        say: called with the name of each stage that begins.
+        note: called with a text on how each log was read.
 
     Raises:
-        InputError: recordings that cannot be used or do not belong together, or a weight of no payload.
+        InputError: a recording cannot be used, recordings do not belong together, or a weight has no payload.
     """
     chosen = made(CalibrateOptions, options, fields)
     prior = chosen.prior
@@ -148,19 +148,19 @@ def calibrate(
 
 
 def read_calibration(path: Path | str) -> Calibration:
-    """Read what ``Calibration.write`` or ``mocobot calibrate --out`` wrote: the file, or its folder.
+    """Read a calibration, from the JSON file or the folder of ``Calibration.write`` or ``mocobot calibrate --out``.
 
     Raises:
-        InputError: the file cannot be read, or is not a whole calibration.
+        InputError: the file cannot be read or is not a complete calibration.
     """
     return public(Calibration, calibration_of(path))
 
 
 def write_calibration(path: Path, calibration: Below, made_with: Mapping[str, Any] | None = None) -> None:
-    """Write the JSON of a calibration, with provenance on request; the file appears whole or not at all.
+    """Write a calibration as JSON, optionally with provenance; a failure leaves no partial file.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     write_json(
         path, calibration_to_dict(calibration) | ({"provenance": dict(made_with)} if made_with else {})
@@ -168,7 +168,7 @@ def write_calibration(path: Path, calibration: Below, made_with: Mapping[str, An
 
 
 def _labels(given: Mapping[str, str] | Iterable[str], logs: Sequence[Given]) -> dict[str, str]:
-    """Labels by the name of a recording, from a mapping or from ``REC=LABEL``."""
+    """Map recording names to payload labels, from a mapping or from texts ``REC=LABEL``."""
     if isinstance(given, Mapping):
         return dict(given)
     names = [log.name if isinstance(log, Recording) else str(log) for log in logs]
@@ -187,7 +187,7 @@ def _labels(given: Mapping[str, str] | Iterable[str], logs: Sequence[Given]) -> 
 
 
 def _labelled(recordings: Sequence[Recording], labels: Mapping[str, str]) -> list[Recording]:
-    """Recordings with labels of their own; a name may come without its folder."""
+    """Replace the payload labels of recordings; ``labels`` may omit the folder of a recording's name."""
     out, unmet = [], dict(labels)
     for recording in recordings:
         name = next((n for n in (recording.name, Path(recording.name).name) if n in labels), None)
@@ -202,7 +202,7 @@ def _labelled(recordings: Sequence[Recording], labels: Mapping[str, str]) -> lis
 
 
 def _masses(given: Mapping[str, Weight] | Weight | Iterable[str]) -> dict[str, Weight]:
-    """Mass, or mass and standard error [kg], by label, "" for that of the only payload."""
+    """Map payload labels to a mass, or to mass and standard error [kg]; "" stands for the only payload."""
     if isinstance(given, Mapping):
         return dict(given)
     if isinstance(given, float | int):
@@ -228,7 +228,7 @@ def _masses(given: Mapping[str, Weight] | Weight | Iterable[str]) -> dict[str, W
 
 
 def _weights(known: Mapping[str, Weight], recordings: Sequence[Recording]) -> dict[str, tuple[float, float]]:
-    """Masses with standard errors by label of a payload."""
+    """Map the payload labels of the recordings to mass and standard error [kg]."""
     labels = {recording.metadata.payload or "" for recording in recordings}
     out = {}
     for label, given in known.items():

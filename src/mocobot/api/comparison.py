@@ -1,18 +1,18 @@
-"""Two results side by side: what differs by more than its errors.
+"""Compare two results: which numbers differ by more than their standard errors.
 
 Keys of the JSON:
 
 format, version     "mocobot-comparison", 1
 kind                "estimate", "calibration" or "diagnosis"
-a, b                what was compared: names of files or folders
-changed             whether anything differs by more than its errors
-groups              list of {name, unit, chi2, dof, p, changed, together, quantities}: p of so large a difference by
-                    chance, correlations heeded; together is a list of {entries [2], correlation} of errors that move
-                    together; chi2 is null if there is a difference and no error
-quantities          list of {name, a, a_se, b, b_se, difference, se, ratio}; the difference is b - a; ratio is null as
-                    chi2
-level               probability of a false alarm anywhere, and least_p, what it leaves to each group
-changes             sentences: what only one of them has
+a, b                names of the compared files or folders
+changed             whether anything differs by more than its standard errors
+groups              list of {name, unit, chi2, dof, p, changed, together, quantities}: p is the p-value of the
+                    chi-square test with correlations; together lists {entries [2], correlation} of strongly
+                    correlated errors; chi2 is null if a difference has no error
+quantities          list of {name, a, a_se, b, b_se, difference, se, ratio}: difference is b - a; ratio is difference
+                    over se, null if a difference has no error
+level               probability of a false alarm in any group; least_p is its share for each group
+changes             sentences: findings that only one of the results has
 notes               sentences
 """
 
@@ -50,14 +50,14 @@ WIDTH = 110
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Folder):
-    """What two results of one kind say differently, printable, and a folder of files.
+    """Differences between two results of one kind; prints as text and writes a folder.
 
     Attributes:
         kind: ``"estimate"``, ``"calibration"`` or ``"diagnosis"``.
-        a, b: what they are called.
-        groups: what both give, with the differences.
-        changes: what only one of them has, or says otherwise, one sentence each.
-        notes: what to know before trusting the differences, one sentence each.
+        a, b: names of the results.
+        groups: quantities that both results contain, with their differences.
+        changes: findings that only one result has or that differ, one sentence each.
+        notes: caveats about the differences, one sentence each.
     """
 
     kind: str
@@ -70,32 +70,32 @@ class Comparison(Folder):
 
     @property
     def least_p(self) -> float:
-        """Probability below which a group has changed."""
+        """Threshold of the p-value below which a group counts as changed (Bonferroni)."""
         return LEVEL / max(1, len(self.groups))
 
     @property
     def changed_groups(self) -> tuple[Group, ...]:
-        """Those that differ by more than their errors, the clearest first."""
+        """Groups that differ by more than their standard errors, the clearest first."""
         found = [group for group in self.groups if group.p < self.least_p]
         return tuple(sorted(found, key=lambda group: -group.chi2 / max(1, group.dof)))
 
     @property
     def changed(self) -> bool:
-        """Whether anything did."""
+        """Whether any group or finding changed."""
         return bool(self.changed_groups or self.changes)
 
     @property
     def what_changed(self) -> str:
-        """The groups of numbers that did, the clearest first."""
+        """Names of the changed groups with their largest difference, the clearest first."""
         return "; ".join(f"{group.name} ({_clearest(group)})" for group in self.changed_groups)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         groups = f"{len(self.changed_groups)} of {len(self.groups)} groups changed"
         return f"<Comparison of two results, {self.kind}: {groups}>"
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         plural = "diagnoses" if self.kind == "diagnosis" else f"{self.kind}s"
         lines = [f"Two {plural}: A is {self.a}", f"{'':{len(plural) + 6}}B is {self.b}", ""]
         lines += _fill(self.verdict)
@@ -118,7 +118,7 @@ class Comparison(Folder):
 
     @property
     def verdict(self) -> str:
-        """What changed, in a sentence."""
+        """State in one sentence what changed."""
         tests = f"{len(self.groups)} groups of numbers are tested together, one false alarm in a hundred comparisons"
         if not self.groups and not self.changes:
             return "NOTHING TO COMPARE: they have no number in common."
@@ -129,7 +129,7 @@ class Comparison(Folder):
         return f"CHANGED beyond its errors, marked with a star ({tests}): {self.what_changed}."
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON as documented at the head of this module."""
+        """Return strict JSON values; the docstring of this module documents the keys."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -148,12 +148,12 @@ class Comparison(Folder):
         """Write JSON, text and a picture into an existing folder.
 
         Args:
-            folder: it.
-            pictures: whether the picture is drawn, too.
+            folder: existing folder.
+            pictures: whether to draw the picture.
             more: further keys of the JSON.
 
         Raises:
-            InputError: something cannot be written.
+            InputError: a file cannot be written.
         """
         write_json(folder / NAME, self.to_dict() | more)
         write_text(folder / REPORT, f"{self}\n")
@@ -164,13 +164,13 @@ class Comparison(Folder):
 
 
 def compare(a: Any, b: Any) -> Comparison:
-    """Compare two estimates, calibrations or diagnoses: what changed beyond its errors.
+    """Compare two estimates, calibrations or diagnoses: which numbers changed by more than their standard errors.
 
     Args:
-        a, b: results of ``estimate``, ``calibrate`` or ``diagnose``, both of the same; or their files or folders.
+        a, b: results of ``estimate``, ``calibrate`` or ``diagnose``, both of one kind; or their files or folders.
 
     Raises:
-        InputError: one cannot be read, they are of different kinds, or of different numbers of robots.
+        InputError: a result cannot be read, or the two differ in kind or in their number of robots.
     """
     one, other = _read(a), _read(b)
     if one.kind != other.kind:
@@ -201,7 +201,7 @@ def compare(a: Any, b: Any) -> Comparison:
 
 @dataclass(frozen=True)
 class _Result:
-    """A result as it was read: its name, its kind, itself, and what it says of the files that it was made from."""
+    """A result that was read; ``files`` maps the SHA-256 of each of its input files to the file's name."""
 
     name: str
     kind: str
@@ -217,7 +217,7 @@ def _read(given: Any) -> _Result:
 
 
 def _file(path: Path) -> Path:
-    """The JSON of a result, or the only one in its folder."""
+    """Return the JSON file of a result: the path itself, or the only result in a folder."""
     if not path.is_dir():
         return path
     found = [path / name for name in (CALIBRATION_NAME, DIAGNOSIS_NAME) if (path / name).is_file()]
@@ -274,7 +274,7 @@ def _finite(value: float) -> float | None:
 
 
 def _clearest(group: Group) -> str:
-    """The largest difference of a group."""
+    """Describe the largest difference of a group in terms of its standard error."""
     k = int(np.argmax(np.abs(group.ratio)))
     entry = f"{group.entries[k]} by " if group.entries[k] else "by "
     return f"{entry}{_with_error(group.difference[k], group.se[k])} {group.unit}".rstrip()

@@ -1,4 +1,4 @@
-"""Groups of numbers that two results both give, and how far they are apart for their errors."""
+"""Groups of quantities that two results share, and tests of their differences against their standard errors."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,17 +22,17 @@ from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.result import PayloadEstimate
 
 LEVEL = 0.01
-"""Probability that two results of the same truth are said to differ anywhere. Chosen: one false alarm in a hundred; it
-is shared out evenly among the groups that are tested (Bonferroni)."""
+"""Probability that two results of the same truth are reported as different. Chosen: one false alarm in a hundred,
+divided evenly among the tested groups (Bonferroni)."""
 TOGETHER = 0.9
-"""Correlation from which on two errors are said to move together. Chosen: four fifths of the variance are then
-common."""
+"""Correlation above which two errors are reported as correlated. Chosen: they then share four fifths of the
+variance."""
 RANK = 1e-10
-"""Least share of the largest eigenvalue of a correlation matrix that counts as known. Derived: eigenvalues of double
-precision are wrong by 1e-16 times the size, and files keep 16 digits; six orders above are left."""
+"""Smallest eigenvalue of a correlation matrix, relative to the largest, that counts as nonzero. Derived: rounding
+errors of eigenvalues are about 1e-16 of the largest, and files keep 16 digits; the limit is six orders above."""
 EQUAL = 1e-9
-"""Difference, relative to the values, that is none where errors are zero. Derived: numbers of degrees and matrices go
-through files with a dozen operations of 1e-16 each."""
+"""Relative difference below which two values count as equal. Derived: converting angles and matrices to and from files
+takes a dozen operations with rounding errors of 1e-16 each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +40,12 @@ class Group:
     """Numbers of one kind, such as the three components of a centre of mass.
 
     Attributes:
-        name: what they are.
-        unit: theirs, all of them.
-        entries: name of each, "" for one alone.
-        a, b: values, shape (K,).
-        a_covariance, b_covariance: of the errors of each, shape (K, K).
-        covariance: of the difference: the sum of these, less what both have in common, shape (K, K).
+        name: name of the group.
+        unit: unit of all its numbers.
+        entries: name of each number, "" for a single one.
+        a, b: values in both results, shape (K,).
+        a_covariance, b_covariance: error covariances of the values, shape (K, K).
+        covariance: error covariance of the difference b - a, in which common errors cancel, shape (K, K).
     """
 
     name: str
@@ -68,12 +68,12 @@ class Group:
         *,
         common: tuple[Array, Array] | None = None,
     ) -> "Group":
-        """From values with covariances.
+        """Build a group from values and covariances.
 
         Args:
-            name, unit, entries: see above.
-            a, b: values and the covariance of their errors, without a common error.
-            common: derivatives of a and of b by one error of unit variance that both have, shape (K,) each.
+            name, unit, entries: attributes of the group.
+            a, b: values and their error covariance, without the common error.
+            common: derivatives of a and b with respect to one common error of unit variance, shape (K,) each.
         """
         no = np.zeros(len(entries))
         by_a, by_b = common or (no, no)
@@ -100,7 +100,7 @@ class Group:
 
     @property
     def difference(self) -> Array:
-        """b - a, shape (K,)."""
+        """Difference b - a, shape (K,)."""
         return self.b - self.a
 
     @property
@@ -110,31 +110,31 @@ class Group:
 
     @property
     def ratio(self) -> Array:
-        """Differences over their standard errors, shape (K,); infinite where there is a difference and no error."""
+        """Differences over their standard errors, shape (K,); infinite for a difference without error."""
         same = np.abs(self.difference) <= EQUAL * np.maximum(np.abs(self.a), np.abs(self.b))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(same, 0.0, self.difference / self.se)
 
     @cached_property
     def _correlation(self) -> tuple[Array, Array]:
-        """Eigenvalues and eigenvectors of the difference's correlation matrix."""
+        """Eigenvalues and eigenvectors of the correlation matrix of the difference."""
         se = np.where(self.se > 0, self.se, 1.0)
         return np.linalg.eigh(self.covariance / np.outer(se, se))
 
     @cached_property
     def _known(self) -> NDArray[np.bool_]:
-        """Which directions have an error that can be told from none, shape (K,)."""
+        """Mask of the eigenvectors with a nonzero error, shape (K,)."""
         values = self._correlation[0]
         return values > RANK * max(values[-1], 0.0)
 
     @property
     def dof(self) -> int:
-        """Number of independent directions that are tested."""
+        """Degrees of freedom of the test: number of eigenvectors with a nonzero error."""
         return int(np.count_nonzero(self._known))
 
     @property
     def chi2(self) -> float:
-        """Square of the difference in terms of its covariance, correlations heeded; infinite as ``ratio``."""
+        """Squared Mahalanobis distance between a and b; infinite if ``ratio`` is."""
         if not np.isfinite(self.ratio).all():
             return float("inf")
         values, vectors = self._correlation
@@ -144,14 +144,14 @@ class Group:
 
     @property
     def p(self) -> float:
-        """Probability of so large a difference by chance."""
+        """P-value of the chi-square test that a and b have the same truth."""
         if not self.dof:
             return 1.0 if self.chi2 == 0 else 0.0
         return float(gammaincc(0.5 * self.dof, 0.5 * self.chi2))
 
     @property
     def together(self) -> list[tuple[str, str, float]]:
-        """Entries whose differences have errors that move together, with the correlation."""
+        """Pairs of entries whose errors correlate by at least ``TOGETHER``, with the correlation."""
         se = self.se
         return [
             (self.entries[i], self.entries[j], r)
@@ -169,7 +169,11 @@ XYZ = ("x", "y", "z")
 
 
 def estimate_groups(a: PayloadEstimate, b: PayloadEstimate) -> list[Group]:
-    """Mass, centre of mass, inertia and grasps, as far as both have them."""
+    """Group mass, centre of mass, inertia and grasps, as far as both estimates determine them.
+
+    Raises:
+        InputError: the estimates differ in their number of robots.
+    """
     if a.robots != b.robots:
         raise InputError(
             f"the estimates are of {a.robots} and {b.robots} robots; both must be of the same number"
@@ -196,12 +200,12 @@ def estimate_groups(a: PayloadEstimate, b: PayloadEstimate) -> list[Group]:
 def grasp_groups(
     a: GraspEstimate, b: GraspEstimate, prefix: str = "", common: tuple[Array, Array] | None = None
 ) -> list[Group]:
-    """Rotation and position of every grasp but the first, in {1}.
+    """Group rotation and position of every grasp except the first, in {1}.
 
     Args:
-        a, b: of the same number of robots.
-        prefix: of the groups' names.
-        common: as of ``Group.of``, for (d_2, e_2, ...) as in ``GraspEstimate``.
+        a, b: grasps of the same number of robots.
+        prefix: prefix of the names of the groups.
+        common: as for ``Group.of``, for the parameters (d_2, e_2, ...) of ``GraspEstimate``.
     """
     groups = []
     by_a, by_b = common or (np.zeros(len(a.covariance)),) * 2
@@ -219,7 +223,7 @@ def grasp_groups(
 
 
 def _near(x: Array, R: Array) -> Array:
-    """Rotation vector of R, of the two within 2 pi the one that is nearer to x [rad], shape (3,)."""
+    """Return the rotation vector of R with an angle below 2 pi that is nearer to x [rad], shape (3,)."""
     y = Rotation.from_matrix(R).as_rotvec()
     angle = float(np.linalg.norm(y))
     other = y * (1.0 - 2.0 * np.pi / angle) if angle > 0 else y
@@ -227,13 +231,19 @@ def _near(x: Array, R: Array) -> Array:
 
 
 def _turned(x: Array, covariance: Array, by: Array) -> tuple[Array, Array, Array]:
-    """A rotation vector, its covariance and its derivative from those of an error rotation in {1}, all in degrees."""
+    """Convert a rotation vector x [rad], the covariance of its left error rotation and a derivative to degrees.
+
+    Args:
+        x: rotation vector [rad], shape (3,).
+        covariance: covariance of the error rotation in {1} [rad^2], shape (3, 3).
+        by: derivative of the error rotation with respect to the common error [rad], shape (3,).
+    """
     J = np.rad2deg(np.linalg.inv(so3.left_jacobian(x)))
     return np.rad2deg(x), J @ covariance @ J.T, J @ by
 
 
 def estimate_notes(a: PayloadEstimate, b: PayloadEstimate) -> list[str]:
-    """What a reader must know of both."""
+    """List caveats about the comparison of two estimates, one sentence each."""
     notes = _one_sided(a, b)
     if in_encoder_frames(a.units) != in_encoder_frames(b.units):
         notes.append(MIXED)
@@ -270,10 +280,13 @@ def _one_sided(a: PayloadEstimate, b: PayloadEstimate) -> list[str]:
 
 
 def calibration_groups(a: Calibration, b: Calibration) -> list[Group]:
-    """Deviations of every robot that both know with an error, and payloads of the same name.
+    """Group the robots' deviations that both calibrations estimate, and the payloads with equal labels.
 
-    The spring scale that all robots share is one error of both where neither has a known weight, for it is of the same
-    springs: it leaves a difference as far as both depend on it alike.
+    If neither calibration knows a weight, both have the same error of the springs' common scale. This error cancels
+    in a difference as far as both results depend on it alike.
+
+    Raises:
+        InputError: the calibrations differ in their number of robots.
     """
     if a.robots != b.robots:
         raise InputError(
@@ -292,7 +305,7 @@ def calibration_groups(a: Calibration, b: Calibration) -> list[Group]:
 
 
 def calibration_notes(a: Calibration, b: Calibration) -> list[str]:
-    """What a reader must know of both."""
+    """List caveats about the comparison of two calibrations, one sentence each."""
     notes = [
         "Both start from an assumption of how far robots are off, and what the recordings say little of stays near it: "
         "such numbers differ by less than their errors."
@@ -314,7 +327,7 @@ def calibration_notes(a: Calibration, b: Calibration) -> list[str]:
 
 
 def _pairs(a: Calibration, b: Calibration) -> Iterator[tuple[CalibratedPayload, CalibratedPayload]]:
-    """Payloads by label."""
+    """Yield the pairs of payloads with equal labels."""
     others = {payload.label: payload for payload in b.payloads}
     for payload in a.payloads:
         if payload.label in others:
@@ -322,7 +335,7 @@ def _pairs(a: Calibration, b: Calibration) -> Iterator[tuple[CalibratedPayload, 
 
 
 def _deviations(a: Calibration, b: Calibration, robot: int, kind: str) -> Group | None:
-    """One kind of one robot's deviations, in the units that reports use."""
+    """Group one robot's deviations of one kind in the units of reports; None if no entry has errors in both."""
     at = AT[kind]
     known = (a.sd[robot, at] > 0) & (b.sd[robot, at] > 0)
     if not known.any():
@@ -349,7 +362,7 @@ def _deviations(a: Calibration, b: Calibration, robot: int, kind: str) -> Group 
 
 
 def _payload(a: CalibratedPayload, b: CalibratedPayload, a_scale_sd: float, b_scale_sd: float) -> list[Group]:
-    """Mass, first of all, centre of mass, inertia and grasps."""
+    """Group mass, centre of mass, inertia and grasps; the mass must come first."""
     name = f"payload {a.label}, " if a.label else ""
     (x, x_covariance, by_x), (y, y_covariance, by_y) = _about_com(a), _about_com(b)
     groups = []
@@ -366,7 +379,7 @@ def _payload(a: CalibratedPayload, b: CalibratedPayload, a_scale_sd: float, b_sc
 
 
 def _about_com(payload: CalibratedPayload) -> tuple[Array, Array, Array]:
-    """Mass, centre of mass and inertia, their covariance with the spring scale held, and their derivative by it."""
+    """Return mass, centre of mass and inertia, their covariance at fixed spring scale, and their derivative by it."""
     found = carried(payload, 0.0)
     values = np.concatenate([[found.mass_kg], found.p_1c, inertia_parameters(found.inertia)])
     return values, found.covariance, found.by_scale
@@ -374,11 +387,11 @@ def _about_com(payload: CalibratedPayload) -> tuple[Array, Array, Array]:
 
 Cause = Mapping[str, Any]
 Values = Mapping[str, Any]
-"""A diagnosis' JSON."""
+"""JSON of a diagnosis."""
 
 
 def diagnosis_groups(a: Values, b: Values) -> list[Group]:
-    """Parameters of the causes that both name at the same place; those that were chosen, not fitted, are left out."""
+    """Group the fitted parameters of causes that both diagnoses name at the same place."""
     groups, others = [], {_place(place): place for one in b["causes"] for place in _places(one)}
     for cause in (place for one in a["causes"] for place in _places(one)):
         other = others.get(_place(cause))
@@ -394,7 +407,7 @@ def diagnosis_groups(a: Values, b: Values) -> list[Group]:
 
 
 def diagnosis_changes(a: Values, b: Values) -> list[str]:
-    """Verdicts that differ, and causes that one of them names alone, one sentence each."""
+    """List a change of verdict and the causes that only one diagnosis names, one sentence each."""
     out = []
     if a["verdict"] != b["verdict"]:
         before, after = (VERDICTS[one["verdict"]].lower() for one in (a, b))
@@ -404,7 +417,7 @@ def diagnosis_changes(a: Values, b: Values) -> list[str]:
         for cause in here["causes"]:
             places = _places(cause)
             alone = [place for place in places if _place(place) not in named]
-            # Of a kind that is nowhere else one sentence is enough.
+            # If the other diagnosis names none of the places, one sentence covers them all.
             for one in [cause] if len(alone) == len(places) else alone:
                 numbers = ", ".join([name_of(one), *_numbers(one)])
                 out.append(f"Named in {name} alone: {numbers}; {other_name} {_could(one, there)}.")
@@ -412,7 +425,7 @@ def diagnosis_changes(a: Values, b: Values) -> list[str]:
 
 
 def diagnosis_notes(a: Values, b: Values) -> list[str]:
-    """What a reader must know of both."""
+    """List caveats about the comparison of two diagnoses, one sentence each."""
     left = [(name, one["residual"]["chi2_per_n"]) for name, one in (("A", a), ("B", b))]
     notes = [f"Misfit left (chi2/n): {', '.join(f'{value:.3g} in {name}' for name, value in left)}."]
     if a["causes"] or b["causes"]:
@@ -423,7 +436,7 @@ def diagnosis_notes(a: Values, b: Values) -> list[str]:
 
 
 def _places(cause: Cause) -> list[Cause]:
-    """A cause at each of its places; a kind has several."""
+    """Split a cause with several places into one entry per place."""
     members = cause.get("members", ())
     return [{**cause, **member, "members": ()} for member in members] if len(members) > 1 else [cause]
 
@@ -444,7 +457,7 @@ def _numbers(cause: Cause) -> list[str]:
 
 
 def _could(cause: Cause, other: Values) -> str:
-    """Whether the other recordings would have shown it."""
+    """Say whether the other recordings would have shown the cause, by their detection limits."""
     limits: Sequence[Values] = [
         entry
         for entry in other["detection_limits"]

@@ -1,4 +1,4 @@
-"""Bring a measured log onto one grid and one clock, and draft the map that says what is where in it."""
+"""Convert a measured log to one time grid and one clock, and draft the map of its channels."""
 
 from __future__ import annotations
 
@@ -26,50 +26,50 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Conversion(below.Converted):
-    """A log that became a recording.
+    """A log that was converted to a recording.
 
     Attributes:
-        recording: on one grid and one clock, checked.
-        level: of the log.
-        streams: what was found in each robot's stream, and done to it.
-        clocks: how the robots' clocks differ, and whether that was corrected.
-        span: which part of the log it is, or None for all of it.
-        left_out: what was left out of the log.
-        log: what was converted.
+        recording: checked recording on one time grid and one clock.
+        level: level of the log, joint or wrist.
+        streams: findings in each robot's stream, and the changes made to it.
+        clocks: offsets between the robots' clocks, and whether they were corrected.
+        span: part of the log that the recording covers; None for all of it.
+        left_out: parts of the log that no recording covers.
+        log: path of the converted log.
     """
 
     log: Path
 
     def report(self, out: Path | str) -> str:
-        """What was found and done, as text that names the recording's file."""
+        """Report findings and changes as text; ``out`` is the file of the recording."""
         return format_conversion(self, str(self.log), Path(out))
 
     def omissions(self) -> str:
-        """What is in no part of the log, as text; empty if nothing."""
+        """List as text which parts of the log were left out; empty if none."""
         return format_omissions(self.left_out) if self.left_out else ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``mocobot_logs.convert_json`` for the keys."""
+        """Return strict JSON values with units in the keys; see ``mocobot_logs.convert_json``."""
         return conversions_dict([(self, None)])
 
     def write(
         self, path: Path | str, advance: Callable[[int], object] = quiet, *, replace_bag: bool = False
     ) -> None:
-        """Write the recording: .parquet, .csv, .npz, .mcap or .db3, or a rosbag2 folder if there is no suffix.
+        """Write the recording as .parquet, .csv, .npz, .mcap or .db3, or as a rosbag2 folder without a suffix.
 
         Args:
-            path: target.
-            advance: takes the number of samples written since the last call.
-            replace_bag: whether a folder that is an earlier bag is replaced.
+            path: file or folder to write; its suffix determines the format.
+            advance: called with the number of samples written since the last call.
+            replace_bag: whether to replace a folder that holds an earlier bag.
 
         Raises:
-            InputError: it cannot be written, or nothing is written under such a name.
+            InputError: the target cannot be written, or its suffix belongs to no format.
         """
         below.write_converted(self.recording, Path(path), advance, replace_bag=replace_bag)
 
 
 def conversions_dict(parts: Sequence[tuple[Conversion, Path | None]]) -> dict[str, Any]:
-    """The JSON of all parts of one log, each with the file that it went to."""
+    """Return the JSON of all parts of one log, each with the file to which it was written, or None."""
     first, _ = parts[0]
     return conversion_dict(str(first.log), list(parts), first.left_out)
 
@@ -84,9 +84,9 @@ def convert(
     """Convert a log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording.
 
     Args:
-        log: a rosbag2 folder, .mcap, .db3, .csv, .npz, .mat or .parquet file, or a LeRobot dataset.
-        options: how; ``fields`` are fields of it.
-        advance: takes the progress made in reading, in the log's units.
+        log: rosbag2 folder; .mcap, .db3, .csv, .npz, .mat or .parquet file; or LeRobot dataset.
+        options: options of the conversion; ``fields`` replace its fields.
+        advance: called with the progress of reading since the last call, in units that depend on the log's format.
 
     Raises:
         InputError: log, map or design cannot be used, or the result is not a plausible recording.
@@ -103,16 +103,16 @@ def convert_parts(
     advance: Callable[[int], object] = quiet,
     **fields: Any,
 ) -> list[Conversion]:
-    """Convert every part of a log between gaps too long to be filled; parts of no use are left out.
+    """Convert each part of a log between gaps that are too long to fill; unusable parts are left out.
 
     Args:
-        log, options, advance: as in ``convert``.
+        log, options, advance: as for ``convert``.
 
     Returns:
-        At least one; each has in ``left_out`` what is in none of them.
+        At least one conversion; ``left_out`` of each lists what none of them covers.
 
     Raises:
-        InputError: as in ``convert``, or no part of it can be used.
+        InputError: as for ``convert``, or no part can be used.
     """
     source, labels, how = _opened(log, made(ConvertOptions, options, fields))
     done, left_out = below.convert_parts(source, labels, omnid_design(), advance=advance, **how)
@@ -120,7 +120,7 @@ def convert_parts(
 
 
 def _opened(log: Path | str, chosen: ConvertOptions) -> tuple[LogSource, below.Labels, dict[str, Any]]:
-    """The log, what is said of it, and how it is converted."""
+    """Open a log; return it with the labels that the options state and the arguments of the conversion."""
     log_map, design = read_map(str(chosen.map)) if chosen.map is not None else None, chosen.design
     labels = below.Labels(
         trial=chosen.trial or (log_map.trial if log_map is not None else None),
@@ -139,13 +139,13 @@ def _opened(log: Path | str, chosen: ConvertOptions) -> tuple[LogSource, below.L
 
 @dataclass(frozen=True)
 class MapDraft:
-    """A draft of a map: TOML, with comments where names and values do not tell.
+    """Draft of a map in TOML, with comments on lines that names and values leave open.
 
     Attributes:
         text: the draft.
-        of: what was found, such as ``"3 robots"``.
-        doubtful: number of lines that must be looked at.
-        missing: what was not found; without it the map is not complete.
+        of: what the log contains, such as ``"3 robots"``.
+        doubtful: number of lines that the user must check.
+        missing: required channels that were not found.
     """
 
     text: str
@@ -155,7 +155,7 @@ class MapDraft:
 
     @property
     def summary(self) -> str:
-        """What is left to do, in a line."""
+        """Summary of the draft and of what the user must check or fill in, on one line."""
         doubts = f"{self.doubtful} doubtful line{'s' * (self.doubtful != 1)} must be looked at"
         if self.missing:
             lacking = f"the draft is not complete: {', '.join(self.missing)} must be filled in"
@@ -163,12 +163,11 @@ class MapDraft:
         return f"{self.of}; {doubts if self.doubtful else 'nothing is doubtful'}"
 
     def __str__(self) -> str:
-        """The draft."""
+        """Return the draft."""
         return self.text
 
     def write(self, path: Path | str) -> None:
-        """Write it.
-
+        """Write the draft to a file.
         Raises:
             InputError: the file cannot be written.
         """
@@ -178,12 +177,12 @@ class MapDraft:
 def map(
     log: Path | str, model: GivenModel | None = None, options: MapOptions | None = None, **fields: Any
 ) -> MapDraft:
-    """Draft the map of a log: what is which channel, by names, the units in them, and values.
+    """Draft the map of a log: match its columns to channels by their names, units and values.
 
     Args:
-        log: of any format that ``convert`` reads.
-        model: of one robot whose joints were logged, or its file; None for a team.
-        options: how; ``fields`` are fields of it.
+        log: log in any format that ``convert`` reads.
+        model: model of a single robot whose joints were logged, or path of its file; None for a team.
+        options: options of the draft; ``fields`` replace its fields.
 
     Raises:
         InputError: the log or the model cannot be read.

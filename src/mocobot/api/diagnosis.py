@@ -1,4 +1,4 @@
-"""Find out what the simulation of a team, or of one robot, gets wrong."""
+"""Find out what the simulation of a team or of a single robot gets wrong."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Member:
-    """One place of a cause that all joints have.
+    """One of the places of a cause that acts on several joints.
 
     Attributes:
-        place: in words.
-        joint: counted from 1, or None.
-        parameters, standard_errors: as of ``Cause``.
+        place: place in words.
+        joint: number of the joint from 1, or None.
+        parameters, standard_errors: as in ``Cause``.
     """
 
     place: str
@@ -46,18 +46,17 @@ class Cause:
 
     Attributes:
         cause: name in the catalogue, such as ``"sea_bias"``.
-        robot: counted from 1, or None.
-        joint: counted from 1, or None.
-        sentence: what it does, with its numbers.
-        parameters: values by name, units in the names; ``make_effect`` takes them.
-        standard_errors: by the same names; None for what was chosen, not fitted.
-        probability: that it is this cause, at this place.
-        in_sample: share of the nominal model's misfit that it removes beyond the causes before it.
-        held_out: the same on trials left out of the fit, or None.
-        place: in words.
-        members: its places; several of a cause that all joints have, whose ``parameters`` are the medians; none of a
-            team's cause.
-        told: names in words of the smallest set of causes that holds 90 %, the likeliest first; empty of a team's.
+        robot: number of the robot from 1, or None.
+        joint: number of the joint from 1, or None.
+        sentence: effect of the cause, with its numbers.
+        parameters: values by name, with units in the names; ``make_effect`` accepts them.
+        standard_errors: by the same names; None for parameters that were chosen instead of fitted.
+        probability: posterior probability that this cause acts at this place.
+        in_sample: share of the nominal model's misfit that the cause removes beyond the causes before it.
+        held_out: the same share on trials that were left out of the fit, or None.
+        place: place in words.
+        members: places of the cause, empty for a team. If there are several, ``parameters`` are their medians.
+        told: names of the smallest set of causes with 90 % of the probability, most likely first; empty for a team.
     """
 
     cause: str
@@ -76,43 +75,43 @@ class Cause:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Folder):
-    """A verdict with all that supports it: printable, a table in a notebook, and a folder of files.
+    """A verdict with its support; prints as text, shows as a table in a notebook, writes a folder.
 
-    The folder has JSON, report, residuals and pictures; ``simulate`` takes the ``extended`` in it as a model.
+    The folder holds JSON, report, residuals and pictures; ``simulate`` accepts its ``extended`` as a model.
 
     Attributes:
-        found: of a team, or of one robot of joints.
+        found: diagnosis of a team or of a single robot.
     """
 
     found: TeamDiagnosed | JointDiagnosed
     result = "diagnosis"
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
+        """Return strict JSON values with units in the keys; see ``discrepancy.result.json``."""
         return self.found.to_dict()
 
     @property
     def verdict(self) -> Word:
-        """``"consistent"``, ``"miscalibrated"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
+        """One of "consistent", "miscalibrated", "explained", "partly_explained" and "unexplained"."""
         return self.to_dict()["verdict"]
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """The named causes, in the order of discovery."""
+        """Named causes in the order of discovery."""
         return tuple(_cause(entry) for entry in self.to_dict()["causes"])
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         values = self.to_dict()
         named = ", ".join(map(name_of, values["causes"])) or "nothing named"
         return f"<Diagnosis of {len(values['recordings'])} trials: {self.verdict}; {named}>"
 
     def __str__(self) -> str:
-        """The text report; of a robot of joints its first sentences and its table."""
+        """Return the text report; for a single robot, its first sentences and its table."""
         return str(self.found)
 
     def verbose_text(self) -> str:
-        """The whole text report."""
+        """Return the full text report."""
         return self.found.verbose_text()
 
     def _repr_html_(self) -> str:
@@ -121,10 +120,10 @@ class Diagnosis(Folder):
         return diagnosis_html(self.to_dict())
 
     def against_truth(self, truth: Mapping[str, Any]) -> Diagnosis:
-        """The same with the errors of its estimates, where the payload is known.
+        """Add the errors of the payload estimates, given the true payload; a single robot's diagnosis is unchanged.
 
         Args:
-            truth: of the payload, as ``GroundTruth.to_dict`` has it; where it is of something else there are no errors.
+            truth: true payload, as ``GroundTruth.to_dict`` returns it; no errors are added if it does not fit.
         """
         if isinstance(self.found, JointDiagnosed):
             return self
@@ -132,19 +131,19 @@ class Diagnosis(Folder):
 
     @property
     def used_truth(self) -> bool:
-        """Whether errors of the estimates are known."""
+        """Whether the diagnosis contains errors of the estimates against the truth."""
         return isinstance(self.found, TeamDiagnosed) and self.found.errors is not None
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
-        """Write everything into an existing folder.
+        """Write all files into an existing folder.
 
         Args:
-            folder: it.
-            pictures: whether pictures are drawn, too.
+            folder: existing folder.
+            pictures: whether to draw pictures.
             more: further keys of the JSON.
 
         Raises:
-            InputError: something cannot be written.
+            InputError: a file cannot be written.
         """
         self.found.write_into(folder, pictures=pictures, **more)
 
@@ -164,18 +163,20 @@ def diagnose(
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth.
 
     Args:
-        logs: recordings of one payload, or paths of their files, or of logs that ``convert`` reads as they are; with a
-            model logs of its joints. Several, so that what is named can be validated.
-        model: one robot whose joints were logged, or its file; None for a team.
-        reference: with a model, logs of the same robot while it was well: what is wrong there, too, is no news.
-        options: how; ``fields`` are fields of it. With a calibration, tolerances are of robots as it has them.
-        truth: of the payload, for the errors of the estimates; it is not looked at before the verdict.
-        say: takes the name of the stage that begins.
-        simulated: called with 1 for every trial that was simulated.
-        note: takes how a log was read, as text.
+        logs: recordings of one payload, or paths of recordings or of logs that ``convert`` reads without further
+            options; with a model, logs of its joints. Several logs allow validation on held-out data.
+        model: single robot whose joints were logged, or path of its file; None for a team.
+        reference: with a model, logs of the same robot when it was healthy; what deviates there, too, is not counted
+            as a fault.
+        options: options of the diagnosis; ``fields`` replace its fields. With a calibration, tolerances apply to the
+            calibrated robots.
+        truth: true payload, for the errors of the estimates; not used before the verdict.
+        say: called with the name of each stage that begins.
+        simulated: called with 1 after every simulated trial.
+        note: called with a text on how each log was read.
 
     Raises:
-        InputError: logs, model, tolerances, causes or other options that cannot be used.
+        InputError: logs, model, tolerances, causes or other options cannot be used.
     """
     chosen = made(DiagnoseOptions, options, fields)
     chosen.check_for(model, reference)
@@ -196,7 +197,7 @@ def diagnose(
 def _diagnosed_joints(
     model: GivenModel, logs: Any, reference: Any, chosen: DiagnoseOptions, say: Say
 ) -> JointDiagnosed:
-    """The verdict on one robot of joints, with rollouts on request."""
+    """Diagnose a single robot; with the option ``closed_loop``, also roll out its simulation."""
     from discrepancy.joints.rolled import rolled_out
     from discrepancy.joints.verdict import judged
     from mocobot.api.joints import read_logs, read_model
@@ -212,7 +213,7 @@ def _diagnosed_joints(
 
 
 def _joint_tolerances(path: Path | str | None) -> dict[str, dict[str, float]] | None:
-    """Tolerances of the causes that a file names; the others keep their own."""
+    """Read the tolerances that a file sets, by cause and parameter; None without a file."""
     from discrepancy.cause_names import read_tolerances as read
     from discrepancy.joints.effects import NAMES
 

@@ -1,4 +1,4 @@
-"""Estimate a payload."""
+"""Estimate a payload from recordings."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ from mocobot.results import public
 
 @dataclass(frozen=True, repr=False)
 class Estimate(PayloadEstimate):
-    """Grasps, mass, centre of mass and inertia of one payload, printable, and a table in a notebook.
+    """Grasps, mass, centre of mass and inertia of one payload; prints as text, shows as a table in a notebook.
 
-    The attributes are those of ``estimator.estimate.result.PayloadEstimate``; None marks what the data do not
-    determine.
+    The attributes are those of ``estimator.estimate.result.PayloadEstimate``; None marks quantities that the data do
+    not determine.
     """
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_estimate(self)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         mass = "mass not determined" if self.mass is None else f"{self.mass.mass:.4g} kg"
         return f"<Estimate from {len(self.recordings)} recordings: {mass}, {self.method}>"
 
@@ -40,7 +40,7 @@ class Estimate(PayloadEstimate):
         return estimate_html(self)
 
     def write(self, path: Path | str) -> None:
-        """Write it as JSON, which ``read_estimate`` reads.
+        """Write the estimate as JSON, for ``read_estimate``.
 
         Raises:
             InputError: the file cannot be written.
@@ -58,18 +58,19 @@ def estimate(
 ) -> Estimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
-    ``why_not_fit`` of the estimate says why the method ``"auto"`` did not fit all at once. With a calibration, its
-    robots are held.
+    ``why_not_fit`` of the estimate states why the method ``"auto"`` did not use the single fit. A calibration fixes
+    the parameters of the robots.
 
     Args:
-        logs: one or several recordings, or paths of their files, or of logs that ``convert`` reads as they are.
-        options: how; ``fields`` are fields of it.
-        say: takes the name of the stage that begins.
-        note: takes how a log was read, as text.
+        logs: one or several recordings, or paths of recordings or of logs that ``convert`` reads without further
+            options.
+        options: options of the estimate; ``fields`` replace its fields.
+        say: called with the name of each stage that begins.
+        note: called with a text on how each log was read.
 
     Raises:
-        InputError: a recording cannot be used, they contradict each other, nothing can be estimated, or the
-            calibration is of other robots.
+        InputError: a recording cannot be used, recordings contradict each other, nothing can be estimated, or the
+            calibration belongs to other robots.
     """
     chosen = made(EstimateOptions, options, fields)
     robots = Robots(chosen.calibration)
@@ -91,11 +92,11 @@ def _self_calibrated(recordings: Sequence[Recording], cutoff_hz: float, say: Say
 
 
 def read_estimate(path: Path | str) -> Estimate:
-    """Read what ``Estimate.write`` or ``mocobot estimate --out`` wrote.
+    """Read an estimate that ``Estimate.write`` or ``mocobot estimate --out`` wrote.
 
     Raises:
-        InputError: the file cannot be read, or is not a whole estimate.
+        InputError: the file cannot be read or is not a complete estimate.
     """
-    from mocobot_view.payload import read_estimate as read  # needs MuJoCo; an estimate does not
+    from mocobot_view.payload import read_estimate as read  # imports MuJoCo
 
     return public(Estimate, read(Path(path)))

@@ -1,4 +1,4 @@
-"""Look at a log before anyone trusts a number of it: of a team, or of one robot's joints."""
+"""Inspect a log of a team or of a single robot before its numbers are used."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Look:
-    """Printable, in a terminal and as JSON."""
+    """Base class of inspections: text report, readiness and JSON."""
 
     name: str
 
@@ -36,33 +36,33 @@ class Look:
 
     @property
     def findings(self) -> list[Finding]:
-        """All that is wrong: ``topic`` and ``sentence`` each."""
+        """All faults found, each with ``topic`` and ``sentence``."""
         return findings(self._whole)
 
     @property
     def ready_for(self) -> str:
-        """What the log can be used for, one line."""
+        """What the log can be used for, on one line."""
         return ready_line(self._whole)
 
     @property
     def is_ready(self) -> bool:
-        """Whether it can be used for anything."""
+        """Whether the log can be used for anything."""
         return not self.ready_for.startswith("ready for: nothing")
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_inspection(self._whole)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         return f"<{type(self).__name__} of {self.name}: {self.ready_for}>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys."""
+        """Return strict JSON values with units in the keys."""
         return inspection_dict(self._whole)
 
     def write(self, path: Path | str) -> None:
-        """Write it as JSON.
+        """Write the inspection as JSON.
 
         Raises:
             InputError: the file cannot be written.
@@ -72,14 +72,14 @@ class Look:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Inspection(Look, team.Inspection):
-    """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
+    """Time stamps, channels, clocks, wiring and excitation of a team's log; shows as a table in a notebook.
 
-    The attributes are those of ``mocobot_inspect.team.Inspection``; ``mocobot_inspect.report`` has the JSON's keys.
+    The attributes are those of ``mocobot_inspect.team.Inspection``; ``mocobot_inspect.report`` documents the JSON.
     """
 
     @property
     def is_ready(self) -> bool:
-        """Whether it can be used for anything, after what must be done first."""
+        """Whether the log can be used for anything, once the required steps are done."""
         return super().is_ready and " yes" in self.ready_for
 
     def _repr_html_(self) -> str:
@@ -90,10 +90,10 @@ class Inspection(Look, team.Inspection):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointInspection(Look, joints.JointInspection):
-    """Stamps, columns, signs, order, units and delays of a joint log, judged by the robot's model: printable.
+    """Time stamps, columns, signs, order, units and delays of a joint log, checked against the robot's model.
 
-    The attributes are those of ``mocobot_inspect.joints.JointInspection``; ``mocobot_inspect.report`` has the JSON's
-    keys.
+    The attributes are those of ``mocobot_inspect.joints.JointInspection``; ``mocobot_inspect.report`` documents the
+    JSON.
     """
 
 
@@ -106,17 +106,17 @@ def inspect(
     tried: Callable[[int], object] = quiet,
     **fields: Any,
 ) -> Inspection | JointInspection:
-    """Look at a log; whatever is wrong with its samples is reported and not refused.
+    """Inspect a log; faults in its samples are reported and raise no error.
 
     Args:
-        log: a recording, or a log of any format that ``convert`` reads.
-        model: of one robot whose joints were logged, or its file; None for a team.
-        options: how; ``fields`` are fields of it.
-        advance: takes the progress made in reading, in the log's units.
-        tried: takes the number of mistakes tried.
+        log: recording, or log in any format that ``convert`` reads.
+        model: model of a single robot whose joints were logged, or path of its file; None for a team.
+        options: options of the inspection; ``fields`` replace its fields.
+        advance: called with the progress of reading since the last call, in units that depend on the log's format.
+        tried: called with the number of wiring mistakes tested since the last call.
 
     Raises:
-        InputError: the log, model, map, design or calibration cannot be read, or does not suit the log.
+        InputError: the log, model, map, design or calibration cannot be read, or does not fit the log.
     """
     chosen = made(InspectOptions, options, fields)
     chosen.check_for(model)

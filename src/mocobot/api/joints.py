@@ -1,4 +1,4 @@
-"""Any robot in MJCF or URDF: its model, and logs of its joints in the model's units and order."""
+"""Model of a single robot (MJCF or URDF), and logs of its joints in the units and order of the model."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from mocobot_logs.joints.joint_map import JointMap, read_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
 
 MAP = "log.toml"
-"""Name of a map that is found where nobody names one: beside the log, or beside the model."""
+"""Name of the default map, searched beside the log and then beside the model."""
 GivenModel = SerialModel | Path | str
 GivenLogs = Path | str | JointLog | Iterable[Path | str | JointLog]
 
 
 def read_model(given: GivenModel) -> SerialModel:
-    """A fixed-base tree of hinges and slides, MJCF or URDF.
+    """Read a fixed-base tree of hinges and slides from MJCF or URDF; a model that is already read is returned.
 
     Raises:
-        InputError: MuJoCo cannot read it, or it is of another kind.
+        InputError: MuJoCo cannot read the file, or the model is no such tree.
     """
     return given if isinstance(given, SerialModel) else load_model(given)
 
@@ -35,17 +35,17 @@ def read_logs(
     episode: int | None = None,
     advance: Callable[[int], object] = quiet,
 ) -> list[JointLog]:
-    """Logs in the units and the order of the model's joints; one with long gaps becomes several.
+    """Read joint logs in the units and order of the model's joints; long gaps split a log into several.
 
     Args:
-        logs: files of any format that ``convert`` reads, or logs read before.
-        model: the robot, or its file.
-        map: map file (docs/serial/guide.md); ``log.toml`` beside the log or the model if not given.
-        episode: of a LeRobot dataset that holds several.
+        logs: files in any format that ``convert`` reads, or logs that are already read.
+        model: robot, or path of its file.
+        map: map file (docs/serial/guide.md); default: ``log.toml`` beside the log or the model.
+        episode: episode of a LeRobot dataset that holds several.
         advance: called with 1 after every file.
 
     Raises:
-        InputError: a file or the map cannot be read, or they do not suit the model.
+        InputError: a file or the map cannot be read, or does not fit the model.
     """
     robot = read_model(model)
     found: list[JointLog] = []
@@ -62,7 +62,11 @@ def read_logs(
 
 
 def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
-    """The file of a log's map."""
+    """Find the map file of a log.
+
+    Raises:
+        InputError: no map is given, and there is no ``log.toml`` beside the log or the model.
+    """
     if given is not None:
         return Path(given)
     for beside in (log.parent / MAP, model.path.parent / MAP):
@@ -75,5 +79,5 @@ def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
 
 
 def map_of(model: SerialModel, log: Path, given: Path | str | None) -> JointMap:
-    """The map of a log."""
+    """Read the map of a log; see ``map_path`` for its file."""
     return read_joint_map(map_path(model, log, given), model.joints, [bool(s) for s in model.slides])

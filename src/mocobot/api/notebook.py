@@ -1,4 +1,4 @@
-"""Results as small HTML tables for notebooks: no script, no network; every text is escaped."""
+"""Show results as small HTML tables in notebooks, without scripts or network access; all text is escaped."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -38,7 +38,7 @@ STYLE = (
 
 
 def estimate_html(estimate: PayloadEstimate) -> str:
-    """Mass, centre of mass, principal moments and grasps with standard errors, then doubts."""
+    """Tabulate mass, centre of mass, principal moments and grasps with standard errors, then list doubts."""
     e = estimate
     rows: list[list[Entry]] = [["mass", mass(e), "kg"]]
     rows += [[quantity(f"p_1c {axis}"), place(e, k), "mm"] for k, axis in enumerate("xyz")]
@@ -56,7 +56,7 @@ def estimate_html(estimate: PayloadEstimate) -> str:
 
 
 def calibration_html(calibration: Calibration) -> str:
-    """Every robot's deviations with standard errors, payloads, recordings, then findings and what stays open."""
+    """Tabulate deviations with standard errors, payloads and recordings, then list findings and open questions."""
     said = [*calibration.findings, *(f"Open: {sentence}" for sentence in calibration.open)]
     return _whole(
         *deviation_tables(calibration),
@@ -67,7 +67,7 @@ def calibration_html(calibration: Calibration) -> str:
 
 
 def diagnosis_html(values: Values) -> str:
-    """The verdict with the causes' sentences, probabilities and parameters, and the misfit before and after."""
+    """Show the verdict, the named causes with probabilities and parameters, and the misfit before and after."""
     rows: list[list[Entry]] = []
     for cause in values["causes"]:
         for k, (name, at, entry) in enumerate(numbers_of(cause) or [("", "", None)]):
@@ -108,7 +108,7 @@ def diagnosis_html(values: Values) -> str:
 
 
 def inspection_html(values: Values) -> str:
-    """What the log is ready for, what is wrong with it, and the robots' streams."""
+    """Show what the log can be used for, its faults, and a table of the robots' streams."""
     log, wrong = values["log"], [finding["sentence"] for finding in values["findings"]]
     rows: list[list[Entry]] = [
         [

@@ -24,12 +24,12 @@ from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
 
 @dataclass(frozen=True)
 class Experiment:
-    """What the experiment came to.
+    """Outcome of the paper's experiment.
 
     Attributes:
-        plan, result: of it.
+        plan, result: plan and result of the experiment.
         made_with: provenance.
-        store: what an interrupted run goes on with; dropped when all is written.
+        store: partial results for resuming an interrupted run; deleted after all results are written.
     """
 
     plan: PaperPlan
@@ -38,12 +38,12 @@ class Experiment:
     store: Store | None
 
     def __str__(self) -> str:
-        """The tables and their summary."""
+        """Return the tables and their summary."""
         return f"{format_tables(self.result.scores)}\n\n{format_summary(self.result.scores)}"
 
     @property
     def physics(self) -> str:
-        """How far the trials went, and how well MuJoCo kept what is rigid, a sentence."""
+        """Largest motions of the trials and constraint errors of MuJoCo, in one sentence."""
         trials = self.result.trials
         damping = min((t.damping_ratio for t in trials if t.damping_ratio is not None), default=0.0)
         return (
@@ -56,7 +56,7 @@ class Experiment:
         )
 
     def write(self, folder: Path, *, recordings: bool = False) -> None:
-        """Write scores, tables, estimates, fits and plots, and the recordings on request."""
+        """Write scores, tables, estimates, fits and plots, and optionally the recordings."""
         plan, result, written = self.plan, self.result, []
 
         def put(name: str, values: Any) -> None:
@@ -75,7 +75,7 @@ class Experiment:
         written.append(folder / "tables.txt")
         write_text(written[-1], f"{self}\n")
         if draws_plots():
-            from mocobot_sim.paper.plots import save_plots  # matplotlib, which printing needs not
+            from mocobot_sim.paper.plots import save_plots  # imports matplotlib
 
             written += save_plots(result.scores, folder)
         if recordings:
@@ -85,7 +85,7 @@ class Experiment:
             self.store.drop()
 
     def _write_recordings(self, folder: Path) -> list[Path]:
-        """Write recordings with the truth beside each, and say where."""
+        """Write recordings with the truth beside each; return the paths."""
         written = []
         for payload in self.plan.payloads:
             for preset in self.plan.presets:
@@ -100,14 +100,14 @@ class Experiment:
 
 
 def run_experiment(options: Paper, tell: Callable[[float, float, str], object]) -> Experiment:
-    """Run the paper's experiment; an interrupted run goes on in its folder.
+    """Run the paper's experiment, or resume an interrupted run in its folder.
 
     Args:
-        options: of the experiment; ``force`` drops what a run with other options left in the folder.
-        tell: takes what is done, what there is to do, and the stage that runs.
+        options: options of the experiment; ``force`` deletes partial results of a run with other options.
+        tell: called with the amount done, the total amount and the name of the current stage.
 
     Raises:
-        InputError: an option that cannot be met.
+        InputError: an option is invalid.
         TrialError: the physics of a trial cannot be trusted.
     """
     plan = PaperPlan(

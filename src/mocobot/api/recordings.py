@@ -1,4 +1,4 @@
-"""Logs as a caller may give them: in memory, as files of recordings, or as logs of any format, read as they are."""
+"""Read logs in every form that callers may pass: recordings in memory, their files, or logs of any format."""
 
 import os
 import shlex
@@ -25,9 +25,9 @@ from mocobot_logs.open_log import open_log
 from mocobot_logs.resample import RATE_HZ
 
 GivenCalibration = Calibration | Path | str
-"""A calibration, or the path of its file, or of the folder that ``mocobot calibrate --out`` wrote."""
+"""A calibration, the path of its file, or the folder that ``mocobot calibrate --out`` wrote."""
 Given = Recording | Path | str
-"""A recording, or the path of its file, or of a log of any format that ``convert`` reads."""
+"""A recording, the path of its file, or the path of a log in any format that ``convert`` reads."""
 Say = Callable[[str], object]
 KINDS = {
     "bag": "a ROS 2 bag",
@@ -37,22 +37,22 @@ KINDS = {
     "lerobot": "of a LeRobot dataset",
     "parquet": "a Parquet file",
 }
-"""Words for what ``log_kind`` finds."""
+"""Words for the formats that ``log_kind`` returns."""
 
 
 def quiet(*_: object) -> None:
-    """Take progress, and say nothing."""
+    """Ignore reports of progress."""
 
 
 class Robots:
-    """The robots as a calibration has them, or as every recording says itself.
+    """Robot parameters from a calibration or, without one, from each recording.
 
     Attributes:
-        calibration: theirs, or None.
+        calibration: calibration of the robots, or None.
     """
 
     def __init__(self, given: GivenCalibration | None) -> None:
-        """Read the calibration, if there is one."""
+        """Read the calibration, if one is given."""
         self.calibration: Calibration | None = None
         self.called = "the calibration"
         if isinstance(given, Calibration):
@@ -61,11 +61,16 @@ class Robots:
             self.calibration, self.called = calibration_of(given), str(given)
 
     def of(self, recording: Recording) -> Recording:
-        """A recording that knows them."""
+        """Return the recording with the calibrated robot parameters."""
         return recording if self.calibration is None else calibrated(recording, self.calibration, self.called)
 
     def units(self, source: LogSource, design: OmnidDesign) -> ArmUnit | None:
-        """The same for a log, of robots of a design where the log does not say; None without a calibration."""
+        """Return the calibrated robots for a log, or None without a calibration.
+
+        Args:
+            source: the log.
+            design: design of the robots, used if the log states none.
+        """
         if self.calibration is None:
             return None
         known = design if source.metadata is None else source.metadata.design
@@ -73,7 +78,7 @@ class Robots:
 
 
 def calibration_of(path: Path | str) -> Calibration:
-    """The calibration of a file, or of the folder that ``mocobot calibrate --out`` wrote."""
+    """Read a calibration from its file, or from the folder that ``mocobot calibrate --out`` wrote."""
     path = Path(path)
     file = path / CALIBRATION if path.is_dir() else path
     return calibration_from_dict(read_json(file, "a calibration"), str(file))
@@ -87,18 +92,18 @@ def recordings_of(
     say: Say = quiet,
     note: Say = quiet,
 ) -> Iterator[Recording]:
-    """One or several recordings, read when their turn comes; what a simulation adds to one is left behind.
+    """Yield recordings one by one, each read only when needed and without the truth of a simulation.
 
     Args:
-        given: recordings, files of recordings, or logs, which are converted in memory: nothing is written.
-        map: map of the logs, by file or built-in name; found out if not given.
-        robots: what they are; None for what every recording says itself.
-        say: takes the name of the stage that begins.
-        note: takes how a log was read, as text.
+        given: recordings, files of recordings, or logs, which are converted in memory.
+        map: map of the logs, by file or built-in name; default: detected from the log.
+        robots: robot parameters; None for those of each recording.
+        say: called with the name of each stage that begins.
+        note: called with a text on how each log was read.
 
     Raises:
-        InputError: a file cannot be read, or is not a plausible recording, or no log needs the map, or the robots are
-            others.
+        InputError: a file cannot be read or is not a plausible recording, no log needs the map, or the calibration
+            belongs to other robots.
     """
     robots, needed = robots or Robots(None), False
     log_map = None if map is None else read_map(map)
@@ -112,7 +117,7 @@ def recordings_of(
             with suppress(RepeatedRowsError):
                 recording = None if is_log else read(path)
             if recording is None:
-                from mocobot_sim.scene.models import omnid_design  # needs MuJoCo; a recording does not
+                from mocobot_sim.scene.models import omnid_design  # imports MuJoCo
 
                 needed = True
                 source = open_log(path, log_map if is_log else None)
@@ -128,7 +133,7 @@ def recordings_of(
 
 
 def _is_log(path: Path) -> bool:
-    """Whether a file or folder is a log of a known format, and no recording."""
+    """Whether a file or folder is a log in a known format and not a recording."""
     try:
         return log_kind(path) != "parquet" or not is_recording(path)
     except InputError:
@@ -136,7 +141,11 @@ def _is_log(path: Path) -> bool:
 
 
 def read(path: Path) -> Recording:
-    """Read a recording."""
+    """Read a recording; the error for any other file suggests what to do with it.
+
+    Raises:
+        InputError: the file cannot be read or is not a recording.
+    """
     try:
         return read_recording(path)
     except InputError:
@@ -150,18 +159,21 @@ def read(path: Path) -> Recording:
 
 
 def check_no_log(path: Path) -> None:
-    """Say what to do with a file or folder that is a log of another format, or of no format that is read."""
+    """Raise an InputError that explains how to convert a file or folder that is not a recording.
+
+    Recordings, damaged recordings and folders that are no log pass without an error.
+    """
     try:
         kind = log_kind(path)
         if kind == "parquet" and is_recording(path):
             return
     except InputError:
         if path.is_dir() or path.suffix in (".parquet", ".json"):
-            return  # not a log at all, or a damaged recording
+            return  # no log, or a damaged recording
         raise InputError(
             f"{path}: is not a recording of mocobot, and mocobot convert does not read its format; make it {FORMATS}"
         ) from None
-    name = Path(os.path.realpath(path)).name or "log"  # "." and "/" have none
+    name = Path(os.path.realpath(path)).name or "log"  # "." and "/" have no name
     target = path.parent / f"{name if path.is_dir() else path.stem}.parquet"
     if target == path:
         target = path.parent / f"{path.stem}_recording.parquet"

@@ -1,4 +1,4 @@
-"""Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
+"""Replay recordings in Rerun: the scene in motion by the measured angles, estimate and truth, all signals."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ def replay(
     """Write a replay for the Rerun viewer (``rerun NAME.rrd`` opens it), or show it.
 
     Args:
-        logs: recordings, shown side by side, or paths of their files; with a model logs of its joints.
-        path: .rrd file to write; None to open the viewer, or with the option ``web`` to serve until interrupted.
-        model: one robot whose joints were logged, or its file; None for a team.
-        options: what is shown; ``fields`` are fields of it. The truth may be a ``GroundTruth``.
-        note: takes what a viewer should know as soon as it is known, a sentence at a time.
+        logs: recordings or paths of their files, shown side by side; with a model, logs of its joints.
+        path: .rrd file to write; None opens the viewer, or with the option ``web`` serves until interrupted.
+        model: single robot whose joints were logged, or path of its file; None for a team.
+        options: what to show; ``fields`` replace its fields. The truth may be a ``GroundTruth``.
+        note: called with each note for the viewer, one sentence at a time.
         advance: called with 1 after every recording.
 
     Returns:
-        The same sentences.
+        All notes.
 
     Raises:
-        InputError: the Rerun SDK is missing, a recording, estimate or diagnosis does not fit, there is no display, or
+        InputError: the Rerun SDK is missing; a recording, estimate or diagnosis does not fit; there is no display; or
             the file cannot be written.
     """
     chosen = made(ReplayOptions, options, fields)
@@ -139,7 +139,7 @@ def _log(
 
 
 def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | None) -> BodyFacts:
-    """The drawable part of a truth, in the frames of an estimate, if there is one."""
+    """Extract the quantities of a truth that a replay draws, in the frames of the estimate if one is given."""
     parts = [truth.R_1i, truth.p_1i, truth.p_1c, truth.R_1c]
     if estimate is not None and estimate.zero_sd_rad:
         parts = seen_by_encoders(theta_x_zeros(truth.units, len(truth.p_1i)), *parts)
@@ -148,12 +148,12 @@ def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | None) -> Body
 
 
 def check_rerun() -> None:
-    """Refuse in one sentence if Rerun is missing, or is not the version that this code speaks to.
+    """Check that the Rerun SDK is installed in the supported version.
 
     Raises:
-        InputError: it is.
+        InputError: the SDK is missing or has another version.
     """
-    # Without this the SDK repeats in its own words what we say in one sentence.
+    # The SDK would otherwise print its own messages about errors that this package reports.
     os.environ.setdefault("RUST_LOG", "off")
     try:
         import rerun
@@ -164,4 +164,4 @@ def check_rerun() -> None:
     version = str(getattr(rerun, "__version__", "unknown"))
     if not version.startswith("0.41."):
         raise InputError(f"replay needs the Rerun SDK 0.41; this is {version}; get it with: {INSTALL}")
-    rerun.set_strict_mode(True)  # what Rerun cannot log is an error, not a warning among others
+    rerun.set_strict_mode(True)  # turn warnings about data that Rerun cannot log into errors

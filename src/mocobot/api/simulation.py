@@ -28,11 +28,11 @@ Progress = Callable[[int, int, int], object]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedRecording(Recording):
-    """A recording with what is known because it was simulated; nothing that estimates or diagnoses looks at it.
+    """A simulated recording with its ground truth, which neither estimates nor diagnoses use.
 
     Attributes:
-        truth: the payload, if there is one, and the robots.
-        log: what truly happened, before any sensor.
+        truth: true parameters of the robots and, if there is one, of the payload.
+        log: true motion and forces, before any sensor.
     """
 
     truth: GroundTruth
@@ -58,21 +58,20 @@ def simulate(
     progress: Callable[[int, int], object] | None = None,
     **fields: Any,
 ) -> SimulatedRecording:
-    """Simulate one trial and read it through the sensors; equal arguments give equal bits.
+    """Simulate one trial and measure it with the sensors; equal arguments give equal bits.
 
     Args:
         payload: name of a shipped payload, or path of a payload MJCF (body ``payload``, sites ``grasp1`` ..
-            ``graspN``); ``"a"`` if neither this nor a model is given. Of a free trial: the one that the robots have put
-            down, which says how many they are.
+            ``graspN``); default: ``"a"``, unless a model is given. In a free trial it only sets the number of robots.
         trajectory: ``"random"``, ``"periodic"``, ``"static"``, or ``"free"``: every arm moves alone and holds nothing.
-        options: how; ``fields`` are fields of it. Effects may be those of ``make_effect``, or in words; the preset and
-            the units may be objects, too. Robots are as the preset has them if there are no units.
-        number: which of several trials of that kind, at least 0; the noise differs from one to the next.
-        gains: of the arms' control; None for the defaults.
-        progress: called with the number of samples done and that of all, every second of the trial.
+        options: options of the simulation; ``fields`` replace its fields. Effects may be objects of ``make_effect``
+            or text; preset and units may be objects. Without units, the preset determines the robots.
+        number: index of the trial among those of its kind, from 0; each index has its own noise.
+        gains: control gains of the arms; None for the defaults.
+        progress: called after every second of the trial with the number of samples done and their total.
 
     Raises:
-        InputError: an argument that cannot be met.
+        InputError: an argument is invalid.
         TrialError: the physics of the trial cannot be trusted.
     """
     chosen = made(SimulateOptions, options, fields)
@@ -91,16 +90,15 @@ def simulate_trials(
     progress: Progress | None = None,
     **fields: Any,
 ) -> list[SimulatedRecording]:
-    """Simulate several trials of one team: the same robots at the same places, and the same hidden in them.
+    """Simulate several trials of one team: the same robots at the same places, with the same hidden effects.
 
     Args:
-        trajectories: kind of every trial, in order; the first is trial 1 of a push.
-        payload, options, gains: as of ``simulate``; vias, duration and robots are for the trials that they say
-            something about.
-        progress: called with the trial (from 1 on), the number of its samples done and that of all its samples.
+        trajectories: kind of every trial, in order; the parameter ``trial`` of an effect counts them from 1.
+        payload, options, gains: as for ``simulate``; vias, duration and robots apply to trials of matching kind.
+        progress: called with the trial (from 1), the number of its samples done and their total.
 
     Raises:
-        InputError: an argument that cannot be met.
+        InputError: an argument is invalid.
         TrialError: the physics of a trial cannot be trusted.
     """
     chosen = made(SimulateOptions, options, fields)
@@ -126,7 +124,7 @@ def _simulated(
     gains: ControlGains | None,
     progress: Progress | None,
 ) -> list[SimulatedRecording]:
-    """Trials of one team, those of a kind numbered from ``first`` on."""
+    """Simulate trials of one team; the index among trials of one kind starts at ``first``."""
     chosen.check_for(payload, trajectories)
     model, units, preset = chosen.model, chosen.units, chosen.preset
     if model is not None and FREE in trajectories:

@@ -1,4 +1,4 @@
-"""Logs to a first verdict: inspect, convert, estimate, calibrate if need be, diagnose, and a page."""
+"""Turn logs into a first verdict: inspect, convert, estimate, calibrate if needed, diagnose, and make a page."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from mocobot_report import NAME
 from mocobot_report.page import write_report
 
 BEYOND, MOST = 3.0, 3
-"""Standard deviations of the prior from which on a robot is said to be off, and how many places are named. Chosen: of
-the some sixty deviations of a healthy team of three, one is that far off in every sixth team."""
+"""Threshold [prior standard deviations] above which the summary names a deviation, and largest number of names.
+Chosen: among the about sixty deviations of a healthy team of three, one exceeds it in every sixth team."""
 VERDICT = "verdict.txt"
 
 
 @dataclass(repr=False)
 class Watched(Folder):
-    """What a first look found.
+    """Result of a first look at logs.
 
     Attributes:
-        lines: the overall verdict.
-        recordings: those that can be used, by the name of their file.
-        converted: names of those that were logs, or whose clocks were corrected.
-        estimate, calibration, diagnosis: None where there is none, and ``lines`` say why.
+        lines: overall verdict, one line per topic.
+        recordings: usable recordings by the name of their file.
+        converted: names of recordings that were converted from logs, or whose clocks were corrected.
+        estimate, calibration, diagnosis: results of each stage, or None; ``lines`` state why a stage failed.
     """
 
     lines: list[str] = field(default_factory=list)
@@ -54,33 +54,35 @@ class Watched(Folder):
     result = "watch"
 
     def of(self, *, free: bool) -> list[Recording]:
-        """Recordings of robots that hold nothing, or of all others."""
+        """List the recordings of free trials (robots hold nothing), or all others."""
         return [one for one in self.recordings.values() if (one.metadata.trial == FREE) is free]
 
     @property
     def good(self) -> bool:
-        """Whether the recordings can be believed, and what they show is understood."""
+        """Whether there is an estimate, and the verdict is ``"consistent"`` or ``"explained"``."""
         verdict = self.diagnosis and self.diagnosis.verdict
         return self.estimate is not None and verdict in ("consistent", "explained")
 
     def __str__(self) -> str:
-        """The overall verdict."""
+        """Return the overall verdict."""
         return "\n".join(self.lines)
 
     def __repr__(self) -> str:
-        """One line."""
+        """Return a one-line summary."""
         return f"<Watched of {len(self.recordings)} recordings: {'' if self.good else 'not '}good>"
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
-        """Write everything into an existing folder: the diagnosis and the JSON of the others at its top, for the page.
+        """Write all results into an existing folder.
+
+        The diagnosis and the JSON of the other results go to its top level, where the page looks for them.
 
         Args:
-            folder: it.
-            pictures: whether pictures are drawn, too.
-            more: further keys of every JSON.
+            folder: existing folder.
+            pictures: whether to draw pictures.
+            more: further keys of every JSON file.
 
         Raises:
-            InputError: something cannot be written.
+            InputError: a file cannot be written.
         """
         if self.diagnosis is not None:
             self.diagnosis.write_into(folder, pictures=pictures, **more)
@@ -96,18 +98,18 @@ class Watched(Folder):
 
 
 def report(folder: Path | str, out: Path | str | None = None, *, say: Say = quiet) -> Path:
-    """Make one HTML page of a result folder (of ``paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign``).
+    """Make one HTML page from a result folder of ``paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign``.
 
     Args:
-        folder: of the result.
-        out: page to write; ``report.html`` in the folder if not given.
-        say: takes the name of the stage that begins.
+        folder: folder of the result.
+        out: page to write; default: ``report.html`` in the folder.
+        say: called with the name of each stage that begins.
 
     Returns:
-        The page.
+        Path of the page.
 
     Raises:
-        InputError: the folder holds no result, or one that cannot be read, or the page cannot be written.
+        InputError: the folder holds no readable result, or the page cannot be written.
     """
     page = Path(folder) / NAME if out is None else Path(out)
     write_report(Path(folder), page, say)
@@ -122,16 +124,16 @@ def watch(
     simulated: Callable[[int], object] | None = None,
     **fields: Any,
 ) -> Watched:
-    """Look at recordings or logs once, and say what there is.
+    """Analyse recordings or logs in one run: inspect, convert, estimate, calibrate if needed, and diagnose.
 
     Args:
-        logs: files of recordings, or logs of any format that ``convert`` reads, all of one payload.
-        options: how; ``fields`` are fields of it.
-        say: takes the name of the stage that begins.
-        simulated: called with 1 for every trial that was simulated.
+        logs: files of recordings, or logs in any format that ``convert`` reads, all of one payload.
+        options: options of the run; ``fields`` replace its fields.
+        say: called with the name of each stage that begins.
+        simulated: called with 1 after every simulated trial.
 
     Raises:
-        InputError: a log that cannot be read.
+        InputError: a log cannot be read.
     """
     chosen, seen = made(WatchOptions, options, fields), Watched()
     for path in [logs] if isinstance(logs, Path | str) else logs:
@@ -141,7 +143,7 @@ def watch(
 
 
 def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> None:
-    """Inspect a file, and read what is of use."""
+    """Inspect a file, and add its usable recordings to ``seen``."""
     say(f"inspecting {path.name}")
     found = inspect(path, map=log_map)
     ready = found.ready_for
@@ -160,14 +162,18 @@ def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> No
     seen.recordings |= recordings
     if done:
         seen.converted += recordings
-        ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
+        ready = f"{ready.partition(';')[0]} ({done})"  # drop the required steps, which are now done
     seen.lines.append(f"{path}: {ready}.")
 
 
 def _used(
     path: Path, log_map: Path | str | None, *, is_log: bool, skewed: bool
 ) -> tuple[dict[str, Recording], str]:
-    """What can be used of a file, by names, and what was done for it, empty if nothing."""
+    """Read the usable recordings of a file.
+
+    Returns:
+        Recordings by name, and the steps that were necessary as text, empty if none.
+    """
     clock, corrected = ("correct", ", clocks corrected") if skewed else ("keep", "")
     try:
         if not is_log and not skewed:
@@ -214,7 +220,7 @@ def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], obj
 
 
 def payload_line(found: Estimate) -> str:
-    """Mass and centre of mass, a sentence."""
+    """State mass and centre of mass in one sentence."""
     mass, com = "mass not determined", "centre of mass not determined"
     if found.mass is not None:
         mass = "{} +- {} kg".format(*measured(found.mass.mass, found.mass.se))
@@ -233,7 +239,7 @@ def _robots(found: Calibration | None) -> str:
 
 
 def _farthest(found: Calibration) -> list[str]:
-    """The robots' clearest deviations, a sentence, if any is beyond what was assumed of healthy ones."""
+    """Name the robots' largest deviations beyond ``BEYOND`` prior standard deviations, in at most one sentence."""
     far = []
     for group in shown_groups(found):
         shown, at = SHOWN[group.name], AT[group.name]

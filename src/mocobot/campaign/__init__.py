@@ -1,1 +1,1 @@
-"""Blind campaigns: hide effects in simulated teams, diagnose, and count what was found, missed and invented."""
+"""Blind campaigns: hide effects in simulated teams, diagnose them, and count hits, misses and false alarms."""

@@ -1,4 +1,4 @@
-"""What a campaign hides: which effect, where, and how large; and how far healthy robots are off besides."""
+"""Draw the hidden effects of a campaign (kind, place, size) and the tolerated deviations of healthy robots."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,33 +24,35 @@ from mocobot_sim.trial.truth import GroundTruth
 
 Json = dict[str, Any]
 GAIN = 38.0
-"""Gain of chi-square of what is about noticed nine times in ten."""
+"""Decrease of chi-square by an effect that is detected about nine times in ten."""
 LIMIT_PUSH_S = 1.0
-"""How long a push lasts whose limit is told; others need more or less force."""
+"""Duration of the pushes whose detection limits are stated [s]; shorter pushes need more force. Chosen."""
 EVERY_S = 5.0
-"""From one push to the next of those whose limits are taken the median of."""
+"""Time between the pushes over which the median of the detection limit is taken [s]. Chosen."""
 FORCE = {"force_x_N", "force_y_N", "force_z_N"}
 TETHER = FORCE | {"stiffness_N_per_m"}
 NEEDED = {"slosh": {"mass_kg"}, "tether": TETHER, "payload_tether": TETHER, "payload_mass": {"mass_kg"}}
-"""Parameters without whose limits an effect cannot be drawn."""
+"""Parameters whose detection limits are required to draw an effect, by cause."""
 PARALLEL = float(np.cos(np.deg2rad(10.0)))
-"""Gimbal axes nearer than this at home are one axis: which robot's rubs cannot be decided."""
+"""Cosine of the angle within which two gimbal axes at home count as parallel; their friction cannot be told apart.
+Chosen: 10 deg."""
 UNDECIDABLE = {("theta_zero", 3)}
-"""Cause and joint that no recording can show: nothing is hidden there."""
+"""Pairs of cause and joint that no recording can show; a campaign hides nothing there."""
 REACH_M = 0.2
-"""Pushes act and pendulums hang this near to the centre of mass."""
+"""Largest distance of pushes and pendulums from the centre of mass [m]. Chosen."""
 TETHER_STIFFNESS = 0.5
-"""Share of a tether's size that is its stiffness; the rest is its force at home."""
+"""Share of a tether's size in its stiffness; the force at home has the rest, so that their squares add up to 1.
+Chosen."""
 PUSH_S = (0.5, 2.0)
-"""How long a push lasts."""
+"""Shortest and longest hidden push [s]. Chosen."""
 DAMPING_RATIO = 0.05
-"""Damping ratio of a pendulum."""
+"""Damping ratio of a hidden pendulum. Chosen."""
 SPREAD_IN_UNCALIBRATED = ("phi_zero", "theta_zero", "link_length", "sea_scale", "sea_bias")
-"""Causes of which an uncalibrated team has so much everywhere that no single one stands out."""
+"""Causes that act on every robot of an uncalibrated team so strongly that a further one would not stand out."""
 
 
 def pushes(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Candidate]:
-    """A push of a second every five seconds of all trials."""
+    """Make candidates for a push of ``LIMIT_PUSH_S`` every ``EVERY_S`` in all trials."""
     spans = [(t, linear.reduction.time) for t, linear in enumerate(rig.linear)]
     return [
         CAUSES["push"].event(tolerance, Transient(trial, float(start), LIMIT_PUSH_S))
@@ -60,7 +62,7 @@ def pushes(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Candidate]:
 
 
 def push_limits(outcome: TeamOutcome, tolerance: Mapping[str, float]) -> list[Json]:
-    """Detection limit of a push of a second in every trial, beyond its tolerance, the median over its instants.
+    """Compute the detection limit of a push in every trial, including its tolerance, as the median over instants.
 
     Returns:
         {trial, parameters: {name: size or None}} for every trial that is long enough; trials count from 1.
@@ -89,11 +91,11 @@ def _medians(values: Sequence[Array]) -> list[float | None]:
 
 @dataclass(frozen=True)
 class MeasuredLimits:
-    """Detection limits as a clean set's file has them.
+    """Detection limits from the result of a clean set.
 
     Attributes:
-        places: {cause, robot, joint, parameters: {name: size or None}}, as a diagnosis states them.
-        pushes: {trial, parameters}, as ``push_limits`` does.
+        places: limits of a diagnosis, each {cause, robot, joint, parameters: {name: size or None}}.
+        pushes: limits of ``push_limits``, each {trial, parameters}.
     """
 
     places: Sequence[Json]
@@ -102,7 +104,7 @@ class MeasuredLimits:
     def at(
         self, cause: str, robot: int | None = None, joint: int | None = None, trial: int | None = None
     ) -> Mapping[str, float]:
-        """By parameter, of a cause at a place; empty where nothing shows it."""
+        """Return the limits of a cause at a place by parameter; empty if the recordings cannot show it."""
         entries = self.pushes if cause == "push" else [e for e in self.places if e["cause"] == cause]
         here = (trial,) if cause == "push" else (robot, joint)
         keys = ("trial",) if cause == "push" else ("robot", "joint")
@@ -112,14 +114,14 @@ class MeasuredLimits:
         return {}
 
     def pendulum(self, rng: np.random.Generator) -> tuple[float, float]:
-        """The length that the limit is of, and the limit."""
+        """Return the length of the pendulum [m] and the detection limit of its mass [kg]."""
         return CAUSES["slosh"].shapes[0]["length_m"], self.at("slosh")["mass_kg"]
 
     def where(self, cause: str, moving: Sequence[int]) -> list[tuple[int | None, int | None]]:
-        """Robot and joint of all places at which a cause shows, so that it can be hidden there.
+        """List robot and joint of all places where a cause is detectable and can be hidden.
 
         Args:
-            cause: its name.
+            cause: name of the cause.
             moving: trials (from 1) in which a push may act.
         """
         if cause == "push":
@@ -135,13 +137,13 @@ class MeasuredLimits:
 
 @dataclass(frozen=True)
 class Ground:
-    """A team without hidden effects, and what it does.
+    """A team without hidden effects, and the motion of its trials.
 
     Attributes:
         robots: number of robots.
         p_1c: centre of mass in {1} [m], shape (3,).
         moving: trial number (from 1), begin and end of motion [s].
-        limits: what sizes are multiples of.
+        limits: detection limits; the sizes of effects are multiples of them.
     """
 
     robots: int
@@ -151,12 +153,12 @@ class Ground:
 
     @classmethod
     def of(cls, scene: TeamScene, trajectories: Sequence[Trajectory], limits: Any) -> "Ground":
-        """The ground of a team, the commands of its trials, and its detection limits."""
+        """Build it from a scene, the commands of its trials and its detection limits."""
         return cls(scene.robots, GroundTruth.of(scene).p_1c, moving_intervals(trajectories), limits)
 
 
 def moving_intervals(trajectories: Sequence[Trajectory]) -> list[tuple[int, float, float]]:
-    """Trial number (from 1), begin and end of the motion [s] of every trial that moves all the time."""
+    """List trial number (from 1), begin and end of motion [s] of every trial except static ones."""
     return [
         (number, SETTLE_S, trajectory.duration_s - SETTLE_S)
         for number, trajectory in enumerate(trajectories, start=1)
@@ -165,10 +167,10 @@ def moving_intervals(trajectories: Sequence[Trajectory]) -> list[tuple[int, floa
 
 
 def gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
-    """Axes of the gimbal joints 1, 2, 3 (z, y, x) at home in {1}, one per row, for every robot: shape (N, 3, 3)."""
+    """Return the axes of gimbal joints 1, 2, 3 (z, y, x) at home in {1}, one per row and robot, shape (N, 3, 3)."""
     out = []
     for theta, X in zip(team.theta_home, team.X_1i, strict=True):
-        flange = X.rotation * Rotation.from_euler("ZYX", theta).inv()  # {b} turned into {1}
+        flange = X.rotation * Rotation.from_euler("ZYX", theta).inv()  # rotation from {b} to {1}
         after_z = flange * Rotation.from_euler("Z", theta[0])
         after_y = after_z * Rotation.from_euler("Y", theta[1])
         axes = [flange.apply([0, 0, 1]), after_z.apply([0, 1, 0]), after_y.apply([1, 0, 0])]
@@ -177,13 +179,13 @@ def gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
 
 
 def one_axis(axes: Any, a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    """Whether two gimbal joints turn about one axis, near enough."""
+    """Whether the axes of two gimbal joints are parallel within the limit ``PARALLEL``."""
     first, second = (np.array(axes)[x["robot"] - 1, x["joint"] - 1] for x in (a, b))
     return bool(abs(first @ second) > PARALLEL)
 
 
 def draw_effect(cause: str, factor: float, ground: Ground, rng: np.random.Generator) -> Effect:
-    """One effect of ``factor`` times the detection limit, at a random place."""
+    """Draw an effect of ``factor`` times the detection limit at a random place."""
     names = EFFECTS[cause].place_names()
     joints = [joint for joint in (1, 2, 3) if (cause, joint) not in UNDECIDABLE]
     robot = int(rng.integers(1, ground.robots + 1)) if "robot" in names else None
@@ -194,12 +196,12 @@ def draw_effect(cause: str, factor: float, ground: Ground, rng: np.random.Genera
 def draw_at(
     cause: str, factor: float, robot: int | None, joint: int | None, ground: Ground, rng: np.random.Generator
 ) -> Effect:
-    """One effect of ``factor`` times the detection limit, at a given place."""
+    """Draw an effect of ``factor`` times the detection limit at a given place."""
     if cause == "push":
         parameters = _push(factor, ground, rng)
     elif cause == "slosh":
         parameters = _slosh(factor, ground, rng)
-    elif cause == "payload_mass":  # a drift: another mass in some trials needs several
+    elif cause == "payload_mass":  # a drift, because a different mass in some trials needs several trials
         rate = factor * ground.limits.at(cause)["mass_kg"] / MASS_OVER_S * rng.choice([-1.0, 1.0])
         parameters = {"rate_kgps": float(rate)} | _vector("point", "m", _near(ground.p_1c, rng))
     elif cause == "tether":
@@ -213,7 +215,7 @@ def draw_at(
 
 
 def signed(cause: str, name: str, value: float) -> float:
-    """The value, or its magnitude where the parameter cannot be negative."""
+    """Return the value, or its magnitude if the parameter cannot be negative."""
     low = EFFECTS[cause].ranges.get(name, (-np.inf, np.inf))[0]
     return abs(value) if low >= 0 else value
 
@@ -222,7 +224,7 @@ def _sized(
     cause: str, factor: float, limits: Mapping[str, float], rng: np.random.Generator
 ) -> dict[str, float]:
     direction = _direction(rng, len(limits))
-    if cause == "link_length":  # one of the lengths
+    if cause == "link_length":  # changes a single length
         direction = np.eye(len(limits))[rng.integers(len(limits))] * rng.choice([-1.0, 1.0])
     return {
         name: signed(cause, name, float(factor * limit * d))
@@ -250,7 +252,7 @@ def _slosh(factor: float, ground: Ground, rng: np.random.Generator) -> dict[str,
 def _tether(
     factor: float, limits: Mapping[str, float], point: Array, rng: np.random.Generator
 ) -> dict[str, float]:
-    """From a point, in the axes of {b} from where {i} is at home."""
+    """Draw the parameters of a tether attached at ``point`` [m], which counts from {i} at home in the axes of {b}."""
     stiffness = factor * TETHER_STIFFNESS * limits["stiffness_N_per_m"]
     force = (
         factor * np.sqrt(1.0 - TETHER_STIFFNESS**2) * _components("force", "N", limits) * _direction(rng, 3)
@@ -278,7 +280,7 @@ def _vector(name: str, unit: str, values: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class GimbalFriction(listed.GimbalFriction):
-    """The same with a single row, which lets stiction fade within ten seconds: nine gimbals then cost a third less."""
+    """Gimbal friction with a single constraint row: faster by a third for nine gimbals, but stiction creeps."""
 
     rows: ClassVar[int] = 1
 
@@ -289,15 +291,16 @@ def draw_background(
     times: float = 1.0,
     tolerances: Mapping[str, Mapping[str, float]] | None = None,
 ) -> list[Effect]:
-    """Every cause with a tolerance at every place, normal, with its standard deviation.
+    """Draw tolerated deviations of every cause at every place from normal distributions.
+
+    Parameters that cannot be negative get the magnitude of the draw. Pushes are left out, because their tolerance
+    represents friction at rest.
 
     Args:
-        robots: how many.
-        rng: what is drawn from.
-        times: deviations over the tolerances.
-        tolerances: standard deviations by cause and parameter; the defaults if None. What is 0 is exact.
-
-    Magnitudes where a parameter cannot be negative. Pushes are left out: their tolerance stands for friction at rest.
+        robots: number of robots.
+        rng: source of random numbers.
+        times: factor on all tolerances.
+        tolerances: standard deviations by cause and parameter, 0 for an exact one; None for the defaults.
     """
     out = []
     for cause, deviations in (default_tolerances() if tolerances is None else tolerances).items():
@@ -317,7 +320,7 @@ def draw_background(
 
 
 def cheaper(effects: list[Effect]) -> list[Effect]:
-    """The same with friction of the gimbals that costs less time."""
+    """Replace gimbal friction by the version that simulates faster."""
     return [
         GimbalFriction(**vars(effect)) if isinstance(effect, listed.GimbalFriction) else effect
         for effect in effects

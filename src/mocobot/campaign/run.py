@@ -1,14 +1,14 @@
-"""Run a campaign: every set simulated, diagnosed blind, and kept; what is there already is not done again.
+"""Run a campaign: simulate every set, diagnose it blind and store the result; stored sets are not run again.
 
-The folder of a campaign:
+Folder of a campaign:
 
-config.json        what its sets depend on, as text by name; a campaign with other values is not mixed with them
-sets/KEY.json      the result of a set, whole or not at all: ``set`` (``CampaignSet.to_dict``), ``error`` (why there is
-                   no verdict, or null), ``unexpected`` (whether that was a fault of the program), ``truth``
-                   (``simulate_set``), ``verdict`` (of ``discrepancy.result.json`` what a score needs) and, of a clean
-                   set, ``limits`` {places, pushes} (``push_limits``)
+config.json        values that determine the results of its sets, as text by name; other values need another folder
+sets/KEY.json      result of a set: ``set`` (``CampaignSet.to_dict``), ``error`` (why there is no verdict, or null),
+                   ``unexpected`` (whether the error is a fault of the program), ``truth`` (``simulate_set``),
+                   ``verdict`` (keys of ``discrepancy.result.json`` that the score needs) and, for a clean set,
+                   ``limits`` {places, pushes} (``push_limits``); a failure leaves no partial file
 campaign.json, sets.csv, report.txt, provenance.json
-                   what was found, in the end
+                   summary of all sets, written last
 """
 
 import json
@@ -58,24 +58,24 @@ from mocobot_sim.trial.trajectories import Trajectory
 SETS, SUMMARY, REPORT, TABLE, VERSION = "sets", "campaign.json", "report.txt", "sets.csv", 1
 RESULT = "the result of a campaign's set"
 NO_MATTER = ("out", "json", "pictures", "force", "jobs", "scheduler", "sets")
-"""Options that a set's result does not depend on."""
+"""Options that do not affect the result of a set."""
 FILES = ("payload", "units", "calibration", "tolerances")
-"""Options that may name a file, of which the content counts."""
+"""Options that may name a file; the configuration records its hash."""
 Json = dict[str, Any]
 KEPT = ("verdict", "causes", "suspected", "scatter", "residual", "notes")
-"""What is kept of a diagnosis; the rest is large, and for one recording's reader."""
+"""Keys of a diagnosis that a set's result keeps; the score does not need the others, which are large."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignPlan(CampaignOptions):
-    """Everything that a campaign's outcomes depend on, its files read; equal plans give equal bits.
+    """Everything that determines the results of a campaign, with all files read; equal plans give equal bits.
 
-    Besides what its background says, everything in a team is off by a draw of its tolerance.
+    In addition to its background, every team has deviations that are drawn from the tolerances.
 
     Attributes:
-        units: the robots of the background ``units``.
-        calibration: the robots as the diagnosis knows them, or None for what recordings say.
-        tolerances: of a healthy robot, standard deviations by cause and parameter.
+        units: robots of the background ``units``.
+        calibration: calibration that the diagnosis uses; None for the robots as recorded.
+        tolerances: tolerances of a healthy robot, standard deviations by cause and parameter.
     """
 
     units: tuple[AsBuilt, ...] = ()
@@ -84,7 +84,11 @@ class CampaignPlan(CampaignOptions):
 
     @classmethod
     def of(cls, options: CampaignOptions) -> "CampaignPlan":
-        """The plan that options ask for."""
+        """Make the plan of the given options.
+
+        Raises:
+            InputError: the preset draws its own robots, or the number of units does not fit the payload.
+        """
         if not sensor_preset(options.preset).calibrated:
             raise InputError(
                 f"preset is {options.preset}, which draws robots of its own; use nominal, and --background uncalibrated"
@@ -103,15 +107,15 @@ class CampaignPlan(CampaignOptions):
 
     @property
     def backgrounds(self) -> tuple[str, ...]:
-        """The robots: ``calibrated`` (as designed), ``uncalibrated`` (drawn for every team) or ``units``."""
+        """Kinds of robots: ``calibrated`` (as designed), ``uncalibrated`` (drawn for every team) or ``units``."""
         return ("units",) if self.units else self.background
 
     def clean_sets(self) -> list["CampaignSet"]:
-        """One for every team."""
+        """List one set without hidden effect for every team."""
         return [CampaignSet(b, team) for b in self.backgrounds for team in range(1, self.teams + 1)]
 
     def hidden_sets(self) -> list["CampaignSet"]:
-        """Those with something hidden; more of them begin with the same."""
+        """List the sets with a hidden effect; a larger number of sets only appends to the list."""
         return [
             CampaignSet(b, k % self.teams + 1, k + 1, cause, self.sizes[k % len(self.sizes)])
             for b in self.backgrounds
@@ -119,13 +123,13 @@ class CampaignPlan(CampaignOptions):
         ]
 
     def candidates(self, background: str) -> list[str]:
-        """Causes that can be hidden in a background: none that it has everywhere."""
+        """List the causes that can be hidden in a background, without those that act on all its robots anyway."""
         has = () if background == "calibrated" or self.calibration is not None else SPREAD_IN_UNCALIBRATED
         names = self.causes or tuple(CAUSES)
         return [name for name in names if name in EFFECTS and name not in (*has, *self.exclude)]
 
     def _in_turn(self, names: Sequence[str], background: str) -> list[str]:
-        """As many as there are sets: every one once, then again in another order."""
+        """Repeat the names, in a new random order each time, up to the number of sets."""
         out: list[str] = []
         while names and len(out) < self.sets:
             rng = self.rng(background, "turn", len(out) // len(names))
@@ -133,7 +137,7 @@ class CampaignPlan(CampaignOptions):
         return out[: self.sets]
 
     def rng(self, *purpose: object) -> np.random.Generator:
-        """Independent stream for one purpose."""
+        """Return an independent random generator for one purpose."""
         return np.random.default_rng([self.seed, *" ".join(map(str, purpose)).encode()])
 
 
@@ -142,11 +146,11 @@ class CampaignSet:
     """One set of recordings of a team.
 
     Attributes:
-        background: the robots.
-        team: which, from 1.
-        number: which of the background's sets with something hidden, from 1; None of a clean one.
-        cause: what is hidden, or None.
-        factor: its size over the detection limit, or None.
+        background: kind of robots, see ``CampaignPlan.backgrounds``.
+        team: number of the team from 1.
+        number: number from 1 among the background's sets with a hidden effect; None for a clean set.
+        cause: hidden cause, or None.
+        factor: size of the cause over its detection limit, or None.
     """
 
     background: str
@@ -157,30 +161,39 @@ class CampaignSet:
 
     @property
     def key(self) -> str:
-        """Its name."""
+        """Name of the set, also that of its file."""
         if self.number is None:
             return f"{self.background}-team{self.team}-clean"
         return f"{self.background}-{self.number:04}-team{self.team}-{self.cause}-x{self.factor:g}"
 
     @property
     def clean(self) -> "CampaignSet":
-        """The same team's clean set, which says how large effects must be."""
+        """Clean set of the same team, which provides its detection limits."""
         return CampaignSet(self.background, self.team)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, the key with them."""
+        """Return the attributes and the key as plain values."""
         return {"key": self.key, **vars(self)}
 
 
 class CampaignStore:
-    """Results of sets, kept as they end.
+    """Stores the result of every set in the folder of a campaign.
 
     Attributes:
-        out: the folder.
+        out: folder of the campaign.
     """
 
     def __init__(self, out: Path, config: Mapping[str, str], *, force: bool = False) -> None:
-        """Open a campaign's folder, or begin one."""
+        """Open the folder of a campaign, or create it.
+
+        Args:
+            out: folder of the campaign.
+            config: values that determine the results of its sets, by name.
+            force: whether to delete the results of a campaign with another configuration.
+
+        Raises:
+            InputError: the folder holds such a campaign and ``force`` is not set.
+        """
         self.out = out
         file = out / CONFIG
         if file.is_file() and (what := _difference(_read(file), config)):
@@ -197,22 +210,26 @@ class CampaignStore:
             write_json(file, {"format": CONFIG_FORMAT, "version": VERSION, "config": dict(config)})
 
     def has(self, one: CampaignSet) -> bool:
-        """Whether a set is done."""
+        """Whether the result of a set is stored."""
         return self.file(one).is_file()
 
     def get(self, one: CampaignSet) -> dict[str, Any]:
-        """The result of a set."""
+        """Read the result of a set.
+
+        Raises:
+            InputError: the file cannot be read or belongs to another set.
+        """
         found = read_json(self.file(one), RESULT)
         if found.get("set") != json.loads(json.dumps(one.to_dict())):
             raise InputError(f"{self.file(one)}: is not the result of that set; delete it")
         return found
 
     def put(self, result: Mapping[str, Any]) -> None:
-        """Keep a result."""
+        """Store the result of a set."""
         write_json(self.out / SETS / f"{result['set']['key']}.json", result)
 
     def file(self, one: CampaignSet) -> Path:
-        """Where the result of a set is."""
+        """Path of the result of a set."""
         return self.out / SETS / f"{one.key}.json"
 
 
@@ -225,7 +242,7 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _difference(there: Mapping[str, Any], here: Mapping[str, str]) -> str:
-    """The first value that is not the same, in words; empty if there is none."""
+    """Describe the first value that differs; empty if all are equal."""
     for name in here:
         if there.get(name) != here[name]:
             if name == "code":
@@ -237,16 +254,19 @@ def _difference(there: Mapping[str, Any], here: Mapping[str, str]) -> str:
 def simulate_set(
     plan: CampaignPlan, one: CampaignSet, limits: MeasuredLimits | None
 ) -> tuple[list[Recording], dict[str, Any]]:
-    """Recordings of a set as any others are, and the truth: ``effects``, ``units``, ``gimbal_axes_1`` and
-    ``control``, whether that was stable in each trial.
+    """Simulate the recordings of a set.
 
     Args:
-        plan: the campaign.
-        one: the set.
-        limits: what sizes are multiples of; None for a clean set.
+        plan: plan of the campaign.
+        one: set to simulate.
+        limits: detection limits, of which effect sizes are multiples; None for a clean set.
+
+    Returns:
+        Recordings without truth, and the truth: ``effects``, ``units``, ``gimbal_axes_1`` and ``control`` (stability
+        of the control in each trial).
 
     Raises:
-        InputError: nothing shows such an effect anywhere in this team, or none is so large.
+        InputError: the team's recordings cannot show the effect anywhere, or its size is out of range.
         TrialError: the physics of a trial cannot be trusted.
     """
     nominal = build_team(plan.payload)
@@ -257,7 +277,7 @@ def simulate_set(
         trajectories = _trajectories(plan, seed, build_team(plan.payload, units))
         hidden.append(_drawn(plan, one, Ground.of(nominal, trajectories, limits), limits))
     places = [_place(effect) for effect in hidden]
-    # One cause acts once at a place: what is hidden takes the place of what is tolerated there.
+    # A cause can act only once at a place, so the hidden effect replaces the tolerated one.
     tolerated = [e for e in _tolerated(plan, one, nominal.robots) if _place(e) not in places]
     done = simulate_trials(
         plan.payload, plan.kinds,
@@ -280,7 +300,7 @@ def _units(plan: CampaignPlan, one: CampaignSet, robots: int) -> Sequence[AsBuil
 
 
 def _tolerated(plan: CampaignPlan, one: CampaignSet, robots: int) -> list[Effect]:
-    """What is a little off everywhere, the same in all sets of a team; units have theirs already."""
+    """Draw the tolerated deviations of a team, equal in all its sets; ``units`` already contain some of them."""
     drawn = cheaper(
         draw_background(robots, plan.rng(one.clean.key, "tolerances"), tolerances=plan.tolerances)
     )
@@ -289,7 +309,7 @@ def _tolerated(plan: CampaignPlan, one: CampaignSet, robots: int) -> list[Effect
 
 
 def _trajectories(plan: CampaignPlan, seed: int, team: TeamScene) -> list[Trajectory]:
-    """Commands of the trials, as ``simulate_trials`` makes them, for their lengths."""
+    """Make the same commands as ``simulate_trials``, to know the durations of the trials."""
     given = {"vias": plan.vias, "duration_s": plan.duration_s}
     told: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     return [
@@ -314,7 +334,7 @@ def _place(effect: Effect) -> tuple[Any, ...]:
 
 
 def _told(effect: Effect) -> dict[str, Any]:
-    """An effect with the right answer, as ``campaign.score`` takes it."""
+    """Describe an effect together with the answer that counts as right, for ``summary.match``."""
     told = effect_to_dict(effect)
     answer = {name: told.get(name) for name in ("cause", "robot", "joint")} | {"known": told["parameters"]}
     return told | {"answer": answer}
@@ -322,10 +342,10 @@ def _told(effect: Effect) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What a campaign found, as ``mocobot.campaign.summary`` documents it.
+    """Summary of a campaign.
 
     Attributes:
-        values: the summary.
+        values: summary with the keys that ``mocobot.campaign.summary`` documents.
         made_with: provenance.
     """
 
@@ -333,17 +353,17 @@ class Campaign:
     made_with: Json
 
     def __str__(self) -> str:
-        """The text report."""
+        """Return the text report."""
         return format_campaign(self.values)
 
     def write(self, folder: Path, *, pictures: bool = True) -> str:
-        """Write summary, table, report and provenance into the campaign's folder, and name them."""
+        """Write summary, table, report and provenance into the folder of the campaign, and list their names."""
         written = [folder / name for name in (SUMMARY, TABLE, REPORT)]
         write_json(written[0], self.values)
         write_text(written[1], csv_table(self.values))
         write_text(written[2], f"{self}\n")
         if pictures and draws_plots():
-            from mocobot.plots import save_campaign  # matplotlib, which printing needs not
+            from mocobot.plots import save_campaign  # imports matplotlib
 
             written += save_campaign(self.values, folder)
         write_json(folder / NAME, folder_provenance(self.made_with, folder, written))
@@ -357,16 +377,16 @@ def campaign(
     force: bool = False,
     done: Callable[[int], object] = quiet,
 ) -> Campaign:
-    """Hide effects in simulated teams, diagnose them blind, and count; a folder that holds some of it is gone on with.
+    """Hide effects in simulated teams, diagnose them blind and count the results; resumes an interrupted campaign.
 
     Args:
-        out: the folder.
-        options: of the campaign.
-        force: drop what another campaign left there.
-        done: called with the number of sets that have ended.
+        out: folder of the campaign.
+        options: options of the campaign.
+        force: whether to delete the results of another campaign in the folder.
+        done: called with the number of sets that were finished since the last call.
 
     Raises:
-        InputError: an option that cannot be met, a folder of another campaign, or an output that cannot be written.
+        InputError: an option is invalid, the folder holds another campaign, or an output cannot be written.
     """
     plan = CampaignPlan.of(options)
     made_with = provenance("campaign", options, inputs_of(options))
@@ -377,7 +397,7 @@ def campaign(
 
 
 def config_of(options: CampaignOptions) -> dict[str, str]:
-    """What sets depend on, as text by name, the code last."""
+    """Return the values that determine the results of sets, as text by name; the key of the code comes last."""
     values = {name: value for name, value in asdict(options).items() if name not in NO_MATTER}
     files = inputs_of(options)
     for name in FILES:
@@ -403,18 +423,18 @@ def run_campaign(
     remote: bool = False,
     work: Callable[[tuple[CampaignPlan, CampaignSet, Json | None]], Json] | None = None,
 ) -> list[Json]:
-    """Run what is not there yet, clean sets first: they say how large effects must be.
+    """Run all sets without a stored result; clean sets come first, because they provide the detection limits.
 
     Args:
-        plan: the campaign.
-        store: where results are and go.
-        jobs: processes; results do not depend on them.
-        done: called with the number of sets that have ended.
-        remote: whether joblib's backend has its processes on other machines.
-        work: what makes a result of (plan, set, limits); ``run_set`` if None.
+        plan: plan of the campaign.
+        store: store of the results.
+        jobs: number of processes; results do not depend on it.
+        done: called with the number of sets that were finished since the last call.
+        remote: whether joblib's backend runs its processes on other machines.
+        work: function that makes a result from (plan, set, limits); ``run_set`` if None.
 
     Returns:
-        The results of all sets, clean ones first, in the order of the plan.
+        Results of all sets, clean ones first, in the order of the plan.
 
     Raises:
         InputError: a result cannot be read or written.
@@ -450,9 +470,9 @@ def _run(
 
 
 def run_set(task: tuple[CampaignPlan, CampaignSet, Json | None]) -> Json:
-    """Simulate and diagnose one set; the truth is put beside the verdict when that is there.
+    """Simulate and diagnose one set; the diagnosis does not see the truth.
 
-    What goes wrong in it is its result: one set must not end a campaign.
+    Errors become part of the result, so that one set cannot end the campaign.
     """
     plan, one, limits = task
     result: Json = {"set": one.to_dict(), "error": None, "unexpected": False}

@@ -1,22 +1,22 @@
-"""What a campaign found, as plain values.
+"""Summarise the results of a campaign as plain values, text and a table.
 
 format, version    "mocobot-campaign", 1
 sets               {clean, hidden, diagnosed, failed: [{key, error, unexpected}]}
 limits             list of {background, cause, kind, places, seen, parameters: {name: {median, low, high}}}: detection
-                   limits that the diagnosis states for clean sets, over teams and places; ``seen`` of ``places`` show
-                   it at all. A push's by trial.
-false_alarms       list of {background, sets, alarms: share, named: {cause: number}, verdicts: {verdict: number}}, of
+                   limits in clean sets over teams and places (trials, for a push); the recordings can show the cause
+                   at ``seen`` of ``places``
+false_alarms       list of {background, sets, alarms: share, named: {cause: number}, verdicts: {verdict: number}} of
                    clean sets
-found              list of {background, factor, right, cause, family, missed, extras}: shares of sets with something
-                   hidden, by size over the detection limit; right is cause and place
-causes             list of {cause, kind, right, missed, error, over_se}: the same by cause; median error of the
-                   parameters over the truth, and rms of the error over its standard error, or null
-confusion          {hidden: [cause], named: [cause or "nothing"], counts}: rows hidden, columns named for it
-reliability        ``reliability``
-records            list, one for each set that was diagnosed, of {key, background, team, cause, robot, joint, factor,
-                   verdict, named, probability, right, extras, error}
+found              list of {background, factor, right, cause, family, missed, extras}: shares of sets with a hidden
+                   effect, by size over the detection limit; right means cause and place
+causes             list of {cause, kind, right, missed, error, over_se}: the same shares by cause; error is the median
+                   relative error of the parameters, over_se the rms of error over standard error, or null
+confusion          {hidden: [cause], named: [cause or "nothing"], counts}: hidden causes in rows, named ones in columns
+reliability        return value of ``reliability``
+records            list of {key, background, team, cause, robot, joint, factor, verdict, named, probability, right,
+                   extras, error}, one for each diagnosed set
 
-A share is {hits, of, interval}: exact 95 % interval.
+A share is {hits, of, interval} with the exact 95 % interval.
 """
 
 import csv
@@ -38,31 +38,30 @@ from mocobot_sim.effects.catalogue import EFFECTS
 
 Json = dict[str, Any]
 BINS = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 0.99), (0.99, 1.0 + 1e-12))
-"""Bins of stated probabilities."""
+"""Bins of stated probabilities: lower limit included, upper limit excluded. Chosen."""
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
-    """Exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
+    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
     low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
     high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
     return float(low), float(high)
 
 
 def share(hits: int, of: int) -> dict[str, Any]:
-    """Counts and interval of a share, as plain values: {hits, of, interval}."""
+    """Return counts and interval of a share as plain values: {hits, of, interval}."""
     return {"hits": hits, "of": of, "interval": list(interval(hits, of))}
 
 
 def reliability(stated: Sequence[tuple[float, bool]]) -> dict[str, Any]:
-    """How often what was said with a probability was right.
+    """Compare stated probabilities with the share of right answers.
 
     Args:
-        stated: probability and rightness of everything that was named.
+        stated: probability of every named cause, and whether the cause was right.
 
     Returns:
-        {number, right, brier, bins: [{low, high, mean, right}]}; ``brier`` is the mean square of probability minus
-        rightness (Brier, Monthly Weather Review 78, 1950), 0 at best, None where nothing was named; bins that nothing
-        falls into are left out.
+        {number, right, brier, bins: [{low, high, mean, right}]}, without empty bins. ``brier`` is the Brier score
+        (Brier, Monthly Weather Review 78, 1950), 0 at best, None if nothing was named.
     """
     bins = []
     for low, high in BINS:
@@ -90,18 +89,18 @@ Item = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Score:
-    """How well one hidden effect was found.
+    """How well a diagnosis found one hidden effect.
 
     Attributes:
-        effect: as the truth has it.
-        factor: its size over the detection limit of its background.
-        listed: whether the diagnosis' catalogue has the answer.
-        named: cause that the verdict names for it, or None.
-        family, member: whether family and cause are right.
-        ambiguous: the wrong member, but the right one, at its place, is among those called ambiguous.
-        place: whether the place is right, too.
-        error: of the parameters that the truth knows, estimate minus truth over truth, the largest; None without any.
-        deviations: estimate minus truth over the standard error of each.
+        effect: hidden effect from the truth.
+        factor: size of the effect over its detection limit.
+        listed: whether the diagnosis could have named the right cause.
+        named: cause that the verdict names for the effect, or None.
+        family, member: whether the family of the cause is right, and whether the cause itself is.
+        ambiguous: the named cause is wrong, but the verdict lists the right one at its place as an ambiguous rival.
+        place: whether the place is right.
+        error: largest relative error of the parameters that the truth states; None without any.
+        deviations: error over standard error of each parameter.
     """
 
     effect: Item
@@ -117,18 +116,18 @@ class Score:
 
     @property
     def right(self) -> bool:
-        """Cause and place."""
+        """Whether cause and place are right."""
         return self.place and (self.member or self.ambiguous)
 
 
 @dataclass(frozen=True)
 class Matched:
-    """What a verdict names, held against everything that is hidden.
+    """Named causes of a verdict, matched to the hidden effects.
 
     Attributes:
-        scores: one for every hidden effect.
-        extras: what was named besides.
-        stated: probability and rightness of everything that was named with a probability.
+        scores: one score per hidden effect.
+        extras: named causes without a hidden effect.
+        stated: probability of every cause named with one, and whether the cause was right.
     """
 
     scores: tuple[Score, ...]
@@ -142,14 +141,14 @@ def match(
     factors: Sequence[float],
     listed: Callable[[str | None], bool] = lambda cause: cause in CAUSES,
 ) -> Matched:
-    """Score the causes of a diagnosis.
+    """Score the causes of a diagnosis against the hidden effects.
 
     Args:
-        named: its ``causes``, as ``discrepancy.result.json`` documents them.
+        named: ``causes`` of the diagnosis, as ``discrepancy.result.json`` documents them.
         truth: ``effects``, each with its right ``answer`` {cause, robot, joint, known: {parameter: value}}, and
-            ``gimbal_axes_1`` (``campaign.ground``).
+            ``gimbal_axes_1`` (``effects.gimbal_axes``).
         factors: size of every effect over its detection limit.
-        listed: whether the diagnosis could have named such an answer.
+        listed: tells whether the diagnosis could have named a cause.
     """
     left = list(named)
     scores, matched = [], []
@@ -169,7 +168,10 @@ def match(
 
 
 def _match(found: Sequence[Item], effect: Item, truth: Item, *, alone: bool) -> Item | None:
-    """The named cause that comes nearest to a hidden one: place, then member, then family, then any."""
+    """Return the named cause that fits a hidden effect best: by cause and place, else cause, else family.
+
+    With a single hidden effect (``alone``), any named cause counts as an answer to it.
+    """
 
     def rank(item: Item) -> tuple[bool, bool, bool]:
         member = item["cause"] == effect["answer"]["cause"]
@@ -178,11 +180,11 @@ def _match(found: Sequence[Item], effect: Item, truth: Item, *, alone: bool) -> 
     if not found:
         return None
     best = max(found, key=rank)
-    return best if any(rank(best)) or alone else None  # among several hidden ones a stranger belongs to none
+    return best if any(rank(best)) or alone else None  # an unrelated cause belongs to none of several
 
 
 def family_of(effect: Item) -> str | None:
-    """Family of the answer; None if the catalogue does not have it."""
+    """Family of the right cause; None if the catalogue lacks it."""
     cause = CAUSES.get(effect["answer"]["cause"])
     return None if cause is None else cause.family
 
@@ -209,13 +211,13 @@ def _here(item: Item) -> tuple[int | None, int | None]:
 
 def _same_place(item: Item, effect: Item, truth: Item) -> bool:
     answer = effect["answer"]
-    if item["cause"] == answer["cause"] == "gimbal_friction":  # parallel axes cannot be told apart
+    if item["cause"] == answer["cause"] == "gimbal_friction":  # the data cannot distinguish parallel axes
         return one_axis(truth["gimbal_axes_1"], item, answer)
     if answer["cause"] == "push":
         p, q = {name: entry["value"] for name, entry in item["parameters"].items()}, effect["parameters"]
         both = min(p["start_s"] + p["duration_s"], q["start_s"] + q["duration_s"])
         return p["trial"] == q["trial"] and both > max(p["start_s"], q["start_s"])
-    if item["cause"] == answer["cause"] == "payload_mass":  # what is put on, or leaks out, and when
+    if item["cause"] == answer["cause"] == "payload_mass":  # the same kind of change in the same trials
         p, known = {name: entry["value"] for name, entry in item["parameters"].items()}, answer["known"]
         alike = bool(p["rate_kgps"]) == bool(known.get("rate_kgps"))
         return alike and all(p[name] == known[name] for name in ("trial", "last_trial") if name in known)
@@ -223,7 +225,13 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
-    """Errors of the parameters that data determine: not where along its line a push acts, nor how long."""
+    """Compute the errors of the parameters that the data determine.
+
+    For a push these exclude its point, start and duration.
+
+    Returns:
+        Largest relative error, or None, and the errors over their standard errors.
+    """
     known, named = effect["answer"]["known"], item["parameters"]
     cause = effect["answer"]["cause"]
     skipped = (
@@ -240,14 +248,14 @@ def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
     se = [named[name]["se"] for name in names]
     deviations = tuple(float(d / s) for d, s in zip(away, se, strict=True) if s)
     units = np.abs(size) > 0.1 * np.abs(size).max() if len(names) > 1 and _alike(names) else size != 0
-    if cause == "payload_mass":  # the size is the mass, however well its place shows
+    if cause == "payload_mass":  # only the mass defines the size
         units &= [name in ("mass_kg", "rate_kgps") for name in names]
     error = float(np.max(np.abs(away[units] / size[units]))) if units.any() else None
     return error, deviations
 
 
 def _alike(names: Sequence[str]) -> bool:
-    """Whether parameters have one unit, so that small ones do not count beside large ones."""
+    """Whether all parameters have the same unit, so that errors of small ones can be ignored beside large ones."""
     return len({name.rsplit("_", 1)[-1] for name in names}) == 1
 
 
@@ -256,10 +264,10 @@ NOTHING = "nothing"
 
 
 def summarise(results: Sequence[Mapping[str, Any]], exclude: Sequence[str] = ()) -> Json:
-    """The summary of results, with the keys above.
+    """Summarise the results of all sets; the docstring of this module documents the keys.
 
     Args:
-        results: of sets, as ``campaign.run`` keeps them.
+        results: results of the sets, as ``campaign.run`` stores them.
         exclude: causes that the diagnosis did not consider.
     """
     sound = [r for r in results if r["error"] is None]
@@ -346,7 +354,7 @@ def _limits(clean: Sequence[Mapping[str, Any]]) -> list[Json]:
 
 
 def kind_of(cause: str) -> str:
-    """A cause in words, wherever it sits."""
+    """Return the title of a cause in words, without a specific place."""
     return CAUSES[cause].title.replace("{", "a ").replace("}", "")
 
 
@@ -435,7 +443,7 @@ COLUMNS = (
 
 
 def format_campaign(summary: Item) -> str:
-    """The text report."""
+    """Return the text report."""
     head, *more = sentences(summary)
     parts = [
         "\n".join([*_fill(head), *(line for sentence in more for line in _fill(sentence, "- "))]),
@@ -446,7 +454,7 @@ def format_campaign(summary: Item) -> str:
 
 
 def csv_table(summary: Item) -> str:
-    """One line for each set that was diagnosed, with the columns of ``COLUMNS``; empty where there is nothing."""
+    """Return CSV with the columns ``COLUMNS`` and one line per diagnosed set; unknown values are empty."""
     out = io.StringIO()
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -465,7 +473,7 @@ def _failed(failed: Sequence[Item]) -> str:
 
 
 def _fill(sentence: str, mark: str = "") -> list[str]:
-    held = sentence.replace(" %", "\0%")  # a number and its unit stay together
+    held = sentence.replace(" %", "\0%")  # keep a number and its percent sign on one line
     lines = textwrap.wrap(held, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark))
     return [line.replace("\0", " ") for line in lines]
 
