@@ -18,7 +18,8 @@ from tqdm import tqdm
 from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array, inertia_matrix, inertia_parameters
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import CalibratedPayload, Calibration, Prior
+from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.prior import Prior
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate

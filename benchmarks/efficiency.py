@@ -33,9 +33,9 @@ from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Prior
 from estimator.calibrate.equations import TrialEquations, corrected
 from estimator.calibrate.least_squares import Layout, Quadratic
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.payload import estimate_payload

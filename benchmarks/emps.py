@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.probability import odds_of
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
 from estimator.filtering import low_pass
 from mocobot import serial

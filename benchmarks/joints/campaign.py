@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import tyro
 
-from discrepancy.evidence.odds import odds_of, without_unfounded
+from discrepancy.evidence.probability import odds_of, without_unfounded
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints.diagnose import diagnose
 from discrepancy.joints.model import SerialModel

@@ -334,7 +334,7 @@ def _renamed(words: list[str], command: str) -> tuple[list[str], dict[str, str]]
         if name.startswith("--"):
             flag = _newer(name[2:].replace("_", "-"), known)
             if spelled.setdefault(flag, name) != name:
-                raise InputError(f"{spelled[flag]} and {name} are one option; give it once")
+                raise InputError(f"{spelled[flag]} and {name} are two names of one option; give one of them")
             name = f"--{flag}" if flag in known else name
         out.append(name + equals + value)
     if command == "convert" and "--out" in out[:-1]:  # convert takes its output as a positional argument

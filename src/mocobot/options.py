@@ -660,7 +660,9 @@ class ReplayOptions(Options):
         if model is not None:
             refuse_teams(self, ("estimate", "calibration", "diagnosis", "payload", "truth"))
         elif self.map is not None:
-            raise InputError("map goes with a model; logs of a team are converted to recordings first")
+            raise InputError(
+                "map goes with a model; a team's log must be converted to a recording first (mocobot convert)"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -305,7 +305,7 @@ def test_earlier_spellings_are_taken(capsys):
     ):
         assert parsed(*earlier.split()) == parsed(*now.split())
     said = refused(capsys, "replay", "a", "--save", "b.rrd", "--out", "c.rrd")
-    assert "--save and --out are one option; give it once" in said
+    assert "--save and --out are two names of one option; give one of them" in said
     assert "--duration is for a periodic" in refused(
         capsys, "simulate", "--duration", 9, "--out", "a.parquet"
     )

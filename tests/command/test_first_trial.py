@@ -36,7 +36,7 @@ WORDS = {
     "estimate rec.parquet --out": "--out EST.json needs a value; see mocobot estimate --help",
     "simulate": "--out must be given: REC.parquet, or with --trials a folder; see mocobot simulate --help",
     "simulate --out-dir new": "new: the file's name must end in .parquet",
-    "simulate --out new.parquet --out-dir new": "--out and --out-dir are one option; give it once",
+    "simulate --out new.parquet --out-dir new": "--out and --out-dir are two names of one option; give one of them",
     "simulate --out new.parquet --trials static": "--out is new.parquet; with --trials it must be a folder",
     "simulate --arms 0": "simulate has no option --arms; see mocobot simulate --help",
     "simulate --efect joint_friction --out new.parquet": "simulate has no option --efect; did you mean --effect?",

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from estimator.arm.unit import ArmUnit
-from estimator.calibrate.calibration import Prior
 from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
 from synthetic_team import Exact, Load, carry, draw_path, draw_units, load
 

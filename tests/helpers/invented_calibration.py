@@ -4,7 +4,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration, Prior
+from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
+from estimator.calibrate.prior import Prior
 from estimator.estimate.grasps import GraspEstimate
 from estimator.rigid_team import Bases
 from omnid_design import DESIGN

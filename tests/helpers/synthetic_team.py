@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from estimator.arm.delta import inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
-from estimator.calibrate.calibration import Prior
+from estimator.calibrate.prior import Prior
 from estimator.estimate.grasps import GraspEstimate
 from estimator.recording.model import Recording
 from estimator.rigid_team import Bases, Shared

@@ -11,7 +11,7 @@ import pytest
 from scipy.io import loadmat
 
 import command
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.probability import odds_of
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
 from mocobot import serial
 

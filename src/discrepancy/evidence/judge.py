@@ -10,9 +10,9 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from discrepancy.evidence.findings import Finding, Limit, Member, Offer, Rival, Scatter, Word
-from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Parts, Values
 from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.probability import Odds
 from discrepancy.evidence.search import Chosen, Linear, Search, State
 from discrepancy.evidence.settings import SETTINGS
 from estimator.arrays import Array

@@ -14,9 +14,9 @@ import numpy as np
 from discrepancy.cause_names import excluded_from
 from discrepancy.evidence.findings import Event, Finding, Member, Verdict, with_held
 from discrepancy.evidence.judge import Judge
-from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.probability import odds_of, without_unfounded
 from discrepancy.evidence.search import Chosen, Until
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.formulas.law import Law

@@ -12,7 +12,7 @@ import numpy as np
 
 from discrepancy.evidence.findings import Event, HeldReadings, held_readings, with_held
 from discrepancy.evidence.judge import is_named
-from discrepancy.evidence.odds import odds_of, without_unfounded
+from discrepancy.evidence.probability import odds_of, without_unfounded
 from discrepancy.evidence.search import Until
 from discrepancy.evidence.settings import ODDS, SETTINGS
 from discrepancy.team.causes import read_tolerances

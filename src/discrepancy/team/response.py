@@ -13,9 +13,9 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from discrepancy.candidate import Candidate
-from discrepancy.evidence.odds import Odds, Rival
 from discrepancy.evidence.parts import Parts
 from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.probability import Odds, Rival
 from discrepancy.evidence.search import Chosen, Key, Search, State
 from discrepancy.formulas.law import Law
 from discrepancy.numbers import three_digits

@@ -57,7 +57,7 @@ class AsFound:
     Attributes:
         units: the robots.
         shared: grasps and payload.
-        causes: causes that are not parameters of the robots, with their values.
+        causes: causes that act in all trials and are not parameters of the robots, with their values.
     """
 
     units: ArmUnit
@@ -66,7 +66,7 @@ class AsFound:
 
     @classmethod
     def of(cls, units: ArmUnit, shared: Shared, causes: Iterable[tuple[Candidate, Array]]) -> AsFound:
-        """Drop the causes that are parameters of the robots or act in some trials only."""
+        """Build it from the causes found, without those that ``units`` holds or that act in some trials only."""
         return cls(units, shared, [(c, v) for c, v in causes if places_of(c) is None and not c.of_trials])
 
 

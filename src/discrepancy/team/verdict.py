@@ -13,9 +13,9 @@ from scipy.signal import lfilter
 from discrepancy.candidate import Candidate
 from discrepancy.evidence.findings import Event, Member, Scatter, Verdict
 from discrepancy.evidence.judge import Judge, Side
-from discrepancy.evidence.odds import Odds
 from discrepancy.evidence.parts import Parts, Values
 from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.probability import Odds
 from discrepancy.evidence.search import State
 from discrepancy.formulas.law import Law
 from discrepancy.result.traces import Trace

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.calibration import CalibratedTrial, Calibration, Prior
+from estimator.calibrate.calibration import CalibratedTrial, Calibration
 from estimator.calibrate.equations import AloneEquations, corrected
 from estimator.calibrate.findings import findings, held_out, shares, undecided
 from estimator.calibrate.least_squares import CarriedTrial, Fit, Given, KnownMass, Unknowns, fit
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Resolution, Rows, Sensing
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial
@@ -145,7 +146,8 @@ def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Record
         groups.setdefault(recording.metadata.payload, []).append(recording)
     if None in groups and len(groups) > 1:
         raise InputError(
-            f"{groups[None][0].name} does not say which payload it is of, and others do; name it in every recording"
+            f"{groups[None][0].name} does not say which payload it is of, and others do; name it in all recordings, or "
+            "in none if all carry the same"
         )
     return groups
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from estimator.arm.unit import AT, COUNT, GROUPS
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.calibration import GRASPS, INERTIAL, MASSES, Prior
+from estimator.calibrate.calibration import GRASPS, INERTIAL, MASSES
 from estimator.calibrate.least_squares import Fit, Given, Quadratic, fit, normal_equations, solved
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 
 UNKNOWN_MASSES = 0.05

@@ -62,11 +62,11 @@ from estimator.calibrate.calibration import (
     CalibratedPayload,
     CalibratedTrial,
     Calibration,
-    Prior,
     carried,
     deviation_names,
     grasps_of,
 )
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
 from estimator.rigid_team import Bases

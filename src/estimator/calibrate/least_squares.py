@@ -17,8 +17,9 @@ from scipy.linalg import block_diag, cho_factor, cho_solve
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.calibration import CalibratedPayload, Calibration, Prior
+from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.calibrate.equations import AloneEquations, Curvature, Rowed, TrialEquations
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from estimator.rigid_team import Bases, Shared

@@ -21,12 +21,12 @@ from estimator.calibrate.calibration import (
     CalibratedPayload,
     Calibration,
     Carried,
-    Prior,
     calibrated,
     carried,
     grasps_of,
 )
 from estimator.calibrate.least_squares import CarriedTrial, Fit, Given, Unknowns, fit
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Resolution, Rows, Sensing
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial, withheld, wrench_balance

@@ -21,9 +21,9 @@ import numpy as np
 
 from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
-from estimator.calibrate.calibration import Prior, read_prior
 from estimator.calibrate.flanges import in_drawing_frames
 from estimator.calibrate.json import calibration_to_dict
+from estimator.calibrate.prior import Prior, read_prior
 from estimator.calibrate.text import format_calibration, unit_toml
 from estimator.errors import InputError
 from estimator.extras import draws_plots

@@ -16,7 +16,7 @@ from discrepancy.team.diagnose import TeamOutcome
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
-from mocobot_sim.effects import springs as listed
+from mocobot_sim.effects import friction_and_springs as listed
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.trajectories import SETTLE_S, Trajectory

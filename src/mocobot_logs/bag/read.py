@@ -119,7 +119,7 @@ class RowAligner:
         if len(steps) and steps.min() < 0:
             raise InputError(
                 f"{self._where}: the stamps of topic {self._names[number]} run back by {-steps.min() * NS:.9g} s; "
-                "topics can be brought together only if their stamps increase"
+                "topics can be brought together only if their stamps never decrease"
             )
 
 

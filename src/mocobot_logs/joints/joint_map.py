@@ -102,12 +102,12 @@ def units_of(kind: Kind, *, slides: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """How the robot is commanded; unknown numbers are NaN.
+    """How the robot is commanded; unknown numbers are NaN, but for ``supply_V``.
 
     Attributes:
-        command: quantity of the log's commands.
+        command: what the logged commands are: one of ``Command``.
         position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,).
-        gain_of: quantity that the gains produce from an error.
+        gain_of: what the loop outputs, gain times error: one of ``GainOf``.
         limit: largest output of the loop, in the quantity of ``gain_of``, shape (J,).
         supply_V: nominal supply voltage, or None.
     """

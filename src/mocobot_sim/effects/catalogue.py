@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 from estimator.errors import InputError
 from estimator.strict import Fields
 from mocobot_sim.effect_names import NAMES, check_effect_name
-from mocobot_sim.effects import geometry, law, payload, readings, springs
+from mocobot_sim.effects import friction_and_springs, geometry, law, payload, readings
 from mocobot_sim.effects.base import JOINTS, PLACE, WHOLE, Effect
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
 
-SUBJECTS = (readings, springs, geometry, payload, law)
+SUBJECTS = (readings, friction_and_springs, geometry, payload, law)
 _KINDS: dict[str, type[Effect]] = {
     kind.cause: kind
     for subject in SUBJECTS

@@ -22,7 +22,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
 from estimator.calibrate.calibrate import calibrate, start_estimate
-from estimator.calibrate.calibration import Calibration, Prior
+from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic

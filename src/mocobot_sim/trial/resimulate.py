@@ -47,7 +47,9 @@ def resimulate(
     if meta.control is None:
         raise InputError(f"{recording.name}: metadata has no 'control'; resimulating it needs it")
     if meta.robots != scene.robots:
-        raise InputError(f"{recording.name}: is of {meta.robots} robots; the scene has {scene.robots}")
+        raise InputError(
+            f"{recording.name}: was recorded with {meta.robots} robots; the scene has {scene.robots}"
+        )
     if meta.rate_hz != RATE_HZ:
         raise InputError(f"{recording.name}: rate_hz is {meta.rate_hz:g}; resimulating it needs {RATE_HZ:g}")
     feed_forward = _feed_forward(recording)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells
-from discrepancy.evidence.odds import without_unfounded
 from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.probability import without_unfounded
 from discrepancy.evidence.search import Chosen, Search
 from estimator.arrays import Array
 from test_evidence_search import EDGES_HZ, LENGTH, RATE_HZ, Machine, wave

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.odds import odds_of, without_unfounded
 from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.probability import odds_of, without_unfounded
 from discrepancy.evidence.search import Chosen, Search, floor_of
 from estimator.arrays import Array
 

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.probability import odds_of
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import causes, problem
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mocobot
-from discrepancy.evidence.odds import Odds, Rival
+from discrepancy.evidence.probability import Odds, Rival
 from discrepancy.evidence.search import Chosen
 from discrepancy.team import long
 from discrepancy.team.causes import CAUSES, read_tolerances

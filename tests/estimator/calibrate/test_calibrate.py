@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import LARGEST, CalibratedPayload, Calibration, Prior, read_prior
+from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.calibrate.least_squares import CarriedTrial, Given, Unknowns, fit
+from estimator.calibrate.prior import LARGEST, Prior, read_prior
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from estimator.recording.model import Recording

@@ -11,8 +11,8 @@ from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Prior
 from estimator.calibrate.equations import AloneEquations, TrialEquations, pose_derivatives
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.recording.model import Recording
 from omnid_design import DESIGN

@@ -12,7 +12,7 @@ import pytest
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import GRASPS, INERTIAL, Prior
+from estimator.calibrate.calibration import GRASPS, INERTIAL
 from estimator.calibrate.equations import TrialEquations
 from estimator.calibrate.findings import held_out, shares
 from estimator.calibrate.least_squares import (
@@ -27,6 +27,7 @@ from estimator.calibrate.least_squares import (
     fit,
     solved,
 )
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from estimator.filtering import low_pass

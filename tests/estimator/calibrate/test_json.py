@@ -16,9 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import AT, COUNT, GROUPS
 from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedPayload, Calibration, Prior, carried, grasps_of
+from estimator.calibrate.calibration import CalibratedPayload, Calibration, carried, grasps_of
 from estimator.calibrate.flanges import in_drawing_frames, parallel_flanges, turned
 from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
+from estimator.calibrate.prior import Prior
 from estimator.calibrate.text import format_calibration, frames_sentence, shown_groups, unit_toml
 from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Calibration, Prior, calibrated
+from estimator.calibrate.calibration import Calibration, calibrated
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.estimate.fit import ONE_FIT as METHOD
 from estimator.estimate.fit import WITHOUT_ERRORS, Asked, estimate, estimate_calibrated, estimate_on

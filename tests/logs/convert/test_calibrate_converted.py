@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.calibration import Prior
+from estimator.calibrate.prior import Prior
 from estimator.recording.parquet import read_recording
 from mocobot.cli import main
 from synthetic_team import carry, draw_path, draw_units, load

@@ -21,8 +21,9 @@ from joblib import Parallel, delayed
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.calibration import CalibratedTrial, Calibration, Prior
+from estimator.calibrate.calibration import CalibratedTrial, Calibration
 from estimator.calibrate.json import calibration_from_dict
+from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.estimate.leftover import Leftover
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate

@@ -523,7 +523,11 @@ def test_what_cannot_be_resimulated_is_refused(recording, teams):
         (but(control=meta.control | {"feed_forward_N": [[1, 2]]}), scene, r"feed_forward_N is \[\[1, 2\]\]"),
         (but(control=meta.control | {"torque_gain": -1}), scene, "rec: control.torque_gain is -1"),
         (but(rate_hz=200.0), scene, "rec: rate_hz is 200; resimulating it needs 100"),
-        (recording, build_team("a", timestep_s=0.001) and teams[2], "is of 3 robots; the scene has 2"),
+        (
+            recording,
+            build_team("a", timestep_s=0.001) and teams[2],
+            "was recorded with 3 robots; the scene has 2",
+        ),
     ]
     for bad, team, sentence in cases:
         with pytest.raises(InputError, match=sentence):
