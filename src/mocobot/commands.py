@@ -13,6 +13,7 @@ import textwrap
 import time
 import webbrowser
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,8 +70,8 @@ def convert(options: opt.Convert) -> None:
         from mocobot.api.conversion import conversions_dict
 
         write_json(options.json, conversions_dict(written))
-    for part, target in written:
-        print(part.report(target))
+    for part, target in written:  # parts of one log share what was left out, which is said once
+        print((replace(part, left_out=()) if options.split_at_gaps else part).report(target))
     if options.split_at_gaps:
         if said := parts[0].omissions():
             print(said)

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from estimator.errors import InputError
 from joint_logs import write_csv
 from made_arm import JOINTS, MAP, RATE_HZ, made, write_log, write_map, write_model
 from mocobot import serial
@@ -253,7 +254,7 @@ def test_map_beside_the_log_comes_first(tmp_path, healthy) -> None:
     (tmp_path / "logs").mkdir()
     write_model(tmp_path)
     log = write_csv(tmp_path / "logs" / "log.csv", healthy)
-    with pytest.raises(serial.InputError, match=r"no map was given \(--map\)"):
+    with pytest.raises(InputError, match=r"no map was given \(--map\)"):
         serial.inspect(log, tmp_path / "arm.xml")
     write_map(tmp_path)
     assert serial.inspect(log, tmp_path / "arm.xml").log_map.name == str(tmp_path / "log.toml")

@@ -304,7 +304,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "exists; give --force" in command.refused(capsys, "map", log, "--out", out)
     assert "there is no such file" in command.refused(capsys, "map", tmp_path / "none.csv")
     assert command.run(capsys, "map", write_text(tmp_path / "a.csv", {"a": RECORDING.time}))[2].startswith(
-        "mocobot: 1 robot; the draft is not complete: "
+        "mocobot: 1 robot; 10 doubtful lines must be looked at; the draft is not complete: "
     )
 
 

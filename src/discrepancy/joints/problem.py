@@ -1,7 +1,4 @@
-"""Build the linear problem of a robot's joint logs: regressor columns, priors and residual torques.
-
-The problem is linearised around given values of the uncertain parameters.
-"""
+"""Build the linear problem of a robot's joint logs around given values: regressor columns, priors, residual torques."""
 
 from __future__ import annotations
 
@@ -43,8 +40,7 @@ class Given:
     """Options of a linear problem.
 
     Attributes:
-        changed: number of leading signals in which causes act. The others are a reference, in which the model may be
-            wrong, too. None: causes act in all signals.
+        changed: number of leading signals in which causes act; the others are a reference. None: all.
         joints: indices of the joints with torques, from 0; None: all.
         motors: joints whose torque per unit of the logged signal is identified with the model.
         back_emf: joints whose drives lose torque in proportion to speed while they are on.
@@ -75,10 +71,7 @@ FADE_S = 0.25
 SWAY_HZ, SWAY_S = (1.0, 2.0, 3.0, 4.5, 6.5), 0.5
 """Free vibrations of an elastic joint at the start of a log: frequencies [Hz] and decay time [s]."""
 INERTIA, JOINT, ZERO_RAD, LENGTH_M, TILT_RAD, SCALE, DELAY_S = 0.1, 0.03, 2e-3, 1e-3, 5e-3, 0.02, 5e-4
-"""Prior standard deviations of a healthy robot's parameters.
-
-``INERTIA`` and ``JOINT`` are relative to the model's inertia, rotor inertia and friction.
-"""
+"""Prior standard deviations of a healthy robot; the first two relative to the model's inertias, rotors and friction."""
 UNKNOWN_SCALE = 0.1
 """Prior standard deviation of the scale if a torque per unit is identified: as uncertain as the masses."""
 LEAST_COM_M = 0.01

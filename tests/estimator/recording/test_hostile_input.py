@@ -119,7 +119,7 @@ def test_the_same_file_twice(rec: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 @pytest.mark.parametrize("cutoff_hz", ["0", "-1", "60", "1e-6", "0.4"])
 def test_cutoffs_that_make_no_sense(rec: Path, capsys: pytest.CaptureFixture[str], cutoff_hz: str) -> None:
-    assert "cutoff_hz is" in refusal(capsys, "estimate", rec, "--cutoff-hz", cutoff_hz)
+    assert "--cutoff-hz is" in refusal(capsys, "estimate", rec, "--cutoff-hz", cutoff_hz)
 
 
 def test_cutoff_goes_with_the_trimmed_ends() -> None:

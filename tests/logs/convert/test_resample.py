@@ -407,7 +407,7 @@ def test_four_in_a_row_lost_at_50_hz_are_filled_within_the_sensors_noise():
 
 
 def test_the_command_has_the_same_limit():
-    assert Convert.__dataclass_fields__["max_gap"].default == MAX_GAP_S
+    assert Convert.__dataclass_fields__["max_gap_s"].default == MAX_GAP_S
 
 
 RATE_HZ = 1000.0
