@@ -205,6 +205,11 @@ def _score(which: int, cause: Item, effect: Item, truth: Item, recordings: Seque
     return LawScore(here, place, variable, named or share < LIKE, size)
 
 
+HELD = {
+    "dropouts_phi": "driven joint {joint} of robot {robot}",
+    "dropouts_theta": "gimbal axis {joint} of robot {robot}",
+}
+"""Places of encoders that hold their last value: events without a law."""
 PLACES: dict[str, tuple[str, ...]] = {
     "tau reading": ("reading of the torque sensor of driven joint {joint} of robot {robot}",),
     "phi reading": ("reading of the angle of driven joint {joint} of robot {robot}",),
@@ -276,6 +281,8 @@ def _place(cause: Item, effect: Item, truth: Item) -> bool:
         every = ({"robot": i + 1, "joint": j} for i in range(len(truth["gimbal_axes_1"])) for j in (1, 2, 3))
         places = [other for other in every if one_axis(truth["gimbal_axes_1"], other, here)]
     names = [word.format(robot=one.get("robot"), joint=one.get("joint")) for word in words for one in places]
+    if effect["cause"] in HELD:
+        names.append(HELD[effect["cause"]].format(**here))
     return any(cause["place"].startswith(name) for name in names)
 
 
