@@ -19,8 +19,6 @@ PRIVATE = {
 """What is counted: zero is not ``nought``, a prediction is not ``foretold``, and a seed means nothing to a reader."""
 ALLOWED = {
     "discrepancy": {"foretold": 4},
-    "estimator": {"sentences that begin with 'Of'": 1},
-    "mocobot": {"sentences that begin with 'Of'": 2},
     "mocobot_report": {"foretold": 1},
 }
 """Occurrences that are left in a package of ``src``. The numbers only get smaller."""
