@@ -74,7 +74,7 @@ def results(folder: Path) -> None:
         ],
         [*mocobot, "estimate", *healthy, "--out", "estimate/est.json", "--force"],
         [str(SCENARIOS / "hidden_effect.py"), "hidden"],
-        [*mocobot, "diagnose", *faulty, "--out", "verdict", "--force"],
+        [*mocobot, "diagnose", *faulty, "--out", "verdict", "--pictures", "--force"],
         *([*mocobot, "report", part, "--force"] for part in ("estimate", "verdict")),
     ):
         subprocess.run([sys.executable, *words], check=True, cwd=folder)
