@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfilt
 from array_log import ArrayLog, stream
 from estimator.quantisation import quantisation_step
 from mocobot_inspect import survey as survey_module
-from mocobot_inspect.channels import Channel, clipped, noise_level, oscillation, stuck
+from mocobot_inspect.channels import Channel, Oscillation, clipped, joined, noise_level, oscillation, stuck
 from mocobot_inspect.findings import findings
 from mocobot_inspect.report import format_inspection, inspection_dict
 from mocobot_inspect.survey import Survey, survey
@@ -469,3 +469,17 @@ def test_the_torque_that_oscillates_most_is_said_with_what_shakes_along() -> Non
     told = inspection_dict(found)["channels"]
     assert told[1]["tau2"]["oscillation"]["amplitude"] == pytest.approx(0.5, rel=0.02)
     assert told[0]["tau2"]["oscillation"] is None
+
+
+def test_what_has_no_step() -> None:
+    rng = np.random.default_rng(3)
+    assert quantisation_step(rng.standard_normal(5000)) is None
+    assert quantisation_step(motion(60.0, noise=0.0)[:, 0]) is None
+    assert quantisation_step(np.full(100, 0.3)) is None
+    assert quantisation_step(np.array([0.0, 1.0, 2.0])) is None
+
+
+def test_parts_are_joined() -> None:
+    assert joined([]) is None
+    parts = [Oscillation(30.0, 1.0, 2.5), Oscillation(29.0, 4.0, 5.0)]
+    assert joined(parts) == Oscillation(29.0, 4.0, 7.5)

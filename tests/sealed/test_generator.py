@@ -4,11 +4,14 @@ import ast
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import discrepancy.team.causes
 import mocobot_sim.effects
-from hidden import HiddenSet, Schedule, Sealed, generate
+from discrepancy.team.causes import CAUSES
+from hidden import LIMITS, HiddenSet, Schedule, Sealed, generate, ground_of, pendulum_limit_kg
+from mocobot.campaign.effects import draw_effect
 from mocobot_sim.effects import EFFECTS
 
 generated = cache(generate)
@@ -38,6 +41,20 @@ def test_recordings_do_not_say_what_is_hidden():
 def test_truth_is_sealed_without_a_verdict():
     with pytest.raises(ValueError, match="sealed"):
         Sealed({"effects": []}).open(None)
+
+
+def test_pendulum_is_measured_by_the_limit_of_its_own_length():
+    """A slow one is hardly excited, and has to be twice as heavy to be seen."""
+    assert pendulum_limit_kg(0.2) == LIMITS["slosh"]["mass_kg"]
+    assert pendulum_limit_kg(0.5) > 1.9 * LIMITS["slosh"]["mass_kg"]
+    ground = ground_of(3, np.zeros(3), [])
+    for seed in range(5):
+        effect = draw_effect("slosh", 4.0, ground, np.random.default_rng(seed))
+        assert effect.mass_kg == pytest.approx(4.0 * pendulum_limit_kg(effect.length_m))
+
+
+def test_every_cause_has_a_limit_and_an_effect():
+    assert set(LIMITS) == set(CAUSES) == set(EFFECTS) - {"law"}
 
 
 def imports(package) -> dict[str, set[str]]:

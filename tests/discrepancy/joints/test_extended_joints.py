@@ -173,6 +173,7 @@ def typical(case: Case, joint: str) -> tuple[float, float, float]:
 
 
 E, R = NAMES.index("elbow"), NAMES.index("rail")
+SHARE = 0.1
 TORQUES: dict[str, tuple[str, str, dict[str, float], Truth]] = {
     "friction": ("friction", "elbow", {},
                  lambda m: 0.4 * np.sign(m.v[:, E]) + 0.2 * m.v[:, E]),
@@ -436,6 +437,17 @@ def given_by(case: Case, found: Finding, told: np.ndarray) -> np.ndarray:
     torques = LoggedTorques.of(joint_log(case.motion.q, told), robot.readings)
     m = case.motion
     return np.array([torques(t, q, v) for t, q, v in zip(m.t, m.q, m.v, strict=True)])
+
+
+def test_a_reading_that_saturates(case: Case) -> None:
+    load = np.abs(case.motion.asked[:, E])
+    told = case.motion.asked.copy()
+    size = float(np.sqrt(np.mean(case.linear.joints[E][0].asked ** 2)))
+    told[:, E] *= 1.0 + 0.2 * (1.0 - 0.1 * (load / size - 1.0))
+    found = fitted(case, ("torque_scale", "elbow"), {"bend": -0.1}, told - case.motion.asked)
+    np.testing.assert_allclose(
+        given_by(case, found, told)[case.moving], case.motion.asked[case.moving], atol=0.01
+    )
 
 
 def test_a_kind_is_one_effect_a_member(case: Case) -> None:

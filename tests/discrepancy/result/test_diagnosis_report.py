@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import string
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,19 @@ import pytest
 
 from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
+from discrepancy.numbers import number
+from discrepancy.result.json import plain
+from discrepancy.result.pictures import closed_loop_figure, file_names
 from discrepancy.result.remains import of_response
 from discrepancy.result.report import format_verdict
 from discrepancy.result.tables import ERRORS, response_units
 from discrepancy.result.traces import Channel, Trace, group_units, groups
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Cause
+from discrepancy.team.estimates import errors
+from discrepancy.team.linear.rows import Whitening
 from discrepancy.team.told import describe
+from discrepancy.team.verdict import unwhitened
 from mocobot_sim.effects.catalogue import EFFECTS
 
 WIDTH = 100
@@ -89,6 +97,17 @@ def test_a_suspicion_is_told_with_its_probability() -> None:
     assert "suspected, too improbable to be named" in format_verdict(values)
 
 
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.0004, "below 0.1 %"), (0.0312, "3.1 %"), (0.094, "9.4 %"), (0.096, "10 %"), (0.5, "50 %"), (0.9951, "99.5 %"),
+     (0.99995, "above 99.9 %")],
+)  # fmt: skip
+def test_a_probability_in_words(share: float, words: str) -> None:
+    values = small_diagnosis()
+    values["causes"][0]["probability"] = share
+    assert f"Probability {words}, 180 nats over nothing" in report(values)
+
+
 @pytest.mark.parametrize(("share", "told"), [(0.79, True), (0.81, False)])
 def test_a_response_that_causes_hardly_mend_is_told(share: float, told: bool) -> None:
     values = small_diagnosis()
@@ -127,6 +146,20 @@ def test_what_is_off_everywhere_beside_a_cause_has_its_rows() -> None:
     assert (
         "9 places zero of a gimbal axis zero [mrad] 52.0 times the tolerance robot 2, joint 3 -9.10" in text
     )
+
+
+def test_errors_against_the_truth_are_shown() -> None:
+    values = small_diagnosis()
+    estimate = values["gain"]["estimates"]["before"]
+    off = estimate | {"mass_kg": 11.7 * 1.01, "p_1c_m": [0.1, 0.2, 0.303]}
+    found = errors(off, estimate)
+    assert found["mass_percent"] == pytest.approx(1.0)
+    assert found["com_mm"] == pytest.approx(3.0)
+    assert found["grasp_rotation_deg"] == 0.0
+    values["gain"]["errors"] = {"before": found, "after": errors(estimate, estimate)}
+    assert "centre of mass [mm]" in report(values)
+    with pytest.raises(ValueError, match="not"):
+        errors(estimate, estimate | {"p_1c_m": [0.1, 0.2]})
 
 
 def test_causes_are_named_in_words_where_they_sit() -> None:
@@ -171,6 +204,43 @@ def test_every_cause_has_a_sentence_with_its_numbers(cause: str) -> None:
         assert "_" not in text
 
 
+def test_a_cause_of_ones_own_gets_its_docstring(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Mine(Cause):
+        """A ghost holds the payload back."""
+
+        at = "payload"
+        columns = type(CAUSES["drag"]).columns
+
+    monkeypatch.setitem(CAUSES, "ghost", Mine())
+    text = describe(Candidate("ghost", "f", None, None, ()), {"c_N": 2.0}, {"c_N": 0.1})
+    assert text == "Payload: A ghost holds the payload back (c_N = 2.00 +- 0.10)."
+
+
+def test_numbers_have_as_many_digits_as_they_deserve() -> None:
+    assert number(0.05, 0.00123, "N m") == "0.0500 +- 0.0012 N m"
+    assert number(-0.05, 1.0, "m", 1e3) == "-50 +- 1000 m"
+    assert number(0.05, math.nan, "s") == "0.05 s"
+
+
+def test_plain_values_have_no_nan() -> None:
+    mixed = {"a": np.float64("nan"), "b": [np.int64(2), np.array([1.0, np.inf])], "c": np.bool_(True)}
+    assert plain(mixed) == {"a": None, "b": [2, [1.0, None]], "c": True}
+
+
+def test_file_names_are_distinct_and_safe() -> None:
+    names = file_names(["/x/rec.parquet", "y/rec.parquet", "a b/c:d", "against", ""])
+    assert names == ["rec", "rec_2", "c_d", "against_2", "trial"]
+
+
+def test_channels_are_grouped_by_name() -> None:
+    channels = [Channel(f"force {a}", "balance", None, "N") for a in "xyz"] + [Channel("gap", "k", 1, "m")]
+    found = groups(channels)
+    assert [(g.name, g.columns, g.components) for g in found] == [
+        ("force", (0, 1, 2), ("x", "y", "z")),
+        ("gap", (3,), ("gap",)),
+    ]
+
+
 def test_one_unit_for_all_channels_of_a_kind() -> None:
     """That of the largest rms, over groups and trials."""
     names = {"grasp 2 rotation": "rad", "grasp 3 rotation": "rad", "force": "N", "moment": "N m"}
@@ -196,3 +266,23 @@ def test_one_unit_for_all_channels_of_a_kind() -> None:
     gain["trials"] = []
     shown = response_units(gain)
     assert shown == {"phi": ("mrad", 1e3), "theta": ("mrad", 1e3), "tau": ("N m", 1.0)}
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+def test_whitening_can_be_undone(uneven: bool) -> None:
+    rng = np.random.default_rng(1)
+    draws = np.cumsum(rng.standard_normal((20, 60, 4)), axis=1) * 0.1 + rng.standard_normal((20, 60, 4))
+    draws[:, :3] *= 5.0
+    white = Whitening.of(draws, 50, uneven=uneven)
+    assert np.any(white.loudness > 1.0) == uneven
+    assert unwhitened(white, white(draws[0])) == pytest.approx(draws[0], abs=1e-10)
+
+
+def test_no_closed_loop_no_picture(tmp_path: Path) -> None:
+    values = small_diagnosis()
+    figure = closed_loop_figure(values)
+    assert figure is not None
+    figure.savefig(tmp_path / "loop.png")
+    assert len(figure.axes) == 4
+    values["gain"]["trials"] = []
+    assert closed_loop_figure(values) is None

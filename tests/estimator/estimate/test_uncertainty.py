@@ -575,3 +575,15 @@ def test_noise_of_one_hold_is_that_within_it() -> None:
         noise.append(report.noise * mass.mass * GRAVITY)
     expected = np.sum(2.0 * np.sum(body.p_1i**2, axis=1)) * 0.02**2 / len(hold.batches) / 3.0
     assert np.mean(np.square(noise)) == pytest.approx(expected, rel=0.12)
+
+
+def test_standard_error_of_a_length():
+    covariance = np.diag([0.01, 0.04, 0.09])
+    assert norm_se(np.array([0.0, 5.0, 0.0]), covariance) == pytest.approx(0.2)
+    assert norm_se(np.array([3.0, 4.0, 0.0]), covariance) == pytest.approx(np.sqrt(0.36 * 0.01 + 0.64 * 0.04))
+    assert norm_se(np.zeros(3), covariance) > 0
+
+
+def test_norm_se_of_next_to_nothing():
+    """Rounding can make the variance of the distance of two identical robots negative."""
+    assert norm_se(np.array([1.0, 0.0, 0.0]), np.diag([-1e-30, 1.0, 1.0])) == 0.0

@@ -383,3 +383,9 @@ def test_no_more_is_taken_off_than_there_is():
     (leak,) = make_effect("payload_mass", {"rate_kgps": -0.6}).actors(1)
     with pytest.raises(InputError, match=sentence):
         leak.start(stage)
+
+
+def test_one_hanging_payload_takes_drag_and_tether(tmp_path):
+    scene = one_robot(tmp_path, example("drag"), example("tether"))
+    log = run_trial(scene, _still(scene, 150))
+    assert np.abs(log.phi - log.phi[0]).max() < 1e-4

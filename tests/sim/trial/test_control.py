@@ -322,3 +322,15 @@ def test_a_gain_out_of_its_range_is_refused(name: str, bad: float, allowed: str)
     with pytest.raises(InputError) as refusal:
         replace(ControlGains(), **{name: bad})
     assert str(refusal.value) == f"control.{name} is {bad!r}; it must be a number from {allowed}"
+
+
+def test_missing_gain_is_named():
+    with pytest.raises(InputError, match=r"control\.rate_hz is None"):
+        ControlGains.from_dict({k: v for k, v in ControlGains().to_dict().items() if k != "rate_hz"})
+
+
+def test_theta_zeros_do_not_reach_the_controller(one):
+    loops = [ClosedLoop(one, as_built=u) for u in ([], [AsBuilt(theta_zero_rad=np.full(3, 0.1))])]
+    for loop in loops:
+        loop.run(0.1, one.wrist_home_b + np.array([0.01, 0.02, 0.03]))
+    np.testing.assert_array_equal(loops[0].data.qpos, loops[1].data.qpos)

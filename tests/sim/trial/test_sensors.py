@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains
-from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure, sensor_preset
@@ -165,3 +165,15 @@ def test_metadata_says_what_was_simulated(random_a):
     assert meta.design == omnid_design(), "the design, not the unit as built"
     assert ControlGains.from_dict(meta.control) == random_a.gains
     np.testing.assert_array_equal(meta.control["feed_forward_N"], random_a.feed_forward)
+
+
+def test_calibrated_means_no_spread_at_all():
+    for entry in dataclasses.fields(CalibrationSpread):
+        assert not SensorPreset("test", spread=CalibrationSpread(**{entry.name: 1e-9})).calibrated
+
+
+def test_geometry_does_not_reach_the_sensors(random_a):
+    units = _units(base_radius_m=[1e-3] * 3, rod_length_m=[1e-3] * 3, proximal_length_m=[1e-3] * 3)
+    recording = measure(dataclasses.replace(random_a, units=units), sensor_preset("ideal"), _rng())
+    np.testing.assert_array_equal(recording.phi, random_a.phi)
+    np.testing.assert_array_equal(recording.tau, random_a.tau)
