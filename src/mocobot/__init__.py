@@ -1,4 +1,4 @@
-"""Simulate mobile cobots that carry an unknown payload, estimate it, and find out what the simulation gets wrong.
+"""Find what a robot's simulation model gets wrong; simulate, estimate and calibrate teams of mobile cobots.
 
 ``__all__`` lists the public names (docs/api.md), which ``__init__.pyi`` declares. Each name is imported at its first
 use, so that ``import mocobot`` is fast.

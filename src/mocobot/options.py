@@ -38,7 +38,7 @@ LogMap = Annotated[
     AnyName | None,
     tyro.conf.arg(
         metavar="MAP.toml|NAME",
-        help="Where logs that are no recordings have which channel, by file or built-in name (docs/measured-data.md); "
+        help="Map from a log's columns to channels: a file or built-in name (docs/measured-data.md); "
         "found out if not given. With a model: log.toml beside the log or the model.",
     ),
 ]

@@ -20,7 +20,7 @@ class Settings:
         open_nats: log odds over nothing that the errors of other causes' laws can take up if a cause is removed.
             Fitted by log score to arms whose effects follow other laws than the table: 9 to 14 score alike.
         unlisted_share: the same for events and unlisted laws beside other unlisted laws, as a share of the log evidence
-            of these laws.
+            of these laws. Chosen when false pushes and laws beside two hidden laws were worth 1 to 52 % of them.
         most_causes: largest set.
         tried: candidates with exact evidence in each step, selected by linear gain.
         tried_quiet: additional candidates, selected by linear gain with the noise at its floor.
