@@ -70,8 +70,8 @@ COMMANDS = [name for commands, _ in TASKS.values() for name in commands]
 refuses bad input before slow imports, and a function in ``mocobot.commands`` that runs it."""
 PROG, CONFIG = "mocobot", "--config"
 ABOUT = (
-    "Find out from logs what a robot's simulation model gets wrong, name the cause, and write a better model. Simulate, "
-    "estimate and calibrate teams of mobile cobots that carry a payload.",
+    "Find out from logs what a robot's simulation model gets wrong, name the cause, and write a better model. "
+    "Simulate, estimate and calibrate teams of mobile cobots that carry a payload.",
     "Exit codes: 0 done; 1 done, and with --strict the answer is not good; 2 refused, with one sentence that says why; "
     "130 interrupted; 141 nobody reads the output any more. --version prints the version. COMMAND --help lists the "
     "options of a command; COMMAND --config FILE.toml takes more options from a file's table [COMMAND].",
