@@ -161,8 +161,26 @@ class Series:
 
 def parts_of(outcome: Outcome, trials: Trials) -> tuple[Parts, tuple[Series, ...]]:
     """Split the rows of a search result into the parts of the trials."""
-    whole, state, problem = outcome.problem.cells, outcome.state, outcome.problem
+    state, problem = outcome.state, outcome.problem
     active = np.flatnonzero(state.posterior.prior)
+    out, each = in_parts(problem, active, state.posterior.variance, trials)
+    events = [k for c in state.chosen if c.group.event for k in (*c.group.columns, *c.forms)]
+    resting = [k for columns, _ in problem.resting for k in columns]
+    return Parts.of(state, each, resting, resting, events), out
+
+
+def in_parts(
+    problem: JointProblem, active: NDArray[np.intp], variance: Array, trials: Trials
+) -> tuple[tuple[Series, ...], list[tuple[Array, Array, float, Array]]]:
+    """Rows of each part as time series, and X' W X, X' W y, y' W y and the number of rows by channel and band.
+
+    Args:
+        problem: the problem of all trials.
+        active: columns to keep, in increasing order.
+        variance: noise variances, shape (C, bands).
+        trials: the trials.
+    """
+    whole = problem.cells
     by_run, each, out = _in_time(whole, active), [], []
     place = {int(k): i for i, k in enumerate(active)}
     seen = [
@@ -178,10 +196,8 @@ def parts_of(outcome: Outcome, trials: Trials) -> tuple[Parts, tuple[Series, ...
         time = own.time[0] + (np.arange(len(residual)) + here.start + 0.5) / rate
         out.append(Series(residual, columns, time, rate, float(np.sqrt(share))))
         cells = _cells(residual, columns, seen, Bands([rate], [len(residual)], whole.bands.edges_hz))
-        each.append((*cells.weighted(state.posterior.variance), cells.rows))
-    events = [k for c in state.chosen if c.group.event for k in (*c.group.columns, *c.forms)]
-    resting = [k for columns, _ in problem.resting for k in columns]
-    return Parts.of(state, each, resting, resting, events), tuple(out)
+        each.append((*cells.weighted(variance), cells.rows))
+    return tuple(out), each
 
 
 def _in_time(cells: Cells, active: NDArray[np.intp]) -> list[tuple[Array, Array]]:

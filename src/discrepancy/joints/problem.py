@@ -48,6 +48,7 @@ class Given:
         tolerances: prior standard deviations by cause and parameter that replace the defaults.
         noise: one sample of the sensor noise in the residual for each log, shape (W, J) each; None: unknown.
         kept: weight of each sample, shape (W, J) for each log; empty: all samples count.
+        inertias: whether every link has a column for each of its ten inertial parameters.
     """
 
     changed: int | None = None
@@ -58,6 +59,7 @@ class Given:
     tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     noise: Sequence[Array] | None = None
     kept: Sequence[Array] = ()
+    inertias: bool = False
 
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
@@ -667,7 +669,7 @@ class _Builder:
         self.group(
             "link_mass", n, whole, [1.0, 0.1, 0.1, 0.1, 2.0], log_prior=half, family=family, shape=(("whole", 1.0),),
         )  # fmt: skip
-        if loaded:
+        if loaded or self.more.inertias:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))
                      for i, x in enumerate(MOMENTS)]  # fmt: skip

@@ -1,0 +1,638 @@
+"""Fit everything that joint logs determine about a robot: inertial parameters, friction, rotors, zeros, gains, delays.
+
+The problem is the linear one of the diagnosis, around the current values. It is solved for all parameters together with
+wide priors around the given model. Inertial parameters keep a physically consistent form: the pseudo-inertia of a link
+is U M M' U', with U U' that of the given model and M an upper triangular matrix with positive diagonal (C. Rucker and
+P. M. Wensing, "Smooth parameterization of rigid-body inertia", RA-L 2022). M = 1 is the given model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+from scipy.optimize import least_squares
+
+from discrepancy.evidence.search import floor_of
+from discrepancy.joints.diagnose import Series, in_parts
+from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import MOMENTS, Given, JointProblem, Values, joint_problem
+from discrepancy.joints.servo import driven_by_voltage
+from discrepancy.joints.signals import Signals
+from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
+from estimator.arrays import Array
+from mocobot_logs.joints.joint_log import JointLog
+from mocobot_sim.serial.mjcf import real_inertia
+
+BODY = 0.4
+"""Prior standard deviation of each entry of M. Chosen: masses within a factor of 2, centres of mass within 0.4 radii of
+gyration, inertias within a factor of 2."""
+ZERO_RAD, TILT_RAD, GAIN, DELAY_S = 0.01, 0.02, 0.02, 2e-3
+"""Prior standard deviations of joint zeros [rad or m], base tilt [rad], torque gains and delays. Chosen: five times those
+of a calibrated robot."""
+FREE_GAIN = 0.3
+"""Prior standard deviation of the gain of a drive whose torque constant is unknown. Chosen: as uncertain as the masses."""
+DETERMINED = 0.3
+"""Largest ratio of standard error and prior standard deviation of a parameter that counts as determined. Chosen: the
+logs reduce its variance tenfold."""
+ROUNDS, SETTLED = 8, 0.1
+"""Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
+LEAST_KG, LEAST_RADIUS_M = 1e-6, 1e-3
+"""Least mass and radius of gyration of a link that is fitted. Chosen: below any part of a robot."""
+BASE = 1e-4
+"""Singular values over the largest below which columns count as dependent. Chosen: 0.01 % of the torques."""
+RATIO = 0.05
+"""Largest difference between a drive's coupling and the ratios 1 and -1 that the columns of coupled drives have."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of the robot or of its log.
+
+    Attributes:
+        place: joint, link or ``base``.
+        name: quantity with its unit, such as ``coulomb_Nm``.
+        model: value of the given model.
+        value: posterior mean.
+        se: standard error, that of the posterior.
+        prior: prior standard deviation.
+        in_model: whether MJCF holds it; else it is an error of the log.
+    """
+
+    place: str
+    name: str
+    model: float
+    value: float
+    se: float
+    prior: float
+    in_model: bool = True
+
+    @property
+    def determined(self) -> bool:
+        """Whether the logs determine it."""
+        return self.se < DETERMINED * self.prior
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A combination of inertial parameters that the logs determine (a base parameter).
+
+    Attributes:
+        terms: factor by (link, parameter about the link's frame); the first has factor 1.
+        model, value, se: value in the given model, posterior mean and standard error.
+    """
+
+    terms: Mapping[tuple[str, str], float]
+    model: float
+    value: float
+    se: float
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Prediction of one part of the logs from the others.
+
+    Attributes:
+        part: name.
+        model, least_squares, calibrated: rms of measured minus predicted torque with the given model, with ordinary
+            least squares of the same parameters, and with this fit, shape (J,) [N m or N].
+        noise: standard deviation of the noise of the rows, shape (J,).
+        torque: rms of the measured torque, shape (J,).
+    """
+
+    part: str
+    model: Array
+    least_squares: Array
+    calibrated: Array
+    noise: Array
+    torque: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ArmCalibration:
+    """What joint logs determine about a robot.
+
+    Attributes:
+        model: the given model.
+        joints: indices of the joints with torques, from 0.
+        parameters: all parameters.
+        combinations: determined combinations of inertial parameters.
+        inertial: number of inertial parameters in all.
+        tree: kinematic tree with the fitted numbers.
+        zero: fitted joint zeros, shape (J,) [rad or m].
+        gravity: in the base's frame, shape (3,) [m/s^2].
+        links: bodies whose inertial parameters were fitted.
+        coupled: Coulomb friction, viscous friction, rotor inertia and ratio of coupled drives, by their second joint.
+        held_out: predictions of each part; of the only part from itself.
+        validated: whether every part was predicted from others.
+        logs: names of the logs.
+        notes: sentences on the logs and on what is not fitted.
+    """
+
+    model: SerialModel
+    joints: tuple[int, ...]
+    parameters: tuple[Parameter, ...]
+    combinations: tuple[Combination, ...]
+    inertial: int
+    tree: Tree
+    zero: Array
+    gravity: Array
+    links: tuple[int, ...]
+    coupled: Mapping[int, tuple[float, float, float, float]]
+    held_out: tuple[HeldOut, ...]
+    validated: bool
+    logs: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def calibrate_arm(
+    model: SerialModel, logs: Sequence[JointLog], say: Callable[[str], object] = lambda _: None
+) -> ArmCalibration:
+    """Fit all parameters of a robot to logs of its joints.
+
+    Args:
+        model: the robot as described.
+        logs: joint logs with torques, currents or duties.
+        say: receives a line of text about each step.
+
+    Raises:
+        InputError: a log cannot be used.
+    """
+    say("smoothing the logs")
+    trials = trials_of(model, logs)
+    fit = _Fit(model, trials)
+    for k in range(ROUNDS):
+        say(f"fitting all parameters, step {k + 1}")
+        if fit.step() < SETTLED:
+            break
+    say("predicting each part from the others")
+    held = fit.held_out()
+    names = tuple(dict.fromkeys(log.name for log in logs))
+    notes = [*notes_of(logs), *at_limits(model, trials.limited), *resting(logs), *fit.notes()]
+    return ArmCalibration(
+        model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
+        10 * len(fit.links), fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
+        len(trials.parts) > 1, names, tuple(notes),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Scalar:
+    """A parameter that is one column of the problem: its place, name, value in the model, bound and export."""
+
+    label: str
+    place: str
+    name: str
+    model: float
+    prior: float
+    least: float = -np.inf
+    in_model: bool = True
+
+
+class _Body:
+    """Inertial parameters of one link as a function of the entries of M, all standard normal in the prior."""
+
+    def __init__(self, tree: Tree, body: int) -> None:
+        mass, com, inertia = float(tree.mass[body]), tree.com[body], tree.inertia[body]
+        inertia = real_inertia(inertia)
+        if np.trace(inertia) < mass * LEAST_RADIUS_M**2:
+            inertia = 0.4 * mass * LEAST_RADIUS_M**2 * np.eye(3)
+        self.body, self.given = body, inertial_parameters(mass, com, inertia)
+        # The factor with the centre of mass in the last column: P = U U', upper triangular.
+        self.root = np.linalg.cholesky(_pseudo(self.given)[::-1, ::-1])[::-1, ::-1]
+
+    def parameters(self, u: Array) -> Array:
+        """The ten inertial parameters about the frame's origin, shape (10,)."""
+        half = self.root @ _triangle(u)[0]
+        return _moments(half @ half.T)
+
+    def jacobian(self, u: Array) -> Array:
+        """Their derivatives, shape (10, 10)."""
+        M, dM = _triangle(u)
+        half = self.root @ M
+        each = (half @ (self.root @ d).T for d in dM)
+        return np.column_stack([_moments(P + P.T) for P in each])
+
+
+def _triangle(u: Array) -> tuple[Array, Array]:
+    """The matrix M (4, 4) of ten entries, and its derivatives (10, 4, 4)."""
+    a, d1, d2, d3, s12, s23, s13, t1, t2, t3 = BODY * u
+    diagonal = np.exp([d1, d2, d3, 0.0])
+    M = np.diag(diagonal)
+    M[[0, 1, 0, 0, 1, 2], [1, 2, 2, 3, 3, 3]] = s12, s23, s13, t1, t2, t3
+    dM = np.zeros((10, 4, 4))
+    dM[0] = M
+    for k in range(3):
+        dM[1 + k, k, k] = diagonal[k]
+    for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
+        dM[4 + k, i, j] = 1.0
+    return np.exp(a) * M, BODY * np.exp(a) * dM
+
+
+def _pseudo(p: Array) -> Array:
+    """Pseudo-inertia (4, 4) from ten inertial parameters about the frame's origin."""
+    xx, yy, zz, xy, xz, yz = p[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    out = np.zeros((4, 4))
+    out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    out[:3, 3] = out[3, :3] = p[1:4]
+    out[3, 3] = p[0]
+    return out
+
+
+def _moments(P: Array) -> Array:
+    """The ten inertial parameters of a pseudo-inertia."""
+    second = P[:3, :3]
+    inertia = np.trace(second) * np.eye(3) - second
+    return np.array([P[3, 3], *P[:3, 3], *np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
+
+
+def central(p: Array) -> Array:
+    """Mass, centre of mass and central inertia (xx, yy, zz, xy, xz, yz) of ten parameters about the frame's origin."""
+    c = p[1:4] / p[0]
+    about = p[0] * (c @ c * np.eye(3) - np.outer(c, c))
+    moved = np.array([*np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
+    return np.array([p[0], *c, *(p[4:] - moved)])
+
+
+CENTRAL = ("mass_kg", "com_x_m", "com_y_m", "com_z_m", *(f"inertia_{a}_kgm2" for a in MOMENTS[4:]))
+
+
+def fitted_links(tree: Tree) -> list[int]:
+    """For every set of moving bodies that are welded together, the heaviest: torques do not tell them apart."""
+    root = np.arange(len(tree.parent))
+    for b in range(1, len(root)):
+        if b not in tree.joint_body:
+            root[b] = root[tree.parent[b]]
+    groups: dict[int, list[int]] = {}
+    for b in map(int, tree.links):
+        groups.setdefault(int(root[b]), []).append(b)
+    each = (max(own, key=lambda b: tree.mass[b]) for own in groups.values())
+    return [b for b in each if tree.mass[b] > LEAST_KG]
+
+
+class _Fit:
+    """The fit around its current values."""
+
+    def __init__(self, model: SerialModel, trials: Trials) -> None:
+        self.model, self.trials = model, trials
+        self.given = trials.runs[0].tree
+        self.tree, self.values = self.given, dict[str, float]()
+        self.known = tuple(map(int, trials.joints))
+        volts = np.flatnonzero(driven_by_voltage(trials.motors, len(model.joints))).tolist()
+        switched = any(s.enabled is not None and not s.enabled.all() for s in trials.runs)
+        self.free = frozenset(motor.joint for motor in trials.motors)
+        self.options = Given(
+            joints=self.known, motors=self.free, back_emf=frozenset(volts if switched else ()), noise=trials.noise,
+            kept=trials.kept, inertias=True,
+        )  # fmt: skip
+        self.bodies = [_Body(self.given, b) for b in fitted_links(self.given)]
+        self.links = tuple(body.body for body in self.bodies)
+        self.problem = self._linear()
+        self.scalars = list(self._scalars())
+        self.gains = self._gain_basis()
+        self.u = np.zeros(self.count)
+        self.covariance = np.eye(self.count)
+
+    # --- parameters
+
+    @property
+    def count(self) -> int:
+        """Number of standard normal variables u."""
+        return 10 * len(self.bodies) + self.gains.shape[1]
+
+    def _scalars(self) -> Iterator[_Scalar]:
+        t, problem = self.given, self.problem
+        slabs = {g.key: (g, dict(zip(g.columns, g.slab, strict=True))) for g in problem.groups if not any(
+            v for k, v in g.shape if k != "ratio")}  # fmt: skip
+        for j in self.known:
+            n = self.model.joints[j]
+            span = problem.joints[j][0].span
+            yield _Scalar(f"{n} coulomb_Nm", n, "coulomb_Nm", t.coulomb[j], span.torque, 0.0)
+            yield _Scalar(
+                f"{n} viscous_Nms_per_rad", n, "viscous_Nms_per_rad", t.viscous[j], span.torque / span.speed, 0.0
+            )
+            yield _Scalar(f"{n} armature_kgm2", n, "armature_kgm2", t.armature[j], span.torque / span.acceleration, 0.0)
+            if ("back_emf", n) in slabs:
+                yield _Scalar(f"{n} braking", n, "braking_Nms_per_rad", 0.0, span.torque / span.speed, 0.0, False)
+            yield _Scalar(f"{n} offset_Nm", n, "offset_Nm", 0.0, span.torque, in_model=False)
+            gain = FREE_GAIN if j in self.free else GAIN
+            if len(self.known) > 1 or j in self.free:
+                yield _Scalar(f"{n} scale", n, "gain", 0.0, gain, in_model=False)
+            yield _Scalar(f"{n} delay_s", n, "delay_s", 0.0, DELAY_S, in_model=False)
+        for j, n in enumerate(self.model.joints):
+            if j:
+                yield _Scalar(f"{n} zero", n, "zero_rad", 0.0, ZERO_RAD)
+            ratio = self._coupling(j)
+            if ratio:
+                span = problem.joints[j][0].span
+                sizes = span.torque, span.torque / span.speed, span.torque / span.acceleration
+                for k, name in enumerate(("coupled_coulomb_Nm", "coupled_viscous_Nms_per_rad", "coupled_armature_kgm2")):
+                    yield _Scalar(f"{n} coupled {ratio:+.0f} {k}", n, name, 0.0, sizes[k], 0.0)
+        if t.gravity.any():
+            for i in range(2):
+                yield _Scalar(f"tilt {i}", "base", f"tilt_{i + 1}_rad", 0.0, TILT_RAD)
+
+    def _coupling(self, j: int) -> float:
+        """Ratio 1 or -1 if the motor of a joint turns with the joint before it, too; else 0."""
+        turns = np.linalg.inv(self.trials.runs[0].log.drive.coupling)
+        if not j or not {j, j - 1} <= set(self.known):
+            return 0.0
+        ratio = turns[j, j - 1] / turns[j, j]
+        return float(np.sign(ratio)) if abs(abs(ratio) - 1.0) < RATIO else 0.0
+
+    def _gain_basis(self) -> Array:
+        """Columns from standard normal variables to the scalars, shape (S, S or S - 1).
+
+        Without a weight, torques tell masses and gains only up to a common factor, so the mean gain of drives with
+        known torques is held at 1.
+        """
+        out = np.diag([s.prior for s in self.scalars])
+        tied = [i for i, s in enumerate(self.scalars) if s.name == "gain" and s.prior == GAIN]
+        if not tied:
+            return out
+        even = np.full((len(tied), 1), len(tied) ** -0.5)
+        rest = np.linalg.qr(np.column_stack([even, np.eye(len(tied))[:, :-1]]))[0][:, 1:]
+        out[np.ix_(tied, tied[:-1])] = GAIN * rest
+        return np.delete(out, tied[-1], axis=1)
+
+    def _split(self, u: Array) -> tuple[list[Array], Array]:
+        n = 10 * len(self.bodies)
+        return list(u[:n].reshape(-1, 10)), u[n:]
+
+    def x(self, u: Array) -> Array:
+        """Inertial parameters of all links and deviations of all scalars, shape (10 B + S,)."""
+        bodies, rest = self._split(u)
+        return np.concatenate([b.parameters(v) for b, v in zip(self.bodies, bodies, strict=True)] + [self.gains @ rest])
+
+    def jacobian(self, u: Array) -> Array:
+        """Derivatives of ``x``, shape (10 B + S, U)."""
+        bodies, _ = self._split(u)
+        n = 10 * len(self.bodies)
+        out = np.zeros((n + len(self.scalars), len(u)))
+        for k, (b, v) in enumerate(zip(self.bodies, bodies, strict=True)):
+            out[10 * k : 10 * k + 10, 10 * k : 10 * k + 10] = b.jacobian(v)
+        out[n:, n:] = self.gains
+        return out
+
+    # --- the linear problem
+
+    def _linear(self) -> JointProblem:
+        t, before = self.tree, self.given
+        parts: list[Signals] = []
+        for s in self.trials.runs:
+            inverse = s.inverse + torque_of(t, s.q, s.dq, s.ddq) - rigid_torque(s.motion)
+            parts.append(replace(s, tree=t, inverse=inverse + (t.armature - before.armature) * s.ddq))
+        return joint_problem(self.model, parts, self.values, self.options)
+
+    def _columns(self) -> NDArray[np.intp]:
+        """Columns of the problem that are fitted, in the order of ``x``."""
+        place = {label: k for k, label in enumerate(self.problem.labels)}
+        names = [f"payload {self.model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
+        return np.array([place[n] for n in [*names, *(s.label for s in self.scalars)]])
+
+    def _at(self) -> Array:
+        """Value in ``x`` at which each column of the problem is 0."""
+        now = [inertial_parameters(t.mass[b], t.com[b], t.inertia[b]) for t in [self.tree] for b in self.links]
+        own = []
+        for s in self.scalars:
+            joint = self.model.joints.index(s.place) if s.place in self.model.joints else -1
+            size = {
+                "coulomb_Nm": self.tree.coulomb - self.given.coulomb,
+                "viscous_Nms_per_rad": self.tree.viscous - self.given.viscous,
+                "armature_kgm2": self.tree.armature - self.given.armature,
+            }.get(s.name)
+            own.append(0.0 if size is None else float(size[joint]))
+        return np.concatenate([*now, own])
+
+    def step(self) -> float:
+        """Fit around the current values, and move there; return the largest step in standard errors."""
+        self.problem = self._linear()
+        columns, at = self._columns(), self._at()
+        prior = self.problem.prior((), None)
+        nuisance = [
+            k for k, n in enumerate(self.problem.labels)
+            if prior[k] and any(word in n for word in (" form ", " rest ", " turning ", " length "))
+        ]  # fmt: skip
+        slabs = np.zeros(len(prior))
+        slabs[nuisance] = prior[nuisance]
+        J = self.jacobian(self.u)
+        slabs[columns] = np.sum(J**2, axis=1)
+        variance = floor_of(self.problem, slabs)
+        active = np.sort(np.concatenate([columns, np.array(nuisance, dtype=np.intp)]))
+        self.series, each = in_parts(self.problem, active, variance, self.trials)
+        self.normals = [(G, b) for G, b, _, _ in each]
+        self.rows, self.variance = [own[3] for own in each], variance
+        self.at, self.local = at, np.isin(active, [k for own, _ in self.problem.resting for k in own])
+        self.fit, self.active = np.searchsorted(active, columns), active
+        self.nuisance = np.setdiff1d(np.arange(len(active)), self.fit)
+        self.spread = prior[active[self.nuisance]]
+        before = self.u
+        self.u, self.covariance = self.solved(range(len(each)))
+        se = np.sqrt(np.diag(self.covariance))
+        self._move()
+        return float(np.max(np.abs(self.u - before) / se))
+
+    def solved(self, parts: Sequence[int]) -> tuple[Array, Array]:
+        """Posterior mode and covariance of u from some parts."""
+        G = sum((self.normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
+        b = sum((self.normals[k][1] for k in parts), np.zeros(len(self.active)))
+        # Integrate the nuisance parameters out.
+        f, n = self.fit, self.nuisance
+        inner = G[np.ix_(n, n)] + np.diag(1.0 / self.spread)
+        gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], b[n]]))
+        H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, :-1]
+        g = b[f] - G[np.ix_(f, n)] @ gain[:, -1]
+        size = np.sqrt(np.maximum(np.diag(H), 1e-300))
+        eigen, turn = np.linalg.eigh(H / np.outer(size, size))
+        keep = eigen > 1e-13 * eigen[-1]
+        root = np.sqrt(eigen[keep])[:, None] * turn[:, keep].T * size  # root' root = H
+        aim = (turn[:, keep].T @ (g / size)) / np.sqrt(eigen[keep]) + root @ self.at
+
+        least = np.full(self.count, -np.inf)
+        first = 10 * len(self.bodies)
+        for i, s in enumerate(self.scalars):
+            if np.isfinite(s.least):
+                column = int(np.flatnonzero(self.gains[i])[0])
+                least[first + column] = (s.least - s.model) / self.gains[i, column] - 1e-12
+
+        def residual(u: Array) -> Array:
+            return np.concatenate([root @ self.x(u) - aim, u])
+
+        def slope(u: Array) -> Array:
+            return np.vstack([root @ self.jacobian(u), np.eye(len(u))])
+
+        start = np.maximum(self.u, least + 1e-9)
+        found = least_squares(residual, start, slope, bounds=(least, np.inf), x_scale="jac", ftol=1e-12, xtol=1e-12)
+        J = slope(found.x)
+        return found.x, np.linalg.inv(J.T @ J)
+
+    def _move(self) -> None:
+        """Put the current values into the tree and into the linearisation point."""
+        x, n = self.x(self.u), 10 * len(self.bodies)
+        mass, com, inertia = (a.copy() for a in (self.given.mass, self.given.com, self.given.inertia))
+        for k, b in enumerate(self.links):
+            own = central(x[10 * k : 10 * k + 10])
+            mass[b], com[b] = own[0], own[1:4]
+            xx, yy, zz, xy, xz, yz = own[4:]
+            inertia[b] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        tables = {name: getattr(self.given, name).copy() for name in ("coulomb", "viscous", "armature")}
+        self.values = {}
+        for s, value in zip(self.scalars, x[n:], strict=True):
+            table = s.name.split("_", 1)[0]
+            if s.label.endswith((" coulomb_Nm", " viscous_Nms_per_rad", " armature_kgm2")):
+                tables[table][self.model.joints.index(s.place)] += value
+            elif s.name in ("gain", "delay_s", "zero_rad") or s.place == "base":
+                self.values[s.label] = float(value)
+        self.tree = replace(self.given, mass=mass, com=com, inertia=inertia, **tables)
+
+    # --- results
+
+    def zero(self) -> Array:
+        """Fitted joint zeros, shape (J,)."""
+        return np.array([self.values.get(f"{n} zero", 0.0) for n in self.model.joints])
+
+    def gravity(self) -> Array:
+        """Gravity with the fitted tilt, shape (3,)."""
+        return np.array(self.problem.parts[0].tree.gravity)
+
+    def coupled(self) -> dict[int, tuple[float, float, float, float]]:
+        """Friction, rotor and ratio of coupled drives by their second joint."""
+        x = dict(zip((s.label for s in self.scalars), self.x(self.u)[10 * len(self.bodies) :], strict=True))
+        out = {}
+        for j, n in enumerate(self.model.joints):
+            ratio = self._coupling(j)
+            if ratio:
+                coulomb, viscous, rotor = (float(x[f"{n} coupled {ratio:+.0f} {k}"]) for k in range(3))
+                out[j] = coulomb, viscous, rotor, ratio
+        return out
+
+    def parameters(self) -> Iterator[Parameter]:
+        """All parameters with their standard errors."""
+        J0, J = self.jacobian(np.zeros(self.count)), self.jacobian(self.u)
+        x, n = self.x(self.u), 10 * len(self.bodies)
+        for k, body in enumerate(self.bodies):
+            at = slice(10 * k, 10 * k + 10)
+            value, given = central(x[at]), central(body.given)
+            now, then = _slope(central, x[at]) @ J[at], _slope(central, body.given) @ J0[at]
+            se = np.sqrt(np.einsum("ij,jk,ik->i", now, self.covariance, now))
+            prior = np.linalg.norm(then, axis=1)
+            place = self.model.model.body(body.body).name
+            for i, name in enumerate(CENTRAL):
+                yield Parameter(place, name, float(given[i]), float(value[i]), float(se[i]), float(prior[i]))
+        se = np.sqrt(np.einsum("ij,jk,ik->i", J[n:], self.covariance, J[n:]))
+        for s, dx, own in zip(self.scalars, x[n:], se, strict=True):
+            prior = float(np.linalg.norm(J[n + self.scalars.index(s)]))
+            yield Parameter(
+                s.place, s.name, float(s.model), float(s.model + dx), float(own), prior, s.in_model
+            )
+
+    def combinations(self) -> Iterator[Combination]:
+        """Base parameters: pivoted QR of the columns (M. Gautier, ICRA 1991) that the logs excite."""
+        n, f = 10 * len(self.bodies), self.fit
+        G = sum((G for G, _ in self.normals), np.zeros((len(self.active),) * 2))
+        H = G[np.ix_(f[:n], f[:n])]
+        size = np.sqrt(np.maximum(np.diag(H), 1e-300))
+        seen = np.flatnonzero(size > 1e-9 * size.max())
+        eigen, turn = np.linalg.eigh(H[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
+        root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
+        _, R, order = qr(root, mode="economic", pivoting=True)
+        rank = int(np.sum(np.abs(np.diag(R)) > BASE * abs(R[0, 0])))
+        beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
+        names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
+        J, x = self.jacobian(self.u)[:n], self.x(self.u)[:n]
+        given = np.concatenate([body.given for body in self.bodies])
+        for i in range(rank):
+            way = np.zeros(n)
+            first = seen[order[i]]
+            way[first] = 1.0
+            others = seen[order[rank:]]
+            way[others] = beta[i] * size[first] ** -1 * size[others]
+            own = way @ J
+            se = float(np.sqrt(own @ self.covariance @ own))
+            if se < DETERMINED * np.linalg.norm(way @ self.jacobian(np.zeros(self.count))[:n]):
+                terms = {names[first]: 1.0} | {names[k]: float(way[k]) for k in others if abs(way[k]) > 1e-6}
+                yield Combination(terms, float(way @ given), float(way @ x), se)
+
+    def held_out(self) -> tuple[HeldOut, ...]:
+        """Predict each part from the others, with values linearised around those of all parts."""
+        out, parts = [], range(len(self.normals))
+        nothing = self.x(np.zeros(self.count)) - self.at
+        for t in parts:
+            others = [k for k in parts if k != t] or [t]
+            u, _ = self.solved(others)
+            sides = [
+                self._left(t, nothing, free=False), self._plain(t, others), self._left(t, self.x(u) - self.at),
+            ]  # fmt: skip
+            rows = self.rows[t]
+            noise = np.sqrt(np.sum(rows * self.variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
+            torque = np.sqrt(np.mean(self.trials.signals[t].torque ** 2, axis=0))
+            sizes = [self._wide(np.sqrt(np.mean(left**2, axis=0))) for left in sides]
+            out.append(HeldOut(self.trials.names[t], *sizes, self._wide(noise), torque))
+        return tuple(out)
+
+    def _left(self, t: int, values: Array, *, free: bool = True) -> Array:
+        """Residual torque of a part at given values; friction at rest, which nobody predicts, is fitted if ``free``."""
+        x = np.zeros(len(self.active))
+        x[self.fit] = values
+        if free and self.local.any():
+            G, b = self.normals[t]
+            at = np.flatnonzero(self.local)
+            prior = self.spread[np.searchsorted(self.nuisance, at)]
+            x[at] = np.linalg.solve(G[np.ix_(at, at)] + np.diag(1.0 / prior), (b - G @ x)[at])
+        return self.series[t].left(x)
+
+    def _plain(self, t: int, others: Sequence[int]) -> Array:
+        """The same with ordinary least squares: ten parameters a link, friction, rotor and offset a joint."""
+        names = ("coulomb_Nm", "viscous_Nms_per_rad", "armature_kgm2", "offset_Nm")
+        n = 10 * len(self.bodies)
+        at = self.fit[[*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name in names)]]
+        scale = np.sqrt(np.mean(np.concatenate([self.trials.signals[k].torque for k in others]) ** 2, axis=0))
+        scale = np.maximum(scale[list(self.known)], 1e-12)
+        A = np.concatenate([(self.series[k].columns[:, :, at] / scale[:, None]).reshape(-1, len(at)) for k in others])
+        y = np.concatenate([(self.series[k].residual / scale).ravel() for k in others])
+        size = np.linalg.norm(A, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        values = np.linalg.lstsq(A / size, y, rcond=BASE)[0] / size
+        x = np.zeros(len(self.active))
+        x[at] = values
+        free = self._left(t, x[self.fit])
+        return free
+
+    def _wide(self, sizes: Array) -> Array:
+        out = np.zeros(len(self.model.joints))
+        out[list(self.known)] = sizes
+        return out
+
+    def notes(self) -> Iterator[str]:
+        """Sentences on what the fit holds fixed."""
+        if len(self.known) > len(self.free) > 0 or not self.free:
+            yield (
+                "The mean torque gain is held at 1: without a known weight, torques determine masses, inertias and "
+                "friction only up to a common factor."
+            )
+        for motor in self.trials.motors:
+            yield motor.sentence(self.model.joints[motor.joint])
+        massless = [
+            self.model.model.body(int(b)).name for b in self.given.joint_body
+            if not any(np.isclose(self.given.mass[k], self.given.mass[k]) and self._welded(int(b), k) for k in self.links)
+        ]  # fmt: skip
+        for name in massless:
+            yield f"Link {name} has no mass in the model, so its inertial parameters are not fitted."
+
+    def _welded(self, root: int, body: int) -> bool:
+        while body != root and body not in self.given.joint_body:
+            body = int(self.given.parent[body])
+        return body == root
+
+
+def _slope(of: Callable[[Array], Array], x: Array) -> Array:
+    """Derivatives of a function by central differences, shape (outputs, inputs)."""
+    steps = 1e-5 * np.maximum(np.abs(x), 1e-6)
+    return np.column_stack([
+        (of(x + step * e) - of(x - step * e)) / (2.0 * step) for step, e in zip(steps, np.eye(len(x)), strict=True)
+    ])  # fmt: skip
