@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.optimize import least_squares
 
+from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import floor_of
 from discrepancy.joints.diagnose import Series, in_parts
 from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
@@ -41,6 +42,8 @@ DETERMINED = 0.3
 logs reduce its variance tenfold."""
 ROUNDS, SETTLED = 8, 0.1
 """Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
+LAW_STEPS, LEAST_LAW = 6, 1e-12
+"""Steps to learn how far friction deviates from its law, and its least variance, relative to the usual. Chosen."""
 LEAST_KG, LEAST_RADIUS_M = 1e-6, 1e-3
 """Least mass and radius of gyration of a link that is fitted. Chosen: below any part of a robot."""
 BASE = 1e-4
@@ -79,10 +82,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Combination:
-    """A combination of inertial parameters that the logs determine (a base parameter).
+    """A combination of parameters that the logs determine where they do not determine each (a base parameter).
 
     Attributes:
-        terms: factor by (link, parameter about the link's frame); the first has factor 1.
+        terms: factor by place and parameter, those of a link about its frame; the first has factor 1.
         model, value, se: value in the given model, posterior mean and standard error.
     """
 
@@ -121,7 +124,6 @@ class ArmCalibration:
         joints: indices of the joints with torques, from 0.
         parameters: all parameters.
         combinations: determined combinations of inertial parameters.
-        inertial: number of inertial parameters in all.
         tree: kinematic tree with the fitted numbers.
         zero: fitted joint zeros, shape (J,) [rad or m].
         gravity: in the base's frame, shape (3,) [m/s^2].
@@ -137,7 +139,6 @@ class ArmCalibration:
     joints: tuple[int, ...]
     parameters: tuple[Parameter, ...]
     combinations: tuple[Combination, ...]
-    inertial: int
     tree: Tree
     zero: Array
     gravity: Array
@@ -175,7 +176,7 @@ def calibrate_arm(
     notes = [*notes_of(logs), *at_limits(model, trials.limited), *resting(logs), *fit.notes()]
     return ArmCalibration(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
-        10 * len(fit.links), fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
+        fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
         len(trials.parts) > 1, names, tuple(notes),
     )  # fmt: skip
 
@@ -412,40 +413,55 @@ class _Fit:
     def step(self) -> float:
         """Fit around the current values, and move there; return the largest step in standard errors."""
         self.problem = self._linear()
-        columns, at = self._columns(), self._at()
+        columns, self.at = self._columns(), self._at()
         prior = self.problem.prior((), None)
-        nuisance = [
-            k for k, n in enumerate(self.problem.labels)
-            if prior[k] and any(word in n for word in (" form ", " rest ", " turning ", " length "))
-        ]  # fmt: skip
         slabs = np.zeros(len(prior))
-        slabs[nuisance] = prior[nuisance]
-        J = self.jacobian(self.u)
-        slabs[columns] = np.sum(J**2, axis=1)
-        variance = floor_of(self.problem, slabs)
-        active = np.sort(np.concatenate([columns, np.array(nuisance, dtype=np.intp)]))
-        self.series, each = in_parts(self.problem, active, variance, self.trials)
-        self.normals = [(G, b) for G, b, _, _ in each]
-        self.rows, self.variance = [own[3] for own in each], variance
-        self.at, self.local = at, np.isin(active, [k for own, _ in self.problem.resting for k in own])
-        self.fit, self.active = np.searchsorted(active, columns), active
-        self.nuisance = np.setdiff1d(np.arange(len(active)), self.fit)
-        self.spread = prior[active[self.nuisance]]
+        slabs[columns] = np.sum(self.jacobian(self.u) ** 2, axis=1)
+        rests = [k for own, _ in self.problem.resting for k in own if prior[k]]
+        laws = [k for k, n in enumerate(self.problem.labels) if prior[k] and (" form " in n or " length " in n)]
+        slabs[rests], slabs[laws] = prior[rests], prior[laws]
+        self.variance = self._noise(slabs)
+        self.active = np.flatnonzero(slabs)
+        self.series, each = in_parts(self.problem, self.active, self.variance, self.trials)
+        self.normals, self.rows = [own[:2] for own in each], [own[3] for own in each]
+        self.fit, self.rests, self.laws = (
+            np.searchsorted(self.active, np.array(k, dtype=np.intp)) for k in (columns, rests, laws)
+        )
+        self.spread = slabs[self.active]
         before = self.u
         self.u, self.covariance = self.solved(range(len(each)))
-        se = np.sqrt(np.diag(self.covariance))
         self._move()
-        return float(np.max(np.abs(self.u - before) / se))
+        return float(np.max(np.abs(self.u - before) / np.sqrt(np.diag(self.covariance))))
+
+    def _noise(self, slabs: Array) -> Array:
+        """Noise variances (C, bands), and in place the prior variances of the errors of each joint's friction law.
+
+        MacKay's step: squared values over the number of values that the logs determine.
+        """
+        cells, labels = self.problem.cells, self.problem.labels
+        families = [[k for k, n in enumerate(labels) if slabs[k] and n.startswith(f"{joint} form ")]
+                    for joint in self.model.joints]  # fmt: skip
+        variance = floor_of(self.problem, slabs)
+        for _ in range(LAW_STEPS if any(families) else 0):
+            posterior = Posterior(cells, slabs, variance)
+            for k in filter(None, families):
+                known = len(k) - np.sum(posterior.variances[k] / slabs[k])
+                factor = np.sum(posterior.mean[k] ** 2 / slabs[k]) / max(float(known), 1e-3)
+                slabs[k] *= np.clip(factor, 0.05, 20.0)
+                slabs[k] = np.maximum(slabs[k], LEAST_LAW)
+            variance = floor_of(self.problem, slabs)
+        return variance
 
     def solved(self, parts: Sequence[int]) -> tuple[Array, Array]:
         """Posterior mode and covariance of u from some parts."""
         G = sum((self.normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
         b = sum((self.normals[k][1] for k in parts), np.zeros(len(self.active)))
-        # Integrate the nuisance parameters out.
-        f, n = self.fit, self.nuisance
-        inner = G[np.ix_(n, n)] + np.diag(1.0 / self.spread)
-        gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], b[n]]))
-        H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, :-1]
+        # Integrate friction at rest out. Errors of laws and lengths stay 0, as in the model that is written.
+        f, n, e = self.fit, self.rests, self.laws
+        inner = G[np.ix_(n, n)] + np.diag(1.0 / self.spread[n])
+        gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], G[np.ix_(n, e)], b[n]]))
+        H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, : len(f)]
+        E = G[np.ix_(f, e)] - G[np.ix_(f, n)] @ gain[:, len(f) : -1]
         g = b[f] - G[np.ix_(f, n)] @ gain[:, -1]
         size = np.sqrt(np.maximum(np.diag(H), 1e-300))
         eigen, turn = np.linalg.eigh(H / np.outer(size, size))
@@ -469,7 +485,10 @@ class _Fit:
         start = np.maximum(self.u, least + 1e-9)
         found = least_squares(residual, start, slope, bounds=(least, np.inf), x_scale="jac", ftol=1e-12, xtol=1e-12)
         J = slope(found.x)
-        return found.x, np.linalg.inv(J.T @ J)
+        covariance = np.linalg.inv(J.T @ J)
+        # What such errors do to the values.
+        moved = covariance @ self.jacobian(found.x).T @ E * np.sqrt(self.spread[e])
+        return found.x, covariance + moved @ moved.T
 
     def _move(self) -> None:
         """Put the current values into the tree and into the linearisation point."""
@@ -533,30 +552,30 @@ class _Fit:
 
     def combinations(self) -> Iterator[Combination]:
         """Base parameters: pivoted QR of the columns (M. Gautier, ICRA 1991) that the logs excite."""
-        n, f = 10 * len(self.bodies), self.fit
-        G = sum((G for G, _ in self.normals), np.zeros((len(self.active),) * 2))
-        H = G[np.ix_(f[:n], f[:n])]
-        size = np.sqrt(np.maximum(np.diag(H), 1e-300))
-        seen = np.flatnonzero(size > 1e-9 * size.max())
-        eigen, turn = np.linalg.eigh(H[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
+        f, n = self.fit, 10 * len(self.bodies)
+        G = sum((G for G, _ in self.normals), np.zeros((len(self.active),) * 2))[np.ix_(f, f)]
+        size = np.sqrt(np.maximum(np.diag(G), 1e-300))
+        typical = np.linalg.norm(self.jacobian(np.zeros(self.count)), axis=1)
+        seen = np.flatnonzero(size * typical > BASE * np.max(size * typical))
+        eigen, turn = np.linalg.eigh(G[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
         root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
         _, R, order = qr(root, mode="economic", pivoting=True)
         rank = int(np.sum(np.abs(np.diag(R)) > BASE * abs(R[0, 0])))
         beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
         names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
-        J, x = self.jacobian(self.u)[:n], self.x(self.u)[:n]
-        given = np.concatenate([body.given for body in self.bodies])
+        names += [(s.place, s.name) for s in self.scalars]
+        J, J0 = self.jacobian(self.u), self.jacobian(np.zeros(self.count))
+        own = np.array([s.model for s in self.scalars])
+        value, given = (np.concatenate([x[:n], x[n:] + own]) for x in (self.x(self.u), self.x(np.zeros(self.count))))
         for i in range(rank):
-            way = np.zeros(n)
-            first = seen[order[i]]
-            way[first] = 1.0
-            others = seen[order[rank:]]
-            way[others] = beta[i] * size[first] ** -1 * size[others]
-            own = way @ J
-            se = float(np.sqrt(own @ self.covariance @ own))
-            if se < DETERMINED * np.linalg.norm(way @ self.jacobian(np.zeros(self.count))[:n]):
-                terms = {names[first]: 1.0} | {names[k]: float(way[k]) for k in others if abs(way[k]) > 1e-6}
-                yield Combination(terms, float(way @ given), float(way @ x), se)
+            first, others = seen[order[i]], seen[order[rank:]]
+            way = np.zeros(len(value))
+            way[first], way[others] = 1.0, beta[i] / size[first] * size[others]
+            way[np.abs(way) * typical < 1e-6 * np.abs(way[first]) * typical[first]] = 0.0
+            terms = {names[k]: float(way[k]) for k in (first, *others) if way[k]}
+            se = float(np.sqrt(way @ J @ self.covariance @ J.T @ way))
+            if len(terms) > 1 and se < DETERMINED * np.linalg.norm(way @ J0):
+                yield Combination(terms, float(way @ given), float(way @ value), se)
 
     def held_out(self) -> tuple[HeldOut, ...]:
         """Predict each part from the others, with values linearised around those of all parts."""
@@ -579,11 +598,9 @@ class _Fit:
         """Residual torque of a part at given values; friction at rest, which nobody predicts, is fitted if ``free``."""
         x = np.zeros(len(self.active))
         x[self.fit] = values
-        if free and self.local.any():
-            G, b = self.normals[t]
-            at = np.flatnonzero(self.local)
-            prior = self.spread[np.searchsorted(self.nuisance, at)]
-            x[at] = np.linalg.solve(G[np.ix_(at, at)] + np.diag(1.0 / prior), (b - G @ x)[at])
+        if free:
+            (G, b), at = self.normals[t], self.rests
+            x[at] = np.linalg.solve(G[np.ix_(at, at)] + np.diag(1.0 / self.spread[at]), (b - G @ x)[at])
         return self.series[t].left(x)
 
     def _plain(self, t: int, others: Sequence[int]) -> Array:
