@@ -46,8 +46,9 @@ LAW_STEPS, LEAST_LAW = 6, 1e-12
 """Steps to learn how far friction deviates from its law, and its least variance, relative to the usual. Chosen."""
 LEAST_KG, LEAST_RADIUS_M = 1e-6, 1e-3
 """Least mass and radius of gyration of a link that is fitted. Chosen: below any part of a robot."""
-BASE = 1e-4
-"""Singular values over the largest below which columns count as dependent. Chosen: 0.01 % of the torques."""
+BASE, DEPENDENT = 1e-4, 1e-2
+"""Singular values over the largest below which columns count as dependent in least squares, and in the combinations
+that are told. Chosen."""
 RATIO = 0.05
 """Largest difference between a drive's coupling and the ratios 1 and -1 that the columns of coupled drives have."""
 
@@ -412,6 +413,14 @@ class _Fit:
 
     def step(self) -> float:
         """Fit around the current values, and move there; return the largest step in standard errors."""
+        self.prepare()
+        before = self.u
+        self.u, self.covariance = self.solved(range(len(self.normals)))
+        self.jump(self.x(self.u))
+        return float(np.max(np.abs(self.u - before) / np.sqrt(np.diag(self.covariance))))
+
+    def prepare(self) -> None:
+        """Build the normal equations of all parts around the current values."""
         self.problem = self._linear()
         columns, self.at = self._columns(), self._at()
         prior = self.problem.prior((), None)
@@ -419,8 +428,10 @@ class _Fit:
         slabs[columns] = np.sum(self.jacobian(self.u) ** 2, axis=1)
         rests = [k for own, _ in self.problem.resting for k in own if prior[k]]
         laws = [k for k, n in enumerate(self.problem.labels) if prior[k] and (" form " in n or " length " in n)]
-        slabs[rests], slabs[laws] = prior[rests], prior[laws]
-        self.variance = self._noise(slabs)
+        slabs[rests] = prior[rests]
+        self.variance = floor_of(self.problem, slabs)  # with what the friction's law leaves
+        slabs[laws] = prior[laws]
+        self._learn(slabs)
         self.active = np.flatnonzero(slabs)
         self.series, each = in_parts(self.problem, self.active, self.variance, self.trials)
         self.normals, self.rows = [own[:2] for own in each], [own[3] for own in each]
@@ -428,29 +439,23 @@ class _Fit:
             np.searchsorted(self.active, np.array(k, dtype=np.intp)) for k in (columns, rests, laws)
         )
         self.spread = slabs[self.active]
-        before = self.u
-        self.u, self.covariance = self.solved(range(len(each)))
-        self._move()
-        return float(np.max(np.abs(self.u - before) / np.sqrt(np.diag(self.covariance))))
 
-    def _noise(self, slabs: Array) -> Array:
-        """Noise variances (C, bands), and in place the prior variances of the errors of each joint's friction law.
+    def _learn(self, slabs: Array) -> None:
+        """Learn, in place, the prior variances of the errors of each joint's friction law.
 
         MacKay's step: squared values over the number of values that the logs determine.
         """
-        cells, labels = self.problem.cells, self.problem.labels
+        labels = self.problem.labels
         families = [[k for k, n in enumerate(labels) if slabs[k] and n.startswith(f"{joint} form ")]
                     for joint in self.model.joints]  # fmt: skip
+        families = [k for k in families if k]
         variance = floor_of(self.problem, slabs)
-        for _ in range(LAW_STEPS if any(families) else 0):
-            posterior = Posterior(cells, slabs, variance)
-            for k in filter(None, families):
+        for _ in range(LAW_STEPS if families else 0):
+            posterior = Posterior(self.problem.cells, slabs, variance)
+            for k in families:
                 known = len(k) - np.sum(posterior.variances[k] / slabs[k])
                 factor = np.sum(posterior.mean[k] ** 2 / slabs[k]) / max(float(known), 1e-3)
-                slabs[k] *= np.clip(factor, 0.05, 20.0)
-                slabs[k] = np.maximum(slabs[k], LEAST_LAW)
-            variance = floor_of(self.problem, slabs)
-        return variance
+                slabs[k] = np.maximum(slabs[k] * np.clip(factor, 0.05, 20.0), LEAST_LAW)
 
     def solved(self, parts: Sequence[int]) -> tuple[Array, Array]:
         """Posterior mode and covariance of u from some parts."""
@@ -490,9 +495,9 @@ class _Fit:
         moved = covariance @ self.jacobian(found.x).T @ E * np.sqrt(self.spread[e])
         return found.x, covariance + moved @ moved.T
 
-    def _move(self) -> None:
-        """Put the current values into the tree and into the linearisation point."""
-        x, n = self.x(self.u), 10 * len(self.bodies)
+    def jump(self, x: Array) -> None:
+        """Put values, in the form of ``x``, into the tree and into the linearisation point."""
+        n = 10 * len(self.bodies)
         mass, com, inertia = (a.copy() for a in (self.given.mass, self.given.com, self.given.inertia))
         for k, b in enumerate(self.links):
             own = central(x[10 * k : 10 * k + 10])
@@ -551,22 +556,24 @@ class _Fit:
             )
 
     def combinations(self) -> Iterator[Combination]:
-        """Base parameters: pivoted QR of the columns (M. Gautier, ICRA 1991) that the logs excite."""
-        f, n = self.fit, 10 * len(self.bodies)
+        """Base parameters: pivoted QR of the columns (M. Gautier, ICRA 1991) of masses and rotors that the logs excite."""
+        n = 10 * len(self.bodies)
+        at = np.array([*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name.endswith("armature_kgm2"))])
+        f = self.fit[at]
         G = sum((G for G, _ in self.normals), np.zeros((len(self.active),) * 2))[np.ix_(f, f)]
         size = np.sqrt(np.maximum(np.diag(G), 1e-300))
-        typical = np.linalg.norm(self.jacobian(np.zeros(self.count)), axis=1)
+        J, J0 = self.jacobian(self.u)[at], self.jacobian(np.zeros(self.count))[at]
+        typical = np.linalg.norm(J0, axis=1)
         seen = np.flatnonzero(size * typical > BASE * np.max(size * typical))
         eigen, turn = np.linalg.eigh(G[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
         root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
         _, R, order = qr(root, mode="economic", pivoting=True)
-        rank = int(np.sum(np.abs(np.diag(R)) > BASE * abs(R[0, 0])))
+        rank = int(np.sum(np.abs(np.diag(R)) > DEPENDENT * abs(R[0, 0])))
         beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
         names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
-        names += [(s.place, s.name) for s in self.scalars]
-        J, J0 = self.jacobian(self.u), self.jacobian(np.zeros(self.count))
-        own = np.array([s.model for s in self.scalars])
-        value, given = (np.concatenate([x[:n], x[n:] + own]) for x in (self.x(self.u), self.x(np.zeros(self.count))))
+        names += [(self.scalars[i].place, self.scalars[i].name) for i in at[n:] - n]
+        own = np.concatenate([np.zeros(n), [s.model for s in self.scalars]])
+        value, given = ((self.x(u) + own)[at] for u in (self.u, np.zeros(self.count)))
         for i in range(rank):
             first, others = seen[order[i]], seen[order[rank:]]
             way = np.zeros(len(value))
