@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -141,17 +140,19 @@ def combined(found: ArmCalibration, truth: Truth) -> list[float]:
     return out
 
 
-def at_truth(model: SerialModel, log: JointLog, truth: Mapping[tuple[str, str], float]) -> list[np.ndarray]:
-    """Torques left with the true numbers, rms of each part and joint; lengths, which nobody knows, as modelled."""
+def at_truth(true: arm.Healthy, log: JointLog, truth: Truth, folder: Path) -> list[np.ndarray]:
+    """Torques left with the true model, rms of each part and joint."""
+    path = folder / "true.xml"
+    true.spec.compile()
+    path.write_text(true.spec.to_xml(), encoding="utf-8")
+    model = load_model(path)
     fit = _Fit(model, trials_of(model, [log]))
-    x = []
-    for body in fit.bodies:
-        t = [truth[model.model.body(body.body).name, n] for n in CENTRAL]
-        x.append(inertial_parameters(t[0], np.array(t[1:4]), full(np.array(t[4:]))))
-    true = np.concatenate([*x, [truth[s.place, s.name] - s.model for s in fit.scalars]])
-    fit.jump(true)
+    at = fit.given_x.copy()
+    for i, s in enumerate(fit.scalars):
+        at[10 * len(fit.bodies) + i] = 0.0 if s.place == "base" else truth[s.place, s.name] - s.model
+    fit.jump(at)
     fit.prepare()
-    return [np.sqrt(np.mean(fit._left(t, true - fit.at) ** 2, axis=0)) for t in range(len(fit.normals))]
+    return [np.sqrt(np.mean(fit._left(t, at - fit.at) ** 2, axis=0)) for t in range(len(fit.normals))]
 
 
 def main(options: Options) -> None:
@@ -171,7 +172,7 @@ def main(options: Options) -> None:
             z = [(p.value - truth[p.place, p.name]) / p.se for p in told]
             both = combined(found, truth)
             all_z += z
-            best = at_truth(model, log, truth)
+            best = at_truth(true, log, truth, Path(name))
             own = [h.calibrated / b for h, b in zip(found.held_out, best, strict=True)]
             plain = [h.least_squares / b for h, b in zip(found.held_out, best, strict=True)]
             ratios.append(float(np.mean(own)))

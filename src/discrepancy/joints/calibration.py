@@ -1,9 +1,10 @@
 """Fit everything that joint logs determine about a robot: inertial parameters, friction, rotors, zeros, gains, delays.
 
-The problem is the linear one of the diagnosis, around the current values. It is solved for all parameters together with
-wide priors around the given model. Inertial parameters keep a physically consistent form: the pseudo-inertia of a link
-is U M M' U', with U U' that of the given model and M an upper triangular matrix with positive diagonal (C. Rucker and
-P. M. Wensing, "Smooth parameterization of rigid-body inertia", RA-L 2022). M = 1 is the given model.
+The problem is the linear one of the diagnosis, around the current values. It is solved for all parameters together, with
+wide priors around the given model. The prior of a link's inertial parameters is the log-determinant divergence of its
+pseudo-inertia P from that of the given model, tr(P0^-1 P) - log det(P0^-1 P) - 4: it is convex in the parameters, and
+infinite where they are not physically consistent (T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic
+identification: a convex programming approach", T-RO 2020).
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
-from scipy.optimize import least_squares
 
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import floor_of
@@ -29,9 +29,9 @@ from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.mjcf import real_inertia
 
-BODY = 0.4
-"""Prior standard deviation of each entry of M. Chosen: masses within a factor of 2, centres of mass within 0.4 radii of
-gyration, inertias within a factor of 2."""
+BODY = 0.3
+"""Half the prior standard deviation of the logarithm of a mass. Chosen: masses are known within a factor of 2; the
+divergence then lets centres of mass move by 0.85 radii of gyration, and second moments change by a factor of 3."""
 ZERO_RAD, TILT_RAD, GAIN, DELAY_S = 0.01, 0.02, 0.02, 2e-3
 """Prior standard deviations of joint zeros [rad or m], base tilt [rad], torque gains and delays. Chosen: five times those
 of a calibrated robot."""
@@ -44,6 +44,8 @@ ROUNDS, SETTLED = 8, 0.1
 """Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
 LAW_STEPS, LEAST_LAW = 6, 1e-12
 """Steps to learn how far friction deviates from its law, and its least variance, relative to the usual. Chosen."""
+MOST_STEPS, LEAST_DROP = 200, 1e-6
+"""Most Newton steps, and the drop of the negative log posterior at which they end. Chosen."""
 LEAST_KG, LEAST_RADIUS_M = 1e-6, 1e-3
 """Least mass and radius of gyration of a link that is fitted. Chosen: below any part of a robot."""
 BASE, DEPENDENT = 1e-4, 1e-2
@@ -196,43 +198,33 @@ class _Scalar:
 
 
 class _Body:
-    """Inertial parameters of one link as a function of the entries of M, all standard normal in the prior."""
+    """Prior of the ten inertial parameters of one link about its frame's origin."""
 
     def __init__(self, tree: Tree, body: int) -> None:
-        mass, com, inertia = float(tree.mass[body]), tree.com[body], tree.inertia[body]
-        inertia = real_inertia(inertia)
+        mass, com, inertia = float(tree.mass[body]), tree.com[body], real_inertia(tree.inertia[body])
         if np.trace(inertia) < mass * LEAST_RADIUS_M**2:
             inertia = 0.4 * mass * LEAST_RADIUS_M**2 * np.eye(3)
         self.body, self.given = body, inertial_parameters(mass, com, inertia)
-        # The factor with the centre of mass in the last column: P = U U', upper triangular.
-        self.root = np.linalg.cholesky(_pseudo(self.given)[::-1, ::-1])[::-1, ::-1]
+        self.inverse = np.linalg.inv(_pseudo(self.given))
 
-    def parameters(self, u: Array) -> Array:
-        """The ten inertial parameters about the frame's origin, shape (10,)."""
-        half = self.root @ _triangle(u)[0]
-        return _moments(half @ half.T)
-
-    def jacobian(self, u: Array) -> Array:
-        """Their derivatives, shape (10, 10)."""
-        M, dM = _triangle(u)
-        half = self.root @ M
-        each = (half @ (self.root @ d).T for d in dM)
-        return np.column_stack([_moments(P + P.T) for P in each])
+    def slopes(self, p: Array) -> tuple[float, Array, Array]:
+        """Negative log prior, its gradient (10,) and its Hessian (10, 10); infinite if ``p`` is not consistent."""
+        P, scale = _pseudo(p), 1.0 / (16.0 * BODY**2)
+        if not _positive(P):
+            return np.inf, np.zeros(10), np.eye(10)
+        each = np.linalg.inv(P) @ _PSEUDO
+        value = np.sum(self.inverse * P) - np.linalg.slogdet(P)[1] - np.linalg.slogdet(self.inverse)[1] - 4.0
+        gradient = np.einsum("ij,kji->k", self.inverse, _PSEUDO) - np.einsum("kii->k", each)
+        return scale * float(value), scale * gradient, scale * np.einsum("aij,bji->ab", each, each)
 
 
-def _triangle(u: Array) -> tuple[Array, Array]:
-    """The matrix M (4, 4) of ten entries, and its derivatives (10, 4, 4)."""
-    a, d1, d2, d3, s12, s23, s13, t1, t2, t3 = BODY * u
-    diagonal = np.exp([d1, d2, d3, 0.0])
-    M = np.diag(diagonal)
-    M[[0, 1, 0, 0, 1, 2], [1, 2, 2, 3, 3, 3]] = s12, s23, s13, t1, t2, t3
-    dM = np.zeros((10, 4, 4))
-    dM[0] = M
-    for k in range(3):
-        dM[1 + k, k, k] = diagonal[k]
-    for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
-        dM[4 + k, i, j] = 1.0
-    return np.exp(a) * M, BODY * np.exp(a) * dM
+def _positive(P: Array) -> bool:
+    """Whether a symmetric matrix is positive definite."""
+    try:
+        np.linalg.cholesky(P)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _pseudo(p: Array) -> Array:
@@ -246,11 +238,8 @@ def _pseudo(p: Array) -> Array:
     return out
 
 
-def _moments(P: Array) -> Array:
-    """The ten inertial parameters of a pseudo-inertia."""
-    second = P[:3, :3]
-    inertia = np.trace(second) * np.eye(3) - second
-    return np.array([P[3, 3], *P[:3, 3], *np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
+_PSEUDO = np.array([_pseudo(e) for e in np.eye(10)])
+"""Pseudo-inertia of one unit of each inertial parameter, shape (10, 4, 4)."""
 
 
 def central(p: Array) -> Array:
@@ -296,16 +285,18 @@ class _Fit:
         self.links = tuple(body.body for body in self.bodies)
         self.problem = self._linear()
         self.scalars = list(self._scalars())
-        self.gains = self._gain_basis()
-        self.u = np.zeros(self.count)
-        self.covariance = np.eye(self.count)
+        n, basis = 10 * len(self.bodies), self._gain_basis()
+        self.basis = np.zeros((n + len(self.scalars), n + basis.shape[1]))
+        self.basis[:n, :n], self.basis[n:, n:] = np.eye(n), basis
+        self.x = np.concatenate([*(body.given for body in self.bodies), np.zeros(len(self.scalars))])
+        self.given_x, self.curvature = self.x, np.eye(self.basis.shape[1])
+        for k, body in enumerate(self.bodies):
+            at = slice(10 * k, 10 * k + 10)
+            self.curvature[at, at] = body.slopes(body.given)[2]
+        self.prior = self.basis @ np.linalg.inv(self.curvature) @ self.basis.T
+        self.covariance = self.prior
 
     # --- parameters
-
-    @property
-    def count(self) -> int:
-        """Number of standard normal variables u."""
-        return 10 * len(self.bodies) + self.gains.shape[1]
 
     def _scalars(self) -> Iterator[_Scalar]:
         t, problem = self.given, self.problem
@@ -348,7 +339,7 @@ class _Fit:
         return float(np.sign(ratio)) if abs(abs(ratio) - 1.0) < RATIO else 0.0
 
     def _gain_basis(self) -> Array:
-        """Columns from standard normal variables to the scalars, shape (S, S or S - 1).
+        """Columns from standard normal variables to the deviations of the scalars, shape (S, S or S - 1).
 
         Without a weight, torques tell masses and gains only up to a common factor, so the mean gain of drives with
         known torques is held at 1.
@@ -361,25 +352,6 @@ class _Fit:
         rest = np.linalg.qr(np.column_stack([even, np.eye(len(tied))[:, :-1]]))[0][:, 1:]
         out[np.ix_(tied, tied[:-1])] = GAIN * rest
         return np.delete(out, tied[-1], axis=1)
-
-    def _split(self, u: Array) -> tuple[list[Array], Array]:
-        n = 10 * len(self.bodies)
-        return list(u[:n].reshape(-1, 10)), u[n:]
-
-    def x(self, u: Array) -> Array:
-        """Inertial parameters of all links and deviations of all scalars, shape (10 B + S,)."""
-        bodies, rest = self._split(u)
-        return np.concatenate([b.parameters(v) for b, v in zip(self.bodies, bodies, strict=True)] + [self.gains @ rest])
-
-    def jacobian(self, u: Array) -> Array:
-        """Derivatives of ``x``, shape (10 B + S, U)."""
-        bodies, _ = self._split(u)
-        n = 10 * len(self.bodies)
-        out = np.zeros((n + len(self.scalars), len(u)))
-        for k, (b, v) in enumerate(zip(self.bodies, bodies, strict=True)):
-            out[10 * k : 10 * k + 10, 10 * k : 10 * k + 10] = b.jacobian(v)
-        out[n:, n:] = self.gains
-        return out
 
     # --- the linear problem
 
@@ -414,10 +386,10 @@ class _Fit:
     def step(self) -> float:
         """Fit around the current values, and move there; return the largest step in standard errors."""
         self.prepare()
-        before = self.u
-        self.u, self.covariance = self.solved(range(len(self.normals)))
-        self.jump(self.x(self.u))
-        return float(np.max(np.abs(self.u - before) / np.sqrt(np.diag(self.covariance))))
+        before = self.x
+        self.x, self.covariance = self.solved(range(len(self.normals)))
+        self.jump(self.x)
+        return float(np.max(np.abs(self.x - before) / np.sqrt(np.diag(self.covariance))))
 
     def prepare(self) -> None:
         """Build the normal equations of all parts around the current values."""
@@ -425,7 +397,7 @@ class _Fit:
         columns, self.at = self._columns(), self._at()
         prior = self.problem.prior((), None)
         slabs = np.zeros(len(prior))
-        slabs[columns] = np.sum(self.jacobian(self.u) ** 2, axis=1)
+        slabs[columns] = np.diag(self.prior)
         rests = [k for own, _ in self.problem.resting for k in own if prior[k]]
         laws = [k for k, n in enumerate(self.problem.labels) if prior[k] and (" form " in n or " length " in n)]
         slabs[rests] = prior[rests]
@@ -457,8 +429,8 @@ class _Fit:
                 factor = np.sum(posterior.mean[k] ** 2 / slabs[k]) / max(float(known), 1e-3)
                 slabs[k] = np.maximum(slabs[k] * np.clip(factor, 0.05, 20.0), LEAST_LAW)
 
-    def solved(self, parts: Sequence[int]) -> tuple[Array, Array]:
-        """Posterior mode and covariance of u from some parts."""
+    def solved(self, parts: Iterable[int]) -> tuple[Array, Array]:
+        """Posterior mode of ``x`` and its covariance from some parts."""
         G = sum((self.normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
         b = sum((self.normals[k][1] for k in parts), np.zeros(len(self.active)))
         # Integrate friction at rest out. Errors of laws and lengths stay 0, as in the model that is written.
@@ -467,33 +439,62 @@ class _Fit:
         gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], G[np.ix_(n, e)], b[n]]))
         H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, : len(f)]
         E = G[np.ix_(f, e)] - G[np.ix_(f, n)] @ gain[:, len(f) : -1]
-        g = b[f] - G[np.ix_(f, n)] @ gain[:, -1]
-        size = np.sqrt(np.maximum(np.diag(H), 1e-300))
-        eigen, turn = np.linalg.eigh(H / np.outer(size, size))
-        keep = eigen > 1e-13 * eigen[-1]
-        root = np.sqrt(eigen[keep])[:, None] * turn[:, keep].T * size  # root' root = H
-        aim = (turn[:, keep].T @ (g / size)) / np.sqrt(eigen[keep]) + root @ self.at
+        g = b[f] - G[np.ix_(f, n)] @ gain[:, -1] + H @ self.at
+        information = self.basis.T @ H @ self.basis
+        y = self._mode(information, self.basis.T @ g)
+        # The prior counts with its curvature at the given model: at the mode it is too sharp near impossible bodies.
+        inverse = self.basis @ np.linalg.inv(information + self.curvature)
+        # What errors of laws and lengths do to the values.
+        moved = inverse @ self.basis.T @ E * np.sqrt(self.spread[e])
+        return self.basis @ y, inverse @ self.basis.T + moved @ moved.T
 
-        least = np.full(self.count, -np.inf)
-        first = 10 * len(self.bodies)
+    def _mode(self, H: Array, g: Array) -> Array:
+        """Minimum of y' H y / 2 - g' y plus the negative log prior.
+
+        Newton's method with an active set of bounds (D. P. Bertsekas, "Projected Newton methods for optimization problems
+        with simple constraints", 1982). The function is convex.
+        """
+        n = 10 * len(self.bodies)
+        least = np.full(H.shape[0], -np.inf)
         for i, s in enumerate(self.scalars):
             if np.isfinite(s.least):
-                column = int(np.flatnonzero(self.gains[i])[0])
-                least[first + column] = (s.least - s.model) / self.gains[i, column] - 1e-12
+                column = np.flatnonzero(self.basis[n + i])[0]
+                least[column] = (s.least - s.model) / self.basis[n + i, column]
 
-        def residual(u: Array) -> Array:
-            return np.concatenate([root @ self.x(u) - aim, u])
+        def slopes(y: Array) -> tuple[float, Array, Array]:
+            value = 0.5 * float(y @ H @ y) - float(g @ y) + 0.5 * float(y[n:] @ y[n:])
+            slope, bend = H @ y - g, H.copy()
+            slope[n:] += y[n:]
+            bend[range(n, len(y)), range(n, len(y))] += 1.0
+            for k, body in enumerate(self.bodies):
+                at = slice(10 * k, 10 * k + 10)
+                more = body.slopes(y[at])
+                value += more[0]
+                slope[at] += more[1]
+                bend[at, at] += more[2]
+            return value, slope, bend
 
-        def slope(u: Array) -> Array:
-            return np.vstack([root @ self.jacobian(u), np.eye(len(u))])
-
-        start = np.maximum(self.u, least + 1e-9)
-        found = least_squares(residual, start, slope, bounds=(least, np.inf), x_scale="jac", ftol=1e-12, xtol=1e-12)
-        J = slope(found.x)
-        covariance = np.linalg.inv(J.T @ J)
-        # What such errors do to the values.
-        moved = covariance @ self.jacobian(found.x).T @ E * np.sqrt(self.spread[e])
-        return found.x, covariance + moved @ moved.T
+        y = np.concatenate([*(body.given for body in self.bodies), np.maximum(0.0, least[n:])])
+        value, slope, bend = slopes(y)
+        for _ in range(MOST_STEPS):
+            held = (y <= least) & (slope > 0.0)
+            free = np.flatnonzero(~held)
+            scale = 1.0 / np.sqrt(np.diag(bend)[free])
+            step = np.zeros(len(y))
+            inner = scale[:, None] * bend[np.ix_(free, free)] * scale
+            step[free] = -scale * np.linalg.solve(inner, scale * slope[free])
+            drop = -float(slope @ step)
+            if drop < LEAST_DROP:
+                break
+            size = 1.0
+            while True:
+                new = np.maximum(y + size * step, least)
+                after = slopes(new)
+                if after[0] <= value - 1e-4 * size * drop or size < 1e-9:
+                    break
+                size *= 0.5
+            y, (value, slope, bend) = new, after
+        return y
 
     def jump(self, x: Array) -> None:
         """Put values, in the form of ``x``, into the tree and into the linearisation point."""
@@ -526,7 +527,7 @@ class _Fit:
 
     def coupled(self) -> dict[int, tuple[float, float, float, float]]:
         """Friction, rotor and ratio of coupled drives by their second joint."""
-        x = dict(zip((s.label for s in self.scalars), self.x(self.u)[10 * len(self.bodies) :], strict=True))
+        x = dict(zip((s.label for s in self.scalars), self.x[10 * len(self.bodies) :], strict=True))
         out = {}
         for j, n in enumerate(self.model.joints):
             ratio = self._coupling(j)
@@ -537,23 +538,22 @@ class _Fit:
 
     def parameters(self) -> Iterator[Parameter]:
         """All parameters with their standard errors."""
-        J0, J = self.jacobian(np.zeros(self.count)), self.jacobian(self.u)
-        x, n = self.x(self.u), 10 * len(self.bodies)
         for k, body in enumerate(self.bodies):
             at = slice(10 * k, 10 * k + 10)
-            value, given = central(x[at]), central(body.given)
-            now, then = _slope(central, x[at]) @ J[at], _slope(central, body.given) @ J0[at]
-            se = np.sqrt(np.einsum("ij,jk,ik->i", now, self.covariance, now))
-            prior = np.linalg.norm(then, axis=1)
+            value, given = central(self.x[at]), central(body.given)
+            se, prior = (
+                np.sqrt(np.diag(slope @ covariance[at, at] @ slope.T))
+                for slope, covariance in (
+                    (_slope(central, self.x[at]), self.covariance), (_slope(central, body.given), self.prior))
+            )  # fmt: skip
             place = self.model.model.body(body.body).name
             for i, name in enumerate(CENTRAL):
                 yield Parameter(place, name, float(given[i]), float(value[i]), float(se[i]), float(prior[i]))
-        se = np.sqrt(np.einsum("ij,jk,ik->i", J[n:], self.covariance, J[n:]))
-        for s, dx, own in zip(self.scalars, x[n:], se, strict=True):
-            prior = float(np.linalg.norm(J[n + self.scalars.index(s)]))
-            yield Parameter(
-                s.place, s.name, float(s.model), float(s.model + dx), float(own), prior, s.in_model
-            )
+        n = 10 * len(self.bodies)
+        se, prior = (np.sqrt(np.diag(covariance)[n:]) for covariance in (self.covariance, self.prior))
+        for i, s in enumerate(self.scalars):
+            value = float(s.model + self.x[n + i])
+            yield Parameter(s.place, s.name, float(s.model), value, float(se[i]), float(prior[i]), s.in_model)
 
     def combinations(self) -> Iterator[Combination]:
         """Base parameters: pivoted QR of the columns (M. Gautier, ICRA 1991) of masses and rotors that the logs excite."""
@@ -562,8 +562,8 @@ class _Fit:
         f = self.fit[at]
         G = sum((G for G, _ in self.normals), np.zeros((len(self.active),) * 2))[np.ix_(f, f)]
         size = np.sqrt(np.maximum(np.diag(G), 1e-300))
-        J, J0 = self.jacobian(self.u)[at], self.jacobian(np.zeros(self.count))[at]
-        typical = np.linalg.norm(J0, axis=1)
+        covariance, prior = self.covariance[np.ix_(at, at)], self.prior[np.ix_(at, at)]
+        typical = np.sqrt(np.diag(prior))
         seen = np.flatnonzero(size * typical > BASE * np.max(size * typical))
         eigen, turn = np.linalg.eigh(G[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
         root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
@@ -573,26 +573,25 @@ class _Fit:
         names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
         names += [(self.scalars[i].place, self.scalars[i].name) for i in at[n:] - n]
         own = np.concatenate([np.zeros(n), [s.model for s in self.scalars]])
-        value, given = ((self.x(u) + own)[at] for u in (self.u, np.zeros(self.count)))
+        value, given = ((x + own)[at] for x in (self.x, self.given_x))
         for i in range(rank):
             first, others = seen[order[i]], seen[order[rank:]]
             way = np.zeros(len(value))
             way[first], way[others] = 1.0, beta[i] / size[first] * size[others]
             way[np.abs(way) * typical < 1e-6 * np.abs(way[first]) * typical[first]] = 0.0
             terms = {names[k]: float(way[k]) for k in (first, *others) if way[k]}
-            se = float(np.sqrt(way @ J @ self.covariance @ J.T @ way))
-            if len(terms) > 1 and se < DETERMINED * np.linalg.norm(way @ J0):
+            se = float(np.sqrt(way @ covariance @ way))
+            if len(terms) > 1 and se < DETERMINED * np.sqrt(way @ prior @ way):
                 yield Combination(terms, float(way @ given), float(way @ value), se)
 
     def held_out(self) -> tuple[HeldOut, ...]:
         """Predict each part from the others, with values linearised around those of all parts."""
         out, parts = [], range(len(self.normals))
-        nothing = self.x(np.zeros(self.count)) - self.at
+        nothing = self.given_x - self.at
         for t in parts:
             others = [k for k in parts if k != t] or [t]
-            u, _ = self.solved(others)
             sides = [
-                self._left(t, nothing, free=False), self._plain(t, others), self._left(t, self.x(u) - self.at),
+                self._left(t, nothing, free=False), self._plain(t, others), self._left(t, self.solved(others)[0] - self.at),
             ]  # fmt: skip
             rows = self.rows[t]
             noise = np.sqrt(np.sum(rows * self.variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
