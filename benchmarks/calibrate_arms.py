@@ -25,6 +25,7 @@ from discrepancy.joints.calibration import CENTRAL, ArmCalibration, _Fit, calibr
 from discrepancy.joints.mechanics import horizontal, inertial_parameters
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.trials import trials_of
+from estimator.statistics import rms
 from joints import arm
 from mocobot_logs.joints.joint_log import JointLog
 
@@ -120,7 +121,9 @@ def truth_of(true: arm.Healthy, model: SerialModel) -> Truth:
         }
     gravity = np.array(model.model.opt.gravity)
     for i, w in enumerate(horizontal(gravity)):
-        out["base", f"tilt_{i + 1}_rad"] = float(-np.cross(w, gravity) @ spec.opt.gravity / (gravity @ gravity))
+        out["base", f"tilt_{i + 1}_rad"] = float(
+            -np.cross(w, gravity) @ spec.opt.gravity / (gravity @ gravity)
+        )
     return out
 
 
@@ -158,6 +161,7 @@ def at_truth(true: arm.Healthy, log: JointLog, truth: Truth, folder: Path) -> li
 def main(options: Options) -> None:
     """Print the tables."""
     all_z: list[float] = []
+    all_both: list[float] = []
     ratios, gained, seconds = [], [], []
     with tempfile.TemporaryDirectory() as name:
         model = owners(Path(name))
@@ -172,25 +176,28 @@ def main(options: Options) -> None:
             z = [(p.value - truth[p.place, p.name]) / p.se for p in told]
             both = combined(found, truth)
             all_z += z
+            all_both += both
             best = at_truth(true, log, truth, Path(name))
             own = [h.calibrated / b for h, b in zip(found.held_out, best, strict=True)]
             plain = [h.least_squares / b for h, b in zip(found.held_out, best, strict=True)]
             ratios.append(float(np.mean(own)))
             gained.append(float(np.mean(plain)))
             print(
-                f"arm {seed}: {len(told)} of {len(found.parameters)} determined, rms {np.sqrt(np.mean(np.square(z))):.2f}, "
-                f"largest {np.max(np.abs(z)):.1f}; {len(both)} combinations, rms {np.sqrt(np.mean(np.square(both))):.2f}; held "
-                f"out over truth {ratios[-1]:.3f}, least squares {gained[-1]:.3f}; {seconds[-1]:.1f} s of CPU",
+                f"arm {seed}: {len(told)} of {len(found.parameters)} determined, rms {rms(z):.2f}, largest "
+                f"{np.max(np.abs(z)):.1f}; {len(both)} combinations, rms {rms(both):.2f}; held out over truth "
+                f"{ratios[-1]:.3f}, least squares {gained[-1]:.3f}; {seconds[-1]:.1f} s of CPU",
                 flush=True,
             )
             if options.verbose:
                 for p, own_z in zip(told, z, strict=True):
                     if abs(own_z) > 3.0:
-                        print(f"    {p.place} {p.name}: {p.value:.5g} +- {p.se:.2g}, true {truth[p.place, p.name]:.5g}")
+                        print(
+                            f"    {p.place} {p.name}: {p.value:.5g} +- {p.se:.2g}, true {truth[p.place, p.name]:.5g}"
+                        )
     print(
-        f"\nrms of error over standard error {np.sqrt(np.mean(np.square(all_z))):.2f}; beyond 3: "
+        f"\nrms of error over standard error {rms(all_z):.2f}, of combinations {rms(all_both):.2f}; beyond 3: "
         f"{100 * np.mean(np.abs(all_z) > 3):.1f} %; held out over truth: median {np.median(ratios):.3f}, worst "
-        f"{max(ratios):.3f}; least squares {np.median(gained):.3f}, {max(gained):.3f}; {np.median(seconds):.1f} s of CPU"
+        f"{max(ratios):.3f}; least squares {np.median(gained):.3f}, {max(gained):.3f}; {np.median(seconds):.1f} s CPU"
     )
 
 

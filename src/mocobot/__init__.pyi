@@ -12,6 +12,7 @@ from mocobot import robots as robots
 from mocobot import serial as serial
 from mocobot import trajectories as trajectories
 from mocobot.api.calibration import Calibration as Calibration
+from mocobot.api.calibration import JointCalibration as JointCalibration
 from mocobot.api.calibration import calibrate as calibrate
 from mocobot.api.calibration import read_calibration as read_calibration
 from mocobot.api.comparison import Comparison as Comparison

@@ -36,7 +36,7 @@ INPUTS = {
     opt.Map: ("log", "model"),
     opt.Convert: ("log", "design", "map"),
     opt.Estimate: ("rec", "map", "calibration"),
-    opt.Calibrate: ("rec", "free", "prior", "map"),
+    opt.Calibrate: ("rec", "free", "prior", "model", "map"),
     opt.Watch: ("rec", "map"),
     opt.Diagnose: ("rec", "reference", "tolerances", "model", "map", "calibration"),
     opt.Compare: ("a", "b"),
@@ -128,11 +128,12 @@ def check_calibrate(options: opt.Calibrate) -> None:
     """Check the options and files of ``calibrate`` before a recording is read."""
     if not options.rec:
         raise InputError("no recording with a payload is given; name them first, those of --free after it")
+    options.check_for(options.model, options.free)
     files = [*options.rec, *options.free]
     _check_recordings(files)
     _check_folder(options, "calibration")
     _check_file(options, options.json)
-    _check_logs(files)
+    _check_logs(files, options.model)
 
 
 def check_watch(options: opt.Watch) -> None:

@@ -35,7 +35,7 @@ TASKS = {
     "Estimate": (
         {
             "estimate": "grasps, mass, centre of mass and inertia of what a team carries",
-            "calibrate": "how every robot differs from its design",
+            "calibrate": "how robots differ from their model: masses, friction, rotors, zeros",
         },
         "mocobot estimate monday.parquet tuesday.parquet --out est.json",
     ),

@@ -128,13 +128,15 @@ def _team_picture(options: opt.Estimate, found: Any, path: Path) -> list[str]:
 
 
 def calibrate(options: opt.Calibrate) -> None:
-    """Estimate how the robots differ from their design; write and print the calibration."""
+    """Estimate how the robots differ from their model; write and print the calibration."""
     notes: list[str] = []
     with stages() as (say, _):
-        found = mocobot.calibrate(options.rec, options.free, options, say=say, note=notes.append)
-        made_with = (
-            provenance("calibrate", options, inputs_of(options)) if options.out or options.json else {}
+        found = mocobot.calibrate(
+            options.rec, options.model, options.free, options, say=say, note=notes.append
         )
+        made_with = {}
+        if options.out or options.json:
+            made_with = provenance("calibrate", options, _inputs_with_model(options))
         missing = _write(found, options, made_with, say)
     print("\n".join([*notes, str(found)]))
     if options.out:
@@ -148,7 +150,7 @@ def diagnose(options: opt.Diagnose) -> None:
     notes: list[str] = []
     made_with = {}
     if options.out or options.json:
-        made_with = provenance("diagnose", options, _inputs_of_diagnosis(options))
+        made_with = provenance("diagnose", options, _inputs_with_model(options))
     with stages() as (say, simulated):
         found = mocobot.diagnose(
             options.rec,
@@ -172,15 +174,15 @@ def diagnose(options: opt.Diagnose) -> None:
         raise NotGood(f"the verdict is {found.verdict.replace('_', ' ')}")
 
 
-def _inputs_of_diagnosis(options: opt.Diagnose) -> list[Path]:
-    """List the files that a diagnosis reads."""
+def _inputs_with_model(options: opt.Diagnose | opt.Calibrate) -> list[Path]:
+    """List the files that a command reads that may take the model of a single robot."""
     if options.model is None:
         return inputs_of(options)
     from mocobot.api.joints import map_path, read_model
 
-    robot, logs = read_model(options.model), [*options.rec, *options.reference]
+    robot, logs = read_model(options.model), [*options.rec, *getattr(options, "reference", ())]
     maps = {map_path(robot, log, options.map) for log in logs}
-    return [options.model, *sorted(maps), *logs, *_paths(options.tolerances)]
+    return [options.model, *sorted(maps), *logs, *_paths(getattr(options, "tolerances", None))]
 
 
 def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:

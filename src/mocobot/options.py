@@ -206,7 +206,7 @@ class Estimate(Files, EstimateOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateOptions(Options):
-    """Options of the calibration of a team's robots."""
+    """Options of the calibration of a team's robots, or of a single robot."""
 
     map: LogMap = None
     prior: Annotated[AnyPath | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
@@ -222,17 +222,29 @@ class CalibrateOptions(Options):
     arm_masses: Flag = False
     """Estimate the mass error of each arm (standard deviation 10 % unless the prior states one)."""
 
+    def check_for(self, model: object, free: object) -> None:
+        """Raise InputError for an option that does not apply to a single robot."""
+        if model is not None:
+            refuse_teams(
+                self, ("prior", "payload_of", "known_mass", "parallel_flanges", "tilt", "arm_masses")
+            )
+            if free:
+                raise InputError("free is of a team's robots; with a model there is none")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Calibrate(Files, CalibrateOptions):
-    """Estimate how every robot differs from its design, from recordings of a team that carries payloads."""
+    """Estimate how robots differ from their model: a team that carries payloads, or with --model a single robot."""
 
     rec: Logs
-    """Recordings (Parquet) of one team that carries payloads, or logs in any format that ``convert`` reads."""
+    """Recordings (Parquet) of one team that carries payloads, or logs in any format that ``convert`` reads; with
+    --model, joint logs of one robot."""
+    model: Model = None
     free: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="REC...")] = ()
     """Recordings of the same robots without a payload; they determine the weight of the arms."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for calibration.json, report.txt, the parameters of every robot and the model of the calibrated team."""
+    """Folder for calibration.json, report.txt, the parameters of every robot and the model of the calibrated team; with
+    --model, for as_found.xml and parameters.csv."""
     json: Json = None
     pictures: Pictures = False
     strict: Flag = False

@@ -1,9 +1,9 @@
 """Fit everything that joint logs determine about a robot: inertial parameters, friction, rotors, zeros, gains, delays.
 
-The problem is the linear one of the diagnosis, around the current values. It is solved for all parameters together, with
-wide priors around the given model. The prior of a link's inertial parameters is the log-determinant divergence of its
-pseudo-inertia P from that of the given model, tr(P0^-1 P) - log det(P0^-1 P) - 4: it is convex in the parameters, and
-infinite where they are not physically consistent (T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic
+The problem is the linear one of the diagnosis, around the current values. It is solved for all parameters together,
+with wide priors around the given model. The prior of a link's inertial parameters is the log-determinant divergence of
+its pseudo-inertia P from that of the given model, tr(P0^-1 P) - log det(P0^-1 P) - 4: it is convex in the parameters,
+and infinite where they are not physically consistent (T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic
 identification: a convex programming approach", T-RO 2020).
 """
 
@@ -18,10 +18,11 @@ from scipy.linalg import qr
 
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import floor_of
-from discrepancy.joints.diagnose import Series, in_parts
+from discrepancy.joints.causes import parameter_name
+from discrepancy.joints.diagnose import in_parts
 from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import MOMENTS, Given, JointProblem, Values, joint_problem
+from discrepancy.joints.problem import MOMENTS, Given, JointProblem, joint_problem
 from discrepancy.joints.servo import driven_by_voltage
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
@@ -33,13 +34,14 @@ BODY = 0.3
 """Half the prior standard deviation of the logarithm of a mass. Chosen: masses are known within a factor of 2; the
 divergence then lets centres of mass move by 0.85 radii of gyration, and second moments change by a factor of 3."""
 ZERO_RAD, TILT_RAD, GAIN, DELAY_S = 0.01, 0.02, 0.02, 2e-3
-"""Prior standard deviations of joint zeros [rad or m], base tilt [rad], torque gains and delays. Chosen: five times those
-of a calibrated robot."""
+"""Prior standard deviations of joint zeros [rad or m], base tilt [rad], torque gains and delays [s]. Chosen: those
+of a robot that nobody calibrated."""
 FREE_GAIN = 0.3
-"""Prior standard deviation of the gain of a drive whose torque constant is unknown. Chosen: as uncertain as the masses."""
-DETERMINED = 0.3
+"""Prior standard deviation of the gain of a drive whose torque constant is unknown. Chosen: as uncertain
+as the masses."""
+DETERMINED = 0.2
 """Largest ratio of standard error and prior standard deviation of a parameter that counts as determined. Chosen: the
-logs reduce its variance tenfold."""
+logs reduce its variance 25-fold."""
 ROUNDS, SETTLED = 8, 0.1
 """Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
 LAW_STEPS, LEAST_LAW = 6, 1e-12
@@ -66,6 +68,7 @@ class Parameter:
         value: posterior mean.
         se: standard error, that of the posterior.
         prior: prior standard deviation.
+        determined: whether the logs determine it.
         in_model: whether MJCF holds it; else it is an error of the log.
     """
 
@@ -75,12 +78,8 @@ class Parameter:
     value: float
     se: float
     prior: float
+    determined: bool
     in_model: bool = True
-
-    @property
-    def determined(self) -> bool:
-        """Whether the logs determine it."""
-        return self.se < DETERMINED * self.prior
 
 
 @dataclass(frozen=True)
@@ -307,11 +306,20 @@ class _Fit:
             span = problem.joints[j][0].span
             yield _Scalar(f"{n} coulomb_Nm", n, "coulomb_Nm", t.coulomb[j], span.torque, 0.0)
             yield _Scalar(
-                f"{n} viscous_Nms_per_rad", n, "viscous_Nms_per_rad", t.viscous[j], span.torque / span.speed, 0.0
+                f"{n} viscous_Nms_per_rad",
+                n,
+                "viscous_Nms_per_rad",
+                t.viscous[j],
+                span.torque / span.speed,
+                0.0,
             )
-            yield _Scalar(f"{n} armature_kgm2", n, "armature_kgm2", t.armature[j], span.torque / span.acceleration, 0.0)
+            yield _Scalar(
+                f"{n} armature_kgm2", n, "armature_kgm2", t.armature[j], span.torque / span.acceleration, 0.0
+            )
             if ("back_emf", n) in slabs:
-                yield _Scalar(f"{n} braking", n, "braking_Nms_per_rad", 0.0, span.torque / span.speed, 0.0, False)
+                yield _Scalar(
+                    f"{n} braking", n, "braking_Nms_per_rad", 0.0, span.torque / span.speed, 0.0, False
+                )
             yield _Scalar(f"{n} offset_Nm", n, "offset_Nm", 0.0, span.torque, in_model=False)
             gain = FREE_GAIN if j in self.free else GAIN
             if len(self.known) > 1 or j in self.free:
@@ -324,7 +332,9 @@ class _Fit:
             if ratio:
                 span = problem.joints[j][0].span
                 sizes = span.torque, span.torque / span.speed, span.torque / span.acceleration
-                for k, name in enumerate(("coupled_coulomb_Nm", "coupled_viscous_Nms_per_rad", "coupled_armature_kgm2")):
+                for k, name in enumerate(
+                    ("coupled_coulomb_Nm", "coupled_viscous_Nms_per_rad", "coupled_armature_kgm2")
+                ):
                     yield _Scalar(f"{n} coupled {ratio:+.0f} {k}", n, name, 0.0, sizes[k], 0.0)
         if t.gravity.any():
             for i in range(2):
@@ -371,7 +381,9 @@ class _Fit:
 
     def _at(self) -> Array:
         """Value in ``x`` at which each column of the problem is 0."""
-        now = [inertial_parameters(t.mass[b], t.com[b], t.inertia[b]) for t in [self.tree] for b in self.links]
+        now = [
+            inertial_parameters(t.mass[b], t.com[b], t.inertia[b]) for t in [self.tree] for b in self.links
+        ]
         own = []
         for s in self.scalars:
             joint = self.model.joints.index(s.place) if s.place in self.model.joints else -1
@@ -399,7 +411,9 @@ class _Fit:
         slabs = np.zeros(len(prior))
         slabs[columns] = np.diag(self.prior)
         rests = [k for own, _ in self.problem.resting for k in own if prior[k]]
-        laws = [k for k, n in enumerate(self.problem.labels) if prior[k] and (" form " in n or " length " in n)]
+        laws = [
+            k for k, n in enumerate(self.problem.labels) if prior[k] and (" form " in n or " length " in n)
+        ]
         slabs[rests] = prior[rests]
         self.variance = floor_of(self.problem, slabs)  # with what the friction's law leaves
         slabs[laws] = prior[laws]
@@ -429,7 +443,7 @@ class _Fit:
                 factor = np.sum(posterior.mean[k] ** 2 / slabs[k]) / max(float(known), 1e-3)
                 slabs[k] = np.maximum(slabs[k] * np.clip(factor, 0.05, 20.0), LEAST_LAW)
 
-    def solved(self, parts: Iterable[int]) -> tuple[Array, Array]:
+    def solved(self, parts: Sequence[int]) -> tuple[Array, Array]:
         """Posterior mode of ``x`` and its covariance from some parts."""
         G = sum((self.normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
         b = sum((self.normals[k][1] for k in parts), np.zeros(len(self.active)))
@@ -451,8 +465,8 @@ class _Fit:
     def _mode(self, H: Array, g: Array) -> Array:
         """Minimum of y' H y / 2 - g' y plus the negative log prior.
 
-        Newton's method with an active set of bounds (D. P. Bertsekas, "Projected Newton methods for optimization problems
-        with simple constraints", 1982). The function is convex.
+        Newton's method with an active set of bounds (D. P. Bertsekas, "Projected Newton methods for optimization
+        problems with simple constraints", 1982). The function is convex.
         """
         n = 10 * len(self.bodies)
         least = np.full(H.shape[0], -np.inf)
@@ -541,24 +555,31 @@ class _Fit:
         for k, body in enumerate(self.bodies):
             at = slice(10 * k, 10 * k + 10)
             value, given = central(self.x[at]), central(body.given)
-            se, prior = (
-                np.sqrt(np.diag(slope @ covariance[at, at] @ slope.T))
-                for slope, covariance in (
-                    (_slope(central, self.x[at]), self.covariance), (_slope(central, body.given), self.prior))
-            )  # fmt: skip
+            se = _errors(_slope(central, self.x[at]), self.covariance[at, at])
+            prior = _errors(_slope(central, body.given), self.prior[at, at])
             place = self.model.model.body(body.body).name
+            known = se < DETERMINED * prior
+            known[1:] &= known[0]  # centre and inertia are quotients by the mass
             for i, name in enumerate(CENTRAL):
-                yield Parameter(place, name, float(given[i]), float(value[i]), float(se[i]), float(prior[i]))
+                numbers = float(given[i]), float(value[i]), float(se[i]), float(prior[i])
+                yield Parameter(place, name, *numbers, bool(known[i]))
         n = 10 * len(self.bodies)
-        se, prior = (np.sqrt(np.diag(covariance)[n:]) for covariance in (self.covariance, self.prior))
+        se, prior = np.sqrt(np.diag(self.covariance)[n:]), np.sqrt(np.diag(self.prior)[n:])
+        slides = {name for name, slide in zip(self.model.joints, self.model.slides, strict=True) if slide}
         for i, s in enumerate(self.scalars):
             value = float(s.model + self.x[n + i])
-            yield Parameter(s.place, s.name, float(s.model), value, float(se[i]), float(prior[i]), s.in_model)
+            name = parameter_name(s.name, slide=s.place in slides)
+            known = bool(se[i] < DETERMINED * prior[i])
+            yield Parameter(
+                s.place, name, float(s.model), value, float(se[i]), float(prior[i]), known, s.in_model
+            )
 
     def combinations(self) -> Iterator[Combination]:
-        """Base parameters: pivoted QR of the columns (M. Gautier, ICRA 1991) of masses and rotors that the logs excite."""
+        """Base parameters of masses and rotors: pivoted QR of the columns the logs excite (M. Gautier, ICRA 1991)."""
         n = 10 * len(self.bodies)
-        at = np.array([*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name.endswith("armature_kgm2"))])
+        at = np.array(
+            [*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name.endswith("armature_kgm2"))]
+        )
         f = self.fit[at]
         G = sum((G for G, _ in self.normals), np.zeros((len(self.active),) * 2))[np.ix_(f, f)]
         size = np.sqrt(np.maximum(np.diag(G), 1e-300))
@@ -567,7 +588,7 @@ class _Fit:
         seen = np.flatnonzero(size * typical > BASE * np.max(size * typical))
         eigen, turn = np.linalg.eigh(G[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
         root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
-        _, R, order = qr(root, mode="economic", pivoting=True)
+        _, R, order = qr(root, mode="economic", pivoting=True)  # pyright: ignore[reportAssignmentType]
         rank = int(np.sum(np.abs(np.diag(R)) > DEPENDENT * abs(R[0, 0])))
         beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
         names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
@@ -590,14 +611,13 @@ class _Fit:
         nothing = self.given_x - self.at
         for t in parts:
             others = [k for k in parts if k != t] or [t]
-            sides = [
-                self._left(t, nothing, free=False), self._plain(t, others), self._left(t, self.solved(others)[0] - self.at),
-            ]  # fmt: skip
+            values = self.solved(others)[0] - self.at
+            sides = self._left(t, nothing, free=False), self._plain(t, others), self._left(t, values)
             rows = self.rows[t]
             noise = np.sqrt(np.sum(rows * self.variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
             torque = np.sqrt(np.mean(self.trials.signals[t].torque ** 2, axis=0))
-            sizes = [self._wide(np.sqrt(np.mean(left**2, axis=0))) for left in sides]
-            out.append(HeldOut(self.trials.names[t], *sizes, self._wide(noise), torque))
+            plain, least, best = (self._wide(np.sqrt(np.mean(left**2, axis=0))) for left in sides)
+            out.append(HeldOut(self.trials.names[t], plain, least, best, self._wide(noise), torque))
         return tuple(out)
 
     def _left(self, t: int, values: Array, *, free: bool = True) -> Array:
@@ -616,7 +636,9 @@ class _Fit:
         at = self.fit[[*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name in names)]]
         scale = np.sqrt(np.mean(np.concatenate([self.trials.signals[k].torque for k in others]) ** 2, axis=0))
         scale = np.maximum(scale[list(self.known)], 1e-12)
-        A = np.concatenate([(self.series[k].columns[:, :, at] / scale[:, None]).reshape(-1, len(at)) for k in others])
+        A = np.concatenate(
+            [(self.series[k].columns[:, :, at] / scale[:, None]).reshape(-1, len(at)) for k in others]
+        )
         y = np.concatenate([(self.series[k].residual / scale).ravel() for k in others])
         size = np.linalg.norm(A, axis=0)
         size = np.where(size > 0.0, size, 1.0)
@@ -633,24 +655,27 @@ class _Fit:
 
     def notes(self) -> Iterator[str]:
         """Sentences on what the fit holds fixed."""
-        if len(self.known) > len(self.free) > 0 or not self.free:
+        if len(self.free) < len(self.known):
             yield (
                 "The mean torque gain is held at 1: without a known weight, torques determine masses, inertias and "
                 "friction only up to a common factor."
             )
         for motor in self.trials.motors:
             yield motor.sentence(self.model.joints[motor.joint])
-        massless = [
-            self.model.model.body(int(b)).name for b in self.given.joint_body
-            if not any(np.isclose(self.given.mass[k], self.given.mass[k]) and self._welded(int(b), k) for k in self.links)
-        ]  # fmt: skip
-        for name in massless:
-            yield f"Link {name} has no mass in the model, so its inertial parameters are not fitted."
+        for b in dict.fromkeys(map(int, self.given.joint_body)):
+            if not any(self._welded(b, k) for k in self.links):
+                name = self.model.model.body(b).name
+                yield f"Link {name} has no mass in the model, so its inertial parameters are not fitted."
 
     def _welded(self, root: int, body: int) -> bool:
         while body != root and body not in self.given.joint_body:
             body = int(self.given.parent[body])
         return body == root
+
+
+def _errors(slope: Array, covariance: Array) -> Array:
+    """Standard errors of linear functions of values with a covariance."""
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", slope, covariance, slope)))
 
 
 def _slope(of: Callable[[Array], Array], x: Array) -> Array:

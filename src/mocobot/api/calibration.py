@@ -1,6 +1,7 @@
-"""Calibrate the robots of a team from recordings of the payloads that they carry.
+"""Calibrate the robots of a team from recordings of the payloads that they carry, or a single robot from joint logs.
 
-Folder of a calibration:
+Folder of a single robot: as_found.xml with its assets, parameters.csv, calibration.json (see
+``discrepancy.joints.calibrated``) and report.txt. Folder of a team:
 
 calibration.json           see ``estimator.calibrate.json``
 report.txt                 text that the command prints
@@ -15,10 +16,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from discrepancy.joints import calibrated
+from discrepancy.joints.calibration import ArmCalibration, calibrate_arm
 from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
 from estimator.calibrate.flanges import in_drawing_frames
@@ -33,6 +36,9 @@ from mocobot.api.recordings import Given, Say, calibration_of, quiet, recordings
 from mocobot.checks import CALIBRATION
 from mocobot.options import CalibrateOptions, made
 from mocobot.results import Folder, public
+
+if TYPE_CHECKING:
+    from mocobot.api.joints import GivenLogs, GivenModel
 
 TILT_RAD, ARM_MASS_RATIO = float(np.deg2rad(0.2)), 0.1
 """Prior standard deviations of base tilt [rad] and relative arm mass, if requested and the prior has none. Chosen."""
@@ -104,20 +110,83 @@ class Calibration(Folder, Below):
         return notes
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class JointCalibration(Folder):
+    """A single robot as its joint logs have it; prints as text, writes a folder.
+
+    Attributes:
+        found: parameters with standard errors, and torques predicted for logs that were not fitted.
+    """
+
+    found: ArmCalibration
+    result = "calibration"
+
+    def __str__(self) -> str:
+        """Return the text report."""
+        return calibrated.to_text(self.found)
+
+    def __repr__(self) -> str:
+        """Return a one-line summary."""
+        told = sum(p.determined for p in self.found.parameters)
+        return f"<Calibration of {self.found.model.path.name}: {told} of {len(self.found.parameters)} parameters>"
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Sentences on what casts doubt on the numbers."""
+        return calibrated.findings(self.found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return strict JSON values with units in the keys; see ``discrepancy.joints.calibrated``."""
+        return calibrated.to_dict(self.found)
+
+    def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> list[str]:
+        """Write all files that the docstring of this module lists into an existing folder.
+
+        Raises:
+            InputError: a file cannot be written, or MuJoCo refuses the model.
+        """
+        calibrated.write_into(self.found, folder, **more)
+        return []
+
+
+@overload
 def calibrate(
     logs: Given | Iterable[Given],
+    model: None = None,
     free: Given | Iterable[Given] = (),
     options: CalibrateOptions | None = None,
     *,
     say: Say = quiet,
     note: Say = quiet,
     **fields: Any,
-) -> Calibration:
-    """Estimate how every robot differs from its design, and the payloads that the team carries.
+) -> Calibration: ...
+@overload
+def calibrate(
+    logs: GivenLogs,
+    model: GivenModel,
+    free: Given | Iterable[Given] = (),
+    options: CalibrateOptions | None = None,
+    *,
+    say: Say = quiet,
+    note: Say = quiet,
+    **fields: Any,
+) -> JointCalibration: ...
+def calibrate(
+    logs: Any,
+    model: GivenModel | None = None,
+    free: Any = (),
+    options: CalibrateOptions | None = None,
+    *,
+    say: Say = quiet,
+    note: Say = quiet,
+    **fields: Any,
+) -> Calibration | JointCalibration:
+    """Estimate how every robot differs from its model, and the payloads that a team carries.
 
     Args:
         logs: recordings of one team with payloads, or paths of recordings or of logs that ``convert`` reads without
-            further options. With several, each can be predicted from the others.
+            further options. With several, each can be predicted from the others. With a model, logs of its joints.
+        model: single robot whose joints were logged, or path of its file; None for a team.
         free: recordings of the same robots without a payload, which determine the weight of the arms.
         options: options of the calibration; ``fields`` replace its fields. Labels and weights may be mappings, such as
             ``known_mass={"c": (10.48, 0.005)}`` [kg]; for a single payload, a number suffices.
@@ -128,6 +197,13 @@ def calibrate(
         InputError: a recording cannot be used, recordings do not belong together, or a weight has no payload.
     """
     chosen = made(CalibrateOptions, options, fields)
+    chosen.check_for(model, free)
+    if model is not None:
+        from mocobot.api.joints import read_logs, read_model
+
+        robot = read_model(model)
+        say("reading")
+        return JointCalibration(calibrate_arm(robot, read_logs(logs, robot, map=chosen.map), say))
     prior = chosen.prior
     assumed = prior if isinstance(prior, Prior) else Prior() if prior is None else read_prior(prior)
     if chosen.tilt and assumed.tilt_rad == 0:

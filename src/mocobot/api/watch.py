@@ -200,7 +200,7 @@ def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], obj
         seen.estimate = estimate(carried, say=say)
         if seen.estimate.contradicts:
             say("calibrating")
-            seen.calibration = calibrate(carried, seen.of(free=True), say=say)
+            seen.calibration = calibrate(carried, None, seen.of(free=True), say=say)
             seen.estimate = estimate(carried, calibration=seen.calibration, say=say)
     except InputError as error:
         seen.lines.append(f"No estimate: {error}.")

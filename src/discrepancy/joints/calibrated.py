@@ -1,0 +1,310 @@
+"""A calibration of a robot from joint logs as text, JSON values, a table and a model.
+
+Keys of ``calibration.json``:
+
+format, version     "mocobot-joint-calibration", 1
+model               path of the given model
+logs                names of the logs
+parameters          list of {place, parameter, model, value, se, prior_se, determined, in_model}; units are in the
+                    names, ``in_model`` is false for errors of the log, ``prior_se`` is the error before the logs
+combinations        list of {terms, model, value, se}: what the logs determine where they do not determine each
+                    parameter; terms are lists of {place, parameter, factor}, inertial ones about the link's frame
+held_out            {joint: {model, least_squares, calibrated, noise, torque}}: rms of the torque that predictions from
+                    other parts leave, of the noise and of the torque [N m or N]
+validated           false if the only part was predicted from itself
+notes               sentences
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
+from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
+from discrepancy.joints.model import load_spec
+from estimator.errors import InputError
+from estimator.files import write_json, write_text
+from estimator.statistics import measured, rms
+from mocobot_sim.model_check import check_named
+from mocobot_sim.serial.effects import RobotEffect
+from mocobot_sim.serial.extended import put, take_along
+from mocobot_sim.serial.mjcf import keep_inertials, set_inertial, with_effects
+
+FORMAT, VERSION = "mocobot-joint-calibration", 1
+MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
+HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
+WORDS = {
+    "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
+    "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "zero": "zero",
+    "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass", "com": "centre of mass",
+    "inertia": "inertia",
+}  # fmt: skip
+UNITS = {
+    "Nms_per_rad": "N m s/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
+    "N": "N", "s": "s",
+}  # fmt: skip
+SMALL = {"rad": ("mrad", 1e3), "m": ("mm", 1e3), "s": ("ms", 1e3)}
+MISFIT = 2.0
+"""Ratio of predicted residual and noise beyond which the model lacks something. Chosen."""
+MOST_TERMS, MOST_COMBINATIONS, ROUND = 6, 12, 1e-3
+"""Terms of a combination and combinations that the text shows, and the rounding of a factor of 1."""
+
+
+def to_dict(found: ArmCalibration) -> dict[str, Any]:
+    """Plain JSON values; the module's docstring lists the keys."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "model": str(found.model.path),
+        "logs": list(found.logs),
+        "parameters": [
+            {
+                "place": p.place, "parameter": p.name, "model": p.model, "value": p.value, "se": p.se,
+                "prior_se": p.prior, "determined": p.determined, "in_model": p.in_model,
+            }
+            for p in found.parameters
+        ],
+        "combinations": [
+            {
+                "terms": [{"place": k[0], "parameter": k[1], "factor": x} for k, x in c.terms.items()],
+                "model": c.model, "value": c.value, "se": c.se,
+            }
+            for c in found.combinations
+        ],
+        "held_out": {
+            found.model.joints[j]: {n: _mean(found.held_out, n, j) for n in HELD_OUT} for j in found.joints
+        },
+        "validated": found.validated,
+        "notes": list(found.notes),
+    }  # fmt: skip
+
+
+def _mean(held: Sequence[HeldOut], name: str, joint: int) -> float:
+    """Root mean square over the parts."""
+    return rms([getattr(one, name)[joint] for one in held])
+
+
+def to_text(found: ArmCalibration) -> str:
+    """Report: the gain on held-out data, what the logs determine, and what they do not."""
+    return "\n".join(_lines(found))
+
+
+def _lines(found: ArmCalibration) -> Iterator[str]:
+    shares = {n: _share(found, n) for n in HELD_OUT[:4]}
+    which = (
+        "torques of parts that were not fitted"
+        if found.validated
+        else "the torques it was fitted to (one part only)"
+    )
+    yield (
+        f"The calibrated model leaves {_percent(shares['calibrated'])} of {which}; the given model leaves "
+        f"{_percent(shares['model'])}, ordinary least squares {_percent(shares['least_squares'])}, noise is "
+        f"{_percent(shares['noise'])}."
+    )
+    told = sum(p.determined for p in found.parameters)
+    both = f" and {len(found.combinations)} combinations of others" if found.combinations else ""
+    yield f"The logs determine {told} of {len(found.parameters)} parameters{both}."
+    yield from findings(found)
+    yield ""
+    yield f"{'rms torque':<24}{'measured':>10}{'model':>10}{'least sq.':>10}{'calibrated':>12}{'noise':>10}"
+    for j in found.joints:
+        unit = "N" if found.model.slides[j] else "N m"
+        numbers = [_mean(found.held_out, n, j) for n in ("torque", *HELD_OUT[:4])]
+        cells = "".join(f"{x:>{12 if k == 3 else 10}.3g}" for k, x in enumerate(numbers))
+        yield f"{f'{found.model.joints[j]} [{unit}]':<24.24}{cells}"
+    for title, wanted in (("Determined, in the model", True), ("Determined, of the log", False)):
+        own = [p for p in found.parameters if p.determined and p.in_model == wanted]
+        if own:
+            yield ""
+            yield f"{title:<54}{'given':>10}   found"
+            yield from (_row(found, p) for p in own)
+    if found.combinations:
+        yield ""
+        yield f"{'Determined in combination only':<54}{'given':>10}   found"
+        for c in found.combinations[:MOST_COMBINATIONS]:
+            value, se = measured(c.value, c.se)
+            yield f"  {_formula(c)}: {c.model:.4g}   {value} +- {se}"
+        if len(found.combinations) > MOST_COMBINATIONS:
+            yield f"  {len(found.combinations) - MOST_COMBINATIONS} more are in {NAME}."
+    unknown = [p for p in found.parameters if not p.determined]
+    if unknown:
+        yield ""
+        yield "Not determined by these logs, so near the given values:"
+        yield from (f"  {line}" for line in _unknown(found, unknown))
+        yield "Faster motion in more poses determines more; a known weight determines the common factor of all torques."
+    if found.notes:
+        yield ""
+        yield from found.notes
+
+
+def findings(found: ArmCalibration) -> tuple[str, ...]:
+    """Sentences on what casts doubt on the numbers."""
+    out = []
+    share = {n: _share(found, n) for n in HELD_OUT[:4]}
+    if share["calibrated"] > share["model"]:
+        out.append(
+            "It predicts worse than the given model: do not use it. Longer logs in more poses may mend that."
+        )
+    if share["calibrated"] > MISFIT * share["noise"]:
+        out.append(
+            "Much more than noise is left, so something else acts, too; `mocobot diagnose` looks for it."
+        )
+    return tuple(out)
+
+
+def _share(found: ArmCalibration, name: str) -> float:
+    """Torque left over torque, root mean square over joints and parts."""
+    return rms(
+        [
+            _mean(found.held_out, name, j) / max(_mean(found.held_out, "torque", j), 1e-12)
+            for j in found.joints
+        ]
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+
+
+def _row(found: ArmCalibration, p: Parameter) -> str:
+    what, unit, scale = described(p.name)
+    value, se = measured(scale * p.value, scale * p.se)
+    return f"  {f'{what} of {place_in_words(found, p.place)} [{unit}]':<52}{scale * p.model:>10.4g}   {value} +- {se}"
+
+
+def described(name: str) -> tuple[str, str, float]:
+    """A parameter in words, its unit and the factor to it."""
+    stem, _, rest = name.partition("_")
+    if stem == "gain":
+        return f"{WORDS[stem]} error", "%", 100.0
+    suffix = next(s for s in UNITS if name.endswith(f"_{s}"))
+    words, middle = WORDS[stem], rest.removesuffix(suffix).strip("_").replace("_", " ")
+    unit, scale = SMALL.get(UNITS[suffix], (UNITS[suffix], 1.0))
+    middle = WORDS.get(middle, middle)
+    return (
+        f"{words} {middle}".strip(),
+        SHOWN.get(unit, unit) if unit == "N m" and suffix == "N" else unit,
+        scale,
+    )
+
+
+def place_in_words(found: ArmCalibration, place: str) -> str:
+    """A joint, a link or the base in words."""
+    joints = found.model.joints
+    if place in joints:
+        return joint_in_words(joints.index(place) + 1, place)
+    return place if place == "base" else link_in_words(place)
+
+
+def _formula(c: Combination) -> str:
+    """The terms of a combination; those with equal factors and quantities share one."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for (place, name), factor in c.terms.items():
+        size = "" if abs(abs(factor) - 1.0) < ROUND else f"{abs(factor):.3g} "
+        alike.setdefault((f"{'-' if factor < 0 else '+'} {size}", name), []).append(place)
+    terms = [f"{size}{name}({', '.join(places)})" for (size, name), places in alike.items()]
+    more = f" + {len(terms) - MOST_TERMS} more" if len(terms) > MOST_TERMS else ""
+    return " ".join(terms[:MOST_TERMS]).removeprefix("+ ") + more
+
+
+def _unknown(found: ArmCalibration, parameters: Sequence[Parameter]) -> Iterator[str]:
+    by_place: dict[str, list[str]] = {}
+    for p in parameters:
+        what = described(p.name)[0]
+        stem = next((w for w in ("centre of mass", "inertia", "tilt") if what.startswith(w)), what)
+        own = by_place.setdefault(p.place, [])
+        if stem not in own:
+            own.append(stem)
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for place, names in by_place.items():
+        alike.setdefault(tuple(names), []).append(place_in_words(found, place))
+    for names, places in alike.items():
+        yield f"{', '.join(places)}: {', '.join(names)}"
+
+
+def effects_of(found: ArmCalibration) -> list[RobotEffect]:
+    """What MJCF holds beside inertial parameters, as changes of the given model."""
+    joints, out = found.model.joints, []
+    for p in found.parameters:
+        if not p.in_model or p.place not in joints:
+            continue
+        j, change = joints.index(p.place) + 1, p.value - p.model
+        if p.name.startswith("coulomb_"):
+            viscous = next(
+                q for q in found.parameters if q.place == p.place and q.name.startswith("viscous_")
+            )
+            numbers = {p.name: change, viscous.name: viscous.value - viscous.model}
+            out.append(RobotEffect("friction", j, None, numbers, ""))
+        elif p.name.startswith("armature_"):
+            out.append(RobotEffect("armature", j, None, {p.name: change}, ""))
+        elif p.name.startswith("zero_"):
+            out.append(RobotEffect("joint_zero", j, None, {p.name: change}, ""))
+    for j, (coulomb, viscous, rotor, ratio) in found.coupled.items():
+        numbers = {
+            "coulomb_Nm": coulomb,
+            "viscous_Nms_per_rad": viscous,
+            "armature_kgm2": rotor,
+            "ratio": ratio,
+        }
+        out.append(RobotEffect("coupled_drive", j + 1, j, numbers, ""))
+    gravity = dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, found.gravity), strict=True))
+    return [*out, RobotEffect("gravity_direction", None, None, gravity, "")]
+
+
+def as_found(found: ArmCalibration) -> mujoco.MjSpec:
+    """The given model with the found numbers.
+
+    Raises:
+        InputError: MuJoCo refuses it.
+    """
+    spec = load_spec(found.model.path)
+    keep_inertials(spec, spec.compile())
+    for b in found.links:
+        body = spec.body(found.model.model.body(b).name)
+        set_inertial(body, float(found.tree.mass[b]), found.tree.com[b], found.tree.inertia[b])
+    with_effects(spec, effects_of(found))
+    return spec
+
+
+def write_as_found(found: ArmCalibration, folder: Path) -> None:
+    """Write ``as_found.xml`` and the files that it refers to into an existing folder.
+
+    Raises:
+        InputError: MuJoCo refuses the model, it refers to files outside its folder, or a file cannot be written.
+    """
+    check_named(found.model.path, assets=False)
+    spec = as_found(found)
+    taken = take_along(spec)
+    try:
+        put(taken, spec, folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    write_text(folder / MODEL, spec.to_xml())
+    mujoco.MjModel.from_xml_path(str(folder / MODEL))
+
+
+def write_into(found: ArmCalibration, folder: Path, **more: Any) -> None:
+    """Write JSON, text, table and model into an existing folder.
+
+    Raises:
+        InputError: a file cannot be written, or MuJoCo refuses the model.
+    """
+    write_as_found(found, folder)
+    head = "place,parameter,model,found,se,determined"
+    rows = [
+        f"{_cell(p.place)},{p.name},{p.model:.9g},{p.value:.9g},{p.se:.3g},{'yes' if p.determined else 'no'}"
+        for p in found.parameters
+    ]
+    write_text(folder / TABLE, "\n".join([head, *rows]) + "\n")
+    write_json(folder / NAME, to_dict(found) | more)
+    write_text(folder / REPORT, to_text(found) + "\n")
+
+
+def _cell(text: str) -> str:
+    """A cell of a CSV table."""
+    quoted = text.replace('"', '""')
+    return f'"{quoted}"' if set(text) & set(',"\n') else text
