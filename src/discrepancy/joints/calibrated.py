@@ -21,6 +21,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+# mujoco's compiled modules come without types.
+# pyright: reportAttributeAccessIssue=false
 import mujoco
 
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
@@ -40,8 +42,8 @@ HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
     "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "zero": "zero",
-    "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass", "com": "centre of mass",
-    "inertia": "inertia",
+    "position": "position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
+    "com": "centre of mass", "inertia": "inertia",
 }  # fmt: skip
 UNITS = {
     "Nms_per_rad": "N m s/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
@@ -106,7 +108,8 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
         f"{_percent(shares['noise'])}."
     )
     told = sum(p.determined for p in found.parameters)
-    both = f" and {len(found.combinations)} combinations of others" if found.combinations else ""
+    count = len(found.combinations)
+    both = f" and {count} combination{'s' if count > 1 else ''} of others" if count else ""
     yield f"The logs determine {told} of {len(found.parameters)} parameters{both}."
     yield from findings(found)
     yield ""
@@ -215,7 +218,9 @@ def _unknown(found: ArmCalibration, parameters: Sequence[Parameter]) -> Iterator
     by_place: dict[str, list[str]] = {}
     for p in parameters:
         what = described(p.name)[0]
-        stem = next((w for w in ("centre of mass", "inertia", "tilt") if what.startswith(w)), what)
+        stem = next(
+            (w for w in ("centre of mass", "inertia", "tilt", "position") if what.startswith(w)), what
+        )
         own = by_place.setdefault(p.place, [])
         if stem not in own:
             own.append(stem)
@@ -243,6 +248,9 @@ def effects_of(found: ArmCalibration) -> list[RobotEffect]:
             out.append(RobotEffect("armature", j, None, {p.name: change}, ""))
         elif p.name.startswith("zero_"):
             out.append(RobotEffect("joint_zero", j, None, {p.name: change}, ""))
+        elif p.name.startswith("position_"):
+            moved = dict.fromkeys(("x_m", "y_m", "z_m"), 0.0) | {p.name.removeprefix("position_"): change}
+            out.append(RobotEffect("link_length", j, None, moved, ""))
     for j, (coulomb, viscous, rotor, ratio) in found.coupled.items():
         numbers = {
             "coulomb_Nm": coulomb,
@@ -251,7 +259,7 @@ def effects_of(found: ArmCalibration) -> list[RobotEffect]:
             "ratio": ratio,
         }
         out.append(RobotEffect("coupled_drive", j + 1, j, numbers, ""))
-    gravity = dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, found.gravity), strict=True))
+    gravity = {f"{axis}_m_per_s2": float(g) for axis, g in zip("xyz", found.gravity, strict=True)}
     return [*out, RobotEffect("gravity_direction", None, None, gravity, "")]
 
 

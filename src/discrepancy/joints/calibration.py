@@ -22,7 +22,7 @@ from discrepancy.joints.causes import parameter_name
 from discrepancy.joints.diagnose import in_parts
 from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import MOMENTS, Given, JointProblem, joint_problem
+from discrepancy.joints.problem import LENGTH_M, MOMENTS, Given, JointProblem, joint_problem
 from discrepancy.joints.servo import driven_by_voltage
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
@@ -42,9 +42,12 @@ as the masses."""
 DETERMINED = 0.2
 """Largest ratio of standard error and prior standard deviation of a parameter that counts as determined. Chosen: the
 logs reduce its variance 25-fold."""
+PLAIN = 3.0
+"""Factor on prior standard deviations of inertial parameters for standard errors. Chosen: where two parameters have one
+effect, the narrower prior would otherwise make the other's error."""
 ROUNDS, SETTLED = 8, 0.1
 """Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
-LAW_STEPS, LEAST_LAW = 6, 1e-12
+LAW_STEPS, LEAST_LAW = 12, 1e-12
 """Steps to learn how far friction deviates from its law, and its least variance, relative to the usual. Chosen."""
 MOST_STEPS, LEAST_DROP = 200, 1e-6
 """Most Newton steps, and the drop of the negative log posterior at which they end. Chosen."""
@@ -284,10 +287,15 @@ class _Fit:
         self.links = tuple(body.body for body in self.bodies)
         self.problem = self._linear()
         self.scalars = list(self._scalars())
-        n, basis = 10 * len(self.bodies), self._gain_basis()
+        self.first = 10 * len(self.bodies)  # number of inertial parameters; scalars follow
+        n, basis = self.first, self._gain_basis()
         self.basis = np.zeros((n + len(self.scalars), n + basis.shape[1]))
         self.basis[:n, :n], self.basis[n:, n:] = np.eye(n), basis
         self.x = np.concatenate([*(body.given for body in self.bodies), np.zeros(len(self.scalars))])
+        self.least = np.concatenate([np.full(n, -np.inf), [s.least - s.model for s in self.scalars]])
+        self.rubbing = n + np.flatnonzero(
+            [s.name.endswith(("coulomb_Nm", "viscous_Nms_per_rad")) for s in self.scalars]
+        )
         self.given_x, self.curvature = self.x, np.eye(self.basis.shape[1])
         for k, body in enumerate(self.bodies):
             at = slice(10 * k, 10 * k + 10)
@@ -328,6 +336,8 @@ class _Fit:
         for j, n in enumerate(self.model.joints):
             if j:
                 yield _Scalar(f"{n} zero", n, "zero_rad", 0.0, ZERO_RAD)
+                for axis in "xyz":
+                    yield _Scalar(f"{n} length {axis}", n, f"position_{axis}_m", 0.0, LENGTH_M)
             ratio = self._coupling(j)
             if ratio:
                 span = problem.joints[j][0].span
@@ -411,56 +421,73 @@ class _Fit:
         slabs = np.zeros(len(prior))
         slabs[columns] = np.diag(self.prior)
         rests = [k for own, _ in self.problem.resting for k in own if prior[k]]
-        laws = [
-            k for k, n in enumerate(self.problem.labels) if prior[k] and (" form " in n or " length " in n)
-        ]
+        laws = [k for k, n in enumerate(self.problem.labels) if prior[k] and " form " in n]
         slabs[rests] = prior[rests]
-        self.variance = floor_of(self.problem, slabs)  # with what the friction's law leaves
+        plain = floor_of(self.problem, slabs)
         slabs[laws] = prior[laws]
         self._learn(slabs)
         self.active = np.flatnonzero(slabs)
-        self.series, each = in_parts(self.problem, self.active, self.variance, self.trials)
-        self.normals, self.rows = [own[:2] for own in each], [own[3] for own in each]
+        self.series, each = in_parts(self.problem, self.active, self.trials)
+        self.variance = plain
+        self.rows = [own.rows for own in each]
+        self.plain, self.normals = (
+            [own.weighted(v)[:2] for own in each] for v in (plain, floor_of(self.problem, slabs))
+        )
         self.fit, self.rests, self.laws = (
             np.searchsorted(self.active, np.array(k, dtype=np.intp)) for k in (columns, rests, laws)
         )
         self.spread = slabs[self.active]
 
     def _learn(self, slabs: Array) -> None:
-        """Learn, in place, the prior variances of the errors of each joint's friction law.
-
-        MacKay's step: squared values over the number of values that the logs determine.
-        """
-        labels = self.problem.labels
-        families = [[k for k, n in enumerate(labels) if slabs[k] and n.startswith(f"{joint} form ")]
-                    for joint in self.model.joints]  # fmt: skip
-        families = [k for k in families if k]
+        """Learn, in place, the prior variance of each error of the friction's law by expectation maximisation."""
+        forms = np.flatnonzero([" form " in n for n in self.problem.labels] & (slabs > 0.0))
         variance = floor_of(self.problem, slabs)
-        for _ in range(LAW_STEPS if families else 0):
+        for _ in range(LAW_STEPS if len(forms) else 0):
             posterior = Posterior(self.problem.cells, slabs, variance)
-            for k in families:
-                known = len(k) - np.sum(posterior.variances[k] / slabs[k])
-                factor = np.sum(posterior.mean[k] ** 2 / slabs[k]) / max(float(known), 1e-3)
-                slabs[k] = np.maximum(slabs[k] * np.clip(factor, 0.05, 20.0), LEAST_LAW)
+            slabs[forms] = np.maximum(posterior.mean[forms] ** 2 + posterior.variances[forms], LEAST_LAW)
 
     def solved(self, parts: Sequence[int]) -> tuple[Array, Array]:
-        """Posterior mode of ``x`` and its covariance from some parts."""
-        G = sum((self.normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
-        b = sum((self.normals[k][1] for k in parts), np.zeros(len(self.active)))
-        # Integrate friction at rest out. Errors of laws and lengths stay 0, as in the model that is written.
-        f, n, e = self.fit, self.rests, self.laws
-        inner = G[np.ix_(n, n)] + np.diag(1.0 / self.spread[n])
-        gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], G[np.ix_(n, e)], b[n]]))
-        H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, : len(f)]
-        E = G[np.ix_(f, e)] - G[np.ix_(f, n)] @ gain[:, len(f) : -1]
-        g = b[f] - G[np.ix_(f, n)] @ gain[:, -1] + H @ self.at
+        """Values of ``x`` and their covariance from some parts.
+
+        Friction that deviates from its law is a nuisance for all other values. Coulomb and viscous friction are then
+        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error.
+        """
+        H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
         information = self.basis.T @ H @ self.basis
-        y = self._mode(information, self.basis.T @ g)
-        # The prior counts with its curvature at the given model: at the mode it is too sharp near impossible bodies.
-        inverse = self.basis @ np.linalg.inv(information + self.curvature)
-        # What errors of laws and lengths do to the values.
-        moved = inverse @ self.basis.T @ E * np.sqrt(self.spread[e])
-        return self.basis @ y, inverse @ self.basis.T + moved @ moved.T
+        x = self.basis @ self._mode(information, self.basis.T @ g)
+        # For errors, the prior counts with its curvature at the given model, and less, so that it does not make them.
+        weak = self.curvature.copy()
+        weak[: self.first, : self.first] /= PLAIN**2
+        covariance = self.basis @ np.linalg.inv(information + weak) @ self.basis.T
+        H, g = self._reduced(self.plain, parts, self.rests)
+        at = self.rubbing
+        least = self.least[at]
+        nearest, free = x[at], np.ones(len(at), dtype=bool)
+        while free.any():
+            k = at[free]
+            rest = np.setdiff1d(np.arange(len(x)), k)
+            nearest[free] = np.linalg.solve(H[np.ix_(k, k)] + np.diag(1.0 / np.diag(self.prior)[k]),
+                                            g[k] - H[np.ix_(k, rest)] @ x[rest])  # fmt: skip
+            beyond = free & (nearest < least)
+            if not beyond.any():
+                break
+            nearest[beyond], x[at[beyond]] = least[beyond], least[beyond]
+            free &= ~beyond
+        covariance[at, at] += (nearest - x[at]) ** 2
+        x[at] = nearest
+        return x, covariance
+
+    def _reduced(
+        self, normals: Sequence[tuple[Array, Array]], parts: Sequence[int], nuisance: NDArray[np.intp]
+    ) -> tuple[Array, Array]:
+        """Information matrix and score of ``x`` from some parts, with nuisance columns integrated out."""
+        G = sum((normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
+        b = sum((normals[k][1] for k in parts), np.zeros(len(self.active)))
+        f, n = self.fit, nuisance
+        inner = G[np.ix_(n, n)] + np.diag(1.0 / self.spread[n])
+        gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], b[n]]))
+        H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, :-1]
+        return H, b[f] - G[np.ix_(f, n)] @ gain[:, -1] + H @ self.at
 
     def _mode(self, H: Array, g: Array) -> Array:
         """Minimum of y' H y / 2 - g' y plus the negative log prior.
@@ -468,12 +495,11 @@ class _Fit:
         Newton's method with an active set of bounds (D. P. Bertsekas, "Projected Newton methods for optimization
         problems with simple constraints", 1982). The function is convex.
         """
-        n = 10 * len(self.bodies)
+        n = self.first
         least = np.full(H.shape[0], -np.inf)
-        for i, s in enumerate(self.scalars):
-            if np.isfinite(s.least):
-                column = np.flatnonzero(self.basis[n + i])[0]
-                least[column] = (s.least - s.model) / self.basis[n + i, column]
+        for i in np.flatnonzero(np.isfinite(self.least)):
+            column = np.flatnonzero(self.basis[i])[0]
+            least[column] = self.least[i] / self.basis[i, column]
 
         def slopes(y: Array) -> tuple[float, Array, Array]:
             value = 0.5 * float(y @ H @ y) - float(g @ y) + 0.5 * float(y[n:] @ y[n:])
@@ -512,7 +538,7 @@ class _Fit:
 
     def jump(self, x: Array) -> None:
         """Put values, in the form of ``x``, into the tree and into the linearisation point."""
-        n = 10 * len(self.bodies)
+        n = self.first
         mass, com, inertia = (a.copy() for a in (self.given.mass, self.given.com, self.given.inertia))
         for k, b in enumerate(self.links):
             own = central(x[10 * k : 10 * k + 10])
@@ -525,7 +551,7 @@ class _Fit:
             table = s.name.split("_", 1)[0]
             if s.label.endswith((" coulomb_Nm", " viscous_Nms_per_rad", " armature_kgm2")):
                 tables[table][self.model.joints.index(s.place)] += value
-            elif s.name in ("gain", "delay_s", "zero_rad") or s.place == "base":
+            elif s.name in ("gain", "delay_s", "zero_rad") or s.name.startswith(("position", "tilt")):
                 self.values[s.label] = float(value)
         self.tree = replace(self.given, mass=mass, com=com, inertia=inertia, **tables)
 
@@ -541,7 +567,7 @@ class _Fit:
 
     def coupled(self) -> dict[int, tuple[float, float, float, float]]:
         """Friction, rotor and ratio of coupled drives by their second joint."""
-        x = dict(zip((s.label for s in self.scalars), self.x[10 * len(self.bodies) :], strict=True))
+        x = dict(zip((s.label for s in self.scalars), self.x[self.first :], strict=True))
         out = {}
         for j, n in enumerate(self.model.joints):
             ratio = self._coupling(j)
@@ -563,7 +589,7 @@ class _Fit:
             for i, name in enumerate(CENTRAL):
                 numbers = float(given[i]), float(value[i]), float(se[i]), float(prior[i])
                 yield Parameter(place, name, *numbers, bool(known[i]))
-        n = 10 * len(self.bodies)
+        n = self.first
         se, prior = np.sqrt(np.diag(self.covariance)[n:]), np.sqrt(np.diag(self.prior)[n:])
         slides = {name for name, slide in zip(self.model.joints, self.model.slides, strict=True) if slide}
         for i, s in enumerate(self.scalars):
@@ -576,7 +602,7 @@ class _Fit:
 
     def combinations(self) -> Iterator[Combination]:
         """Base parameters of masses and rotors: pivoted QR of the columns the logs excite (M. Gautier, ICRA 1991)."""
-        n = 10 * len(self.bodies)
+        n = self.first
         at = np.array(
             [*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name.endswith("armature_kgm2"))]
         )
@@ -632,7 +658,7 @@ class _Fit:
     def _plain(self, t: int, others: Sequence[int]) -> Array:
         """The same with ordinary least squares: ten parameters a link, friction, rotor and offset a joint."""
         names = ("coulomb_Nm", "viscous_Nms_per_rad", "armature_kgm2", "offset_Nm")
-        n = 10 * len(self.bodies)
+        n = self.first
         at = self.fit[[*range(n), *(n + i for i, s in enumerate(self.scalars) if s.name in names)]]
         scale = np.sqrt(np.mean(np.concatenate([self.trials.signals[k].torque for k in others]) ** 2, axis=0))
         scale = np.maximum(scale[list(self.known)], 1e-12)

@@ -163,21 +163,21 @@ def parts_of(outcome: Outcome, trials: Trials) -> tuple[Parts, tuple[Series, ...
     """Split the rows of a search result into the parts of the trials."""
     state, problem = outcome.state, outcome.problem
     active = np.flatnonzero(state.posterior.prior)
-    out, each = in_parts(problem, active, state.posterior.variance, trials)
+    out, cells = in_parts(problem, active, trials)
+    each = [(*own.weighted(state.posterior.variance), own.rows) for own in cells]
     events = [k for c in state.chosen if c.group.event for k in (*c.group.columns, *c.forms)]
     resting = [k for columns, _ in problem.resting for k in columns]
     return Parts.of(state, each, resting, resting, events), out
 
 
 def in_parts(
-    problem: JointProblem, active: NDArray[np.intp], variance: Array, trials: Trials
-) -> tuple[tuple[Series, ...], list[tuple[Array, Array, float, Array]]]:
-    """Rows of each part as time series, and X' W X, X' W y, y' W y and the number of rows by channel and band.
+    problem: JointProblem, active: NDArray[np.intp], trials: Trials
+) -> tuple[tuple[Series, ...], list[Cells]]:
+    """Rows of each part as time series, and by channel and band.
 
     Args:
         problem: the problem of all trials.
         active: columns to keep, in increasing order.
-        variance: noise variances, shape (C, bands).
         trials: the trials.
     """
     whole = problem.cells
@@ -195,8 +195,7 @@ def in_parts(
         rate = own.rate_hz * share
         time = own.time[0] + (np.arange(len(residual)) + here.start + 0.5) / rate
         out.append(Series(residual, columns, time, rate, float(np.sqrt(share))))
-        cells = _cells(residual, columns, seen, Bands([rate], [len(residual)], whole.bands.edges_hz))
-        each.append((*cells.weighted(variance), cells.rows))
+        each.append(_cells(residual, columns, seen, Bands([rate], [len(residual)], whole.bands.edges_hz)))
     return tuple(out), each
 
 
