@@ -3,7 +3,7 @@
 import difflib
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +93,8 @@ class Place:
 
 class TableSource:
     """A table as a ``LogSource``."""
+
+    notes: Sequence[str] = ()
 
     def __init__(self, table: Table, log_map: LogMap) -> None:
         """Locate every channel of every robot."""
