@@ -234,6 +234,35 @@ class Look:
         stamps, _, named = reader.read_named(messages)
         return (stamps if clock == "header" else messages.log_ns)[named.any(axis=1)]
 
+    def numbers(self, topic: str, joints: Sequence[str], field: str) -> dict[str, tuple[Array, str]]:
+        """Return the finite values of a field in the first messages by joint, and why there are none, if so."""
+        messages = self.first(topic, _NAMES_BYTES)
+        reader = CdrReader(
+            message_type(self._files.topics[topic], self._bag),
+            [Selector(field, joint) for joint in joints],
+            stamp=False,
+        )
+        values = np.empty((0, len(joints))) if messages is None else reader.read(messages)[1]
+        found = {}
+        for joint, x, lacking in zip(joints, values.T, reader.lacking, strict=True):
+            why = (
+                f"{field} is NaN"
+                if lacking is None
+                else f"{field} is empty"
+                if lacking.startswith(EMPTY)
+                else lacking.partition(": ")[2]
+            )
+            found[joint] = x[np.isfinite(x)], f"{why} in the first {reader.count} messages"
+        return found
+
+    def is_stamped(self, topic: str) -> bool:
+        """Return whether messages have header stamps, and the first ones are not all zero."""
+        try:
+            message_type(self._files.topics[topic], self._bag).require_stamp()
+        except InputError:
+            return False
+        return bool(self.stamps((topic,), "header")[topic].any())
+
     def stamps(self, topics: Sequence[str], clock: Clock) -> dict[str, Stamps]:
         """Return stamps [ns] of the first messages of some topics, in a single pass over the bag."""
         missing = [topic for topic in topics if (topic, clock) not in self._stamps]
