@@ -27,7 +27,15 @@ from mocobot_logs.draft import (
 )
 from mocobot_logs.draft_names import TOKEN, UNITS, Robots
 from mocobot_logs.formats import log_kind
-from mocobot_logs.joints.joint_map import QUANTITIES, units_of
+from mocobot_logs.joints.joint_map import (
+    COMMANDS,
+    DUTIES,
+    EFFORTS,
+    POSITIONS,
+    QUANTITIES,
+    VELOCITIES,
+    units_of,
+)
 from mocobot_logs.joints.read import unwrapped
 from mocobot_logs.presets import TYPES, Meaning, column_meaning, effort_meaning
 from mocobot_logs.table.table import Table, Wanted
@@ -66,8 +74,6 @@ _ROWS = 20_000
 
 _WEAK = {"joint", "state"}
 """Words that identify a quantity only if no other column does."""
-_FIRST_BYTES = 1 << 20
-"""Bytes of a topic's messages that are looked at: two minutes of six joints at 50 Hz."""
 
 
 @dataclass(frozen=True)
@@ -133,14 +139,22 @@ def _sections(
         name: place for name, place in places.items() if place.every is not None and not len(place.every)
     }
     places = {name: place for name, place in places.items() if name not in absent}
-    missing = [] if {"q", "motor_position"} & set(places) else ["a position"]
-    if not set(places) - {"q", "motor_position", "dq", "motor_velocity", "supply", "enabled"}:
+    # One torque, velocity, command and duty of a joint are used.
+    others = {
+        name
+        for group in (EFFORTS, VELOCITIES, COMMANDS, DUTIES)
+        for name in [each for each in group if each in places][1:]
+    }
+    spare = [f"# or {_line(name, places[name], slides)}" for name in places if name in others]
+    places = {name: place for name, place in places.items() if name not in others}
+    missing = [] if set(POSITIONS) & set(places) else ["a position"]
+    if not {*EFFORTS, *COMMANDS, *DUTIES} & set(places):
         missing.append("a torque, a current, a command or a duty")
-    lines = [_line(name, place, slides) for name, place in places.items()]
+    lines = [*(_line(name, place, slides) for name, place in places.items()), *spare]
     for name, place in absent.items():
         reasons = "; ".join(dict.fromkeys(place.lacks.values())) or "its columns have no value"
         lines.append(f"# no {name}: {printable(reasons)}")
-    for name in {"q", "motor_position"} & set(places):
+    for name in set(POSITIONS) & set(places):
         doubts += [f"{name} of {joint}: {why}" for joint, why in places[name].lacks.items()]
         places[name] = replace(places[name], lacks={})
     lines += [f"# {DOUBTFUL}nothing was found that is {what}" for what in missing]

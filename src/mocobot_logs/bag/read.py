@@ -15,6 +15,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -176,7 +177,6 @@ STAMPS = 1000
 """Number of stamps per topic that are read before the bag itself."""
 _ENOUGH_BLOCKS = 64
 """Number of blocks after which the stamps found so far must suffice."""
-_NAMES_BYTES = 1 << 20  # several publishers may each send some of the joints
 _EARLY_NS = 1_000_000_000
 """A clock that was just set to zero, as of a simulation, is before this; a stamp of zero counts then [ns]."""
 _MAPS = ("mocobot-ros2", "omnid-ros2")
@@ -199,6 +199,20 @@ class Look:
         found = self._files.blocks((topic,), lambda _: None, block_bytes)
         return next((block[topic] for block in found), None)
 
+    def firsts(self, topic: str) -> Iterator[Messages]:
+        """Yield the first messages of a topic, at least ``STAMPS`` if there are so many.
+
+        Several publishers may each send some of the joints, and one of them may start late.
+        """
+        count = 0
+        blocks = self._files.blocks((topic,), lambda _: None) if self._files.has_messages(topic) else ()
+        for block in islice(blocks, _ENOUGH_BLOCKS):
+            if topic in block:
+                yield block[topic]
+                count += len(block[topic])
+            if count >= STAMPS:
+                return
+
     def joints(self, topic: str) -> tuple[str, ...]:
         """Return the joints in the first messages of a topic, empty if it has no joint states or does not exist."""
         if topic not in self._files.topics:
@@ -208,7 +222,7 @@ class Look:
             reader = CdrReader(kind, [Selector("position", "")], stamp=False)
             if kind.name == JOINT_STATE:
                 kind.require_joints("position")
-                if (messages := self.first(topic, _NAMES_BYTES)) is not None:
+                for messages in self.firsts(topic):
                     reader.read(messages)
             self._joints[topic], self._senders[topic] = tuple(reader.joints), reader.senders
         return self._joints[topic]
@@ -227,22 +241,23 @@ class Look:
 
     def sent(self, topic: str, joints: Sequence[str], clock: Clock) -> Stamps:
         """Return stamps [ns] of the first messages of a topic that name some of the joints."""
-        kind, messages = message_type(self._files.topics[topic], self._bag), self.first(topic, _NAMES_BYTES)
-        if messages is None:
-            return np.empty(0, np.int64)
+        kind, found = message_type(self._files.topics[topic], self._bag), [np.empty(0, np.int64)]
         reader = CdrReader(kind, [Selector("position", joint) for joint in joints], clock == "header")
-        stamps, _, named = reader.read_named(messages)
-        return (stamps if clock == "header" else messages.log_ns)[named.any(axis=1)]
+        for messages in self.firsts(topic):
+            stamps, _, named = reader.read_named(messages)
+            found.append((stamps if clock == "header" else messages.log_ns)[named.any(axis=1)])
+        return np.concatenate(found)
 
     def numbers(self, topic: str, joints: Sequence[str], field: str) -> dict[str, tuple[Array, str]]:
         """Return the finite values of a field in the first messages by joint, and why there are none, if so."""
-        messages = self.first(topic, _NAMES_BYTES)
         reader = CdrReader(
             message_type(self._files.topics[topic], self._bag),
             [Selector(field, joint) for joint in joints],
             stamp=False,
         )
-        values = np.empty((0, len(joints))) if messages is None else reader.read(messages)[1]
+        values = np.concatenate(
+            [np.empty((0, len(joints))), *(reader.read(m)[1] for m in self.firsts(topic))]
+        )
         found = {}
         for joint, x, lacking in zip(joints, values.T, reader.lacking, strict=True):
             why = (
