@@ -33,7 +33,7 @@ from mocobot_logs.joints.joint_map import (
 )
 from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated
 from mocobot_logs.open_log import open_log
-from mocobot_logs.resample import MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
+from mocobot_logs.resample import LARGEST, MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
 from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, on_grid
 
 MAX_GAP_S = 0.05
@@ -321,7 +321,7 @@ def _plain(rate_hz: float) -> float:
 def _check_values(name: str, channels: tuple[str, ...], values: Array) -> None:
     if not len(values):
         raise InputError(f"{name}: has no samples")
-    infinite = np.argwhere(np.isinf(values))
+    infinite = np.argwhere(np.abs(values) >= LARGEST)
     if len(infinite):
         row, k = infinite[0]
         raise InputError(
