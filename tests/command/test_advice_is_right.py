@@ -14,6 +14,7 @@ from joint_logs import motion, write_csv, write_lerobot
 from log_files import write_lerobot as write_team
 from log_files import write_text
 from made_arm import made, write_log, write_map, write_model
+from mocobot import serial
 from mocobot_sim.trial.sensors import PRESETS, measure
 from recordings import small_recording
 
@@ -51,25 +52,37 @@ def dataset(tmp_path) -> Path:
     )
 
 
-@pytest.mark.parametrize(
-    "command",
-    [("map",), ("inspect",), ("replay", "--out", "out.rrd")],
-    ids=lambda words: words[0],
-)
-def test_an_episode_of_a_robots_dataset(tmp_path, capsys, monkeypatch, dataset, command) -> None:
-    monkeypatch.chdir(tmp_path)
-    arguments = [command[0], dataset, "--model", "robot.xml", *command[1:]]
+@pytest.mark.parametrize("command", ["map", "inspect"])
+def test_an_episode_of_a_robots_dataset(tmp_path, capsys, dataset, command) -> None:
+    arguments = [command, dataset, "--model", tmp_path / "robot.xml"]
     assert refused(capsys, *arguments).endswith("holds 2 episodes, 0 to 1; say which one with --episode")
     assert refused(capsys, *arguments, "--episode", 2).endswith("there is no episode 2; it holds 2, 0 to 1")
     assert run(capsys, *arguments, "--episode", 1)[0] == 0
 
 
-def test_a_diagnosis_takes_the_episode(tmp_path, capsys, monkeypatch, dataset) -> None:
-    """One without a torque is no diagnosis; what is refused is that, and no longer the dataset."""
+def test_all_episodes_are_logs(tmp_path, dataset) -> None:
+    """So a diagnosis may test what it finds in one on the others."""
+    first, second = serial.read_logs(dataset, tmp_path / "robot.xml")
+    assert [log.name for log in (first, second)] == [f"{dataset} (episode {k})" for k in (0, 1)]
+    for log, episode in ((first, 0), (second, 1)):
+        (alone,) = serial.read_logs(dataset, tmp_path / "robot.xml", episode=episode)
+        assert alone.name == str(dataset)
+        np.testing.assert_array_equal(alone.q, log.q)
+    np.testing.assert_allclose(second.q, 0.5 * first.q, atol=1e-6)
+
+
+def test_episodes_of_a_diagnosis_and_a_replay(tmp_path, capsys, monkeypatch, dataset) -> None:
+    """A diagnosis without a torque is none; that is what is refused, and no longer the dataset."""
     monkeypatch.chdir(tmp_path)
-    arguments = ["diagnose", dataset, "--model", "robot.xml"]
-    assert "say which one with --episode" in refused(capsys, *arguments)
-    assert "episode" not in refused(capsys, *arguments, "--episode", 1)
+    for more in ([], ["--episode", 1]):
+        message = refused(capsys, "diagnose", dataset, "--model", "robot.xml", *more)
+        assert "there are no torques, currents or duties, one of which the diagnosis needs" in message
+        out = f"out{len(more)}.rrd"
+        assert run(capsys, "replay", dataset, "--model", "robot.xml", *more, "--out", out)[0] == 0
+        assert Path(out).stat().st_size > 1000
+    for command in (["diagnose"], ["replay", "--out", "none.rrd"]):
+        message = refused(capsys, *command, dataset, "--model", "robot.xml", "--episode", 2)
+        assert message.endswith("there is no episode 2; it holds 2, 0 to 1")
 
 
 @pytest.fixture(scope="module")
