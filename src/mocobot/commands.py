@@ -120,7 +120,7 @@ def _team_picture(options: opt.Estimate, found: Any, path: Path) -> list[str]:
     from mocobot.api.recordings import recordings_of
     from mocobot.pictures import estimate_view
 
-    picture = estimate_view(next(recordings_of(options.rec, options.map)), found)
+    picture = estimate_view(next(recordings_of(options.rec, options.map, episode=options.episode)), found)
     if isinstance(picture, str):
         return [picture]
     imsave(path, picture)

@@ -172,6 +172,7 @@ class EstimateOptions(Options):
     """Options of the payload estimate."""
 
     map: LogMap = None
+    episode: Episode = None
     calibration: Calibrated = None
     self_calibrate: Flag = False
     """Calibrate the robots and estimate the payload in one fit of these recordings, which may include free trials."""
@@ -209,6 +210,7 @@ class CalibrateOptions(Options):
     """Options of the calibration of a team's robots, or of a single robot."""
 
     map: LogMap = None
+    episode: Episode = None
     prior: Annotated[AnyPath | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
     """Prior standard deviations of the robots' deviations (docs/calibration.md); uncalibrated robots if omitted."""
     payload_of: Annotated[AnyWords, tyro.conf.arg(metavar="REC=LABEL...")] = ()
@@ -256,6 +258,7 @@ class DiagnoseOptions(Options):
     """Options of the diagnosis of a team or of a single robot."""
 
     map: LogMap = None
+    episode: Episode = None
     calibration: Calibrated = None
     tolerances: Tolerances = None
     exclude: Annotated[AnyWords, tyro.conf.arg(metavar="CAUSE...")] = ()
@@ -317,6 +320,7 @@ class WatchOptions(Options):
     """Options of the first look."""
 
     map: LogMap = None
+    episode: Episode = None
     jobs: Jobs = 1
 
     def check(self) -> None:
@@ -653,6 +657,7 @@ class ReplayOptions(Options):
     """Options of a replay."""
 
     map: LogMap = None
+    episode: Episode = None
     estimate: Annotated[AnyPath | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, written by `mocobot estimate --out`; if omitted, an estimate is made from each recording."""
     calibration: Calibrated = None
@@ -671,9 +676,10 @@ class ReplayOptions(Options):
             raise InputError("out and web are both given; choose a file or a browser")
         if model is not None:
             refuse_teams(self, ("estimate", "calibration", "diagnosis", "payload", "truth"))
-        elif self.map is not None:
+        elif self.map is not None or self.episode is not None:
+            name = "map" if self.map is not None else "episode"
             raise InputError(
-                "map goes with a model; a team's log must be converted to a recording first (mocobot convert)"
+                f"{name} goes with a model; a team's log must be converted to a recording first (mocobot convert)"
             )
 
 

@@ -339,9 +339,15 @@ def _joint_time(found: JointInspection) -> Iterator[str]:
     yield from _stamps(replace(found.timing, gaps=0, missing=0) if whole else found.timing)
 
 
+def is_left_out(c: Channel, t: Timing) -> bool:
+    """Return whether no sample has the channel, so that the log is read without it, as its notes say."""
+    return c.nans == t.samples
+
+
 def _joint_samples(found: JointInspection) -> Iterator[str]:
     for c in found.channels:
-        yield from _readings(c.name, c, found.timing)
+        if not (found.logs and is_left_out(c, found.timing)):
+            yield from _readings(c.name, c, found.timing)
     yield from found.signs_lost
     for log in found.logs[:1]:
         for j, joint in enumerate(log.joints):

@@ -90,7 +90,8 @@ def inspect_joints(
     Raises:
         InputError: the log cannot be read.
     """
-    samples = collect(source, advance).streams[0]
+    log = collect(source, advance)
+    samples = log.streams[0]
     timing = TimingTally()
     timing.add(samples)
     found = JointInspection(
@@ -107,7 +108,7 @@ def inspect_joints(
     # Wild samples count as missing; otherwise they would be refused or used as readings.
     samples = replace(samples, values=np.where(wild(samples.values), np.nan, samples.values))
     try:
-        logs = joint_logs_of(source.name, samples, log_map)
+        logs = joint_logs_of(source.name, samples, log_map, log.notes)
     except InputError as error:
         return replace(found, unchecked=str(error).removeprefix(f"{source.name}: "))
     found = replace(found, logs=tuple(logs))

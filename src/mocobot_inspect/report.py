@@ -55,7 +55,15 @@ import numpy as np
 
 from estimator.clocks import ClockEstimate
 from mocobot_inspect.channels import UNITS, Channel
-from mocobot_inspect.findings import evidence, findings, milliseconds, mistake_words, percent, wrong_scales
+from mocobot_inspect.findings import (
+    evidence,
+    findings,
+    is_left_out,
+    milliseconds,
+    mistake_words,
+    percent,
+    wrong_scales,
+)
 from mocobot_inspect.joint_motion import Follows, pooled
 from mocobot_inspect.joints import JointInspection
 from mocobot_inspect.mistakes import Mistake, listed
@@ -385,7 +393,8 @@ def _joint_ready(found: JointInspection) -> str:
     before = [f"the mistake{'s' * (wrong > 1)} above undone in the map"] if wrong else []
     if any(c.wild or c.infinities for c in found.channels):
         before.append("the absurd values left out of the log")
-    lacking = "; rows that lack a value are left out" if any(c.nans for c in found.channels) else ""
+    some = any(c.nans and not is_left_out(c, found.timing) for c in found.channels)
+    lacking = "; rows that lack a value are left out" if some else ""
     return f"{_AS_IT_IS}{' and '.join(before)}: " * bool(before) + f"{' and '.join(good)}{lacking}"
 
 

@@ -60,6 +60,7 @@ class Converted:
         clocks: differences of the robots' clocks, and whether they were corrected.
         span: part of the log, after the log's start, or None for all of it.
         left_out: parts left out on request or because they are unusable.
+        notes: sentences on irregularities of the log.
     """
 
     recording: Recording
@@ -68,6 +69,7 @@ class Converted:
     clocks: ClockReport
     span: Span | None
     left_out: tuple[Omission, ...]
+    notes: tuple[str, ...]
 
 
 def convert(
@@ -188,7 +190,7 @@ def _convert(
     streams = resampled.reports
     del resampled  # as large as the recording
     check_recording(recording)
-    return Converted(recording, source.level, streams, clocks, None, ())
+    return Converted(recording, source.level, streams, clocks, None, (), tuple(source.notes))
 
 
 def write_converted(

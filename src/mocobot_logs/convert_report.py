@@ -69,7 +69,7 @@ def format_conversion(converted: Converted, name: str, out: Path) -> str:
     titles, units = zip(*_COLUMNS, strict=True)
     lines += [_row("robot", titles), _row("", units)]
     lines += [_stream(stream) for stream in streams]
-    lines += _methods(converted) + _blank(streams)
+    lines += _methods(converted) + _blank(streams) + [f"    {note}" for note in converted.notes]
     lines += ["[[Clocks against that of robot 1]]", *_clocks(converted)]
     duration_s = (len(recording.time) - 1) / metadata.rate_hz
     payload = "" if metadata.payload is None else f", payload {metadata.payload}"

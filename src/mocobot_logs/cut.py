@@ -4,7 +4,7 @@ Seconds count from the log's start, the earliest first stamp of its robots. Both
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -163,6 +163,11 @@ class Piece:
         self.metadata, self.size = source.metadata, source.size
         self.span, self._source, self._origin_ns = span, source, origin_ns
         self._drops = [[d.span for d in drops if d.robot == i + 1] for i in range(source.robots)]
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Notes of the whole log."""
+        return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         """Yield samples as ``LogSource.chunks``; reading stops after the span.

@@ -74,6 +74,11 @@ class LogSource(Protocol):
     metadata: RecordingMetadata | None
     size: int
 
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on irregularities and how they were handled; complete once the log is read."""
+        ...
+
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         """Yield samples in the order of the log: (robot from 0, its next samples).
 
@@ -91,7 +96,7 @@ class Log:
     """A whole log in memory.
 
     Attributes:
-        name, level, channels, metadata: as in ``LogSource``.
+        name, level, channels, metadata, notes: as in ``LogSource``.
         streams: samples of every robot.
     """
 
@@ -100,6 +105,7 @@ class Log:
     channels: tuple[str, ...]
     metadata: RecordingMetadata | None
     streams: tuple[Samples, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def robots(self) -> int:
@@ -117,7 +123,7 @@ def collect(source: LogSource, advance: Callable[[int], object] = lambda _: None
     for robot, samples in source.chunks(advance):
         parts[robot].append(samples)
     streams = tuple(joined(p, len(source.channels)) for p in parts)
-    return Log(source.name, source.level, source.channels, source.metadata, streams)
+    return Log(source.name, source.level, source.channels, source.metadata, streams, tuple(source.notes))
 
 
 def joined(parts: Sequence[Samples], channels: int) -> Samples:
@@ -152,6 +158,11 @@ class Readings:
         self.level: Level = source.level
         self.name, self.robots, self.channels = source.name, source.robots, source.channels
         self.metadata, self.size, self._source = source.metadata, source.size, source
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Notes of the log itself."""
+        return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         """Yield samples as ``LogSource.chunks``.

@@ -33,7 +33,7 @@ JOINT_FIELDS = ("position", "velocity", "effort")
 _PLACEHOLDERS = ("robot", "robot0", "name", "channel")
 _REQUIRED = ("version", "level", "channels")
 _OPTIONAL = ("robots", "names", "trial", "time", "csv", "defaults", "robot")
-_TIME = ("column", "unit", "clock")
+_TIME = ("column", "nanosec", "unit", "clock")
 _CSV = ("delimiter", "decimal")
 _CHANNEL = (*PLACES, "unit", "sign", "offset", "counts_per_turn", "optional")
 KEYS = (*_REQUIRED, *_OPTIONAL, *_TIME, *_CSV, *_CHANNEL)
@@ -73,7 +73,7 @@ class ChannelMap:
         column: column of a table, ``name[i, j]`` inside an array, or None.
         scale: sign times the size of one raw unit in SI.
         offset: added before sign and unit apply [raw unit].
-        optional: whether a log may lack the channel (commands only).
+        optional: whether a log may lack the channel: commands of a team; of joints all but positions.
         bits: width of a signed number that was logged as unsigned (two's complement), or None.
         counted: whether raw values are counts, whose step is 1.
     """
@@ -115,11 +115,13 @@ class TimeMap:
             ``timestamp`` in a LeRobot dataset.
         unit: ``s``, ``ms``, ``us`` or ``ns``; ``iso`` for ISO 8601 dates.
         clock: stamp of a bag's messages: ``header`` (when the robot took the sample) or ``log`` (when it was written).
+        nanosec: column of the nanoseconds that are added to whole seconds in ``column``, or None.
     """
 
     column: str | None = None
     unit: str = "s"
     clock: Literal["header", "log"] = "header"
+    nanosec: str | None = None
 
     @property
     def unit_ns(self) -> int | None:
@@ -183,6 +185,10 @@ class LogMap:
     def time_column(self, robot: int) -> str | None:
         """Return the time column of one robot, counted from 1."""
         return self.time.column and self._fill(self.time.column, robot)
+
+    def nanosec_column(self, robot: int) -> str | None:
+        """Return the column of nanoseconds of one robot, counted from 1."""
+        return self.time.nanosec and self._fill(self.time.nanosec, robot)
 
     def _fill(self, text: str, robot: int, channel: str = "") -> str:
         values = {"robot": str(robot), "robot0": str(robot - 1), "channel": channel}
@@ -318,8 +324,11 @@ def parse_channel(
 def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEHOLDERS) -> TimeMap:
     """Parse the table ``[time]``."""
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
+    if "nanosec" in fields and ("column" not in fields or fields.values["unit"] != "s"):
+        raise InputError(f'{where}: nanosec goes with a column of whole seconds: column, and unit = "s"')
     return TimeMap(
         column=check_placeholders(fields, "column", placeholders),
+        nanosec=check_placeholders(fields, "nanosec", placeholders),
         unit=fields.one_of("unit", (*TIME_UNITS, DATES)) if "unit" in fields else "s",
         clock=fields.one_of("clock", ("header", "log")) if "clock" in fields else "header",
     )
@@ -476,7 +485,7 @@ def _robot_names(top: Fields, robots: int | None) -> tuple[str, ...]:
 def _check_names(found: LogMap, where: str) -> None:
     """Check that names are given if and only if a text holds ``{name}``."""
     channels = [*found.common.values(), *(c for own in found.own.values() for c in own.values())]
-    texts = [found.time.column, *(getattr(c, key) for c in channels for key in PLACES)]
+    texts = [found.time.column, found.time.nanosec, *(getattr(c, key) for c in channels for key in PLACES)]
     holds = any("{name}" in text for text in texts if text is not None)
     if holds and not found.called:
         raise InputError(

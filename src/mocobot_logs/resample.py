@@ -423,7 +423,7 @@ class Screen:
         if len(faulty):
             raise InputError(
                 f"{self._where}: {self._channels[faulty[0]]} is {values[faulty[0]]} in {here}; "
-                f"every value must be a finite number, smaller than {LARGEST:g} (--drop leaves samples out)"
+                f"every value must be a finite number, smaller than {LARGEST:g} (convert --drop leaves samples out)"
             )
         if step_ns < 0:
             raise InputError(

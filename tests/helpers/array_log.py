@@ -25,6 +25,10 @@ class ArrayLog:
     reads: int = 0
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        return ()
+
+    @property
     def robots(self) -> int:
         return len(self.streams)
 

@@ -99,19 +99,19 @@ def write_table(path: Path, values: dict[str, np.ndarray]) -> Path:
     return path
 
 
-def write_lerobot(folder: Path, q: np.ndarray, action: np.ndarray, fps: float) -> Path:
-    """A LeRobot dataset of one episode: states and actions as lists of 32-bit floats."""
+def write_lerobot(folder: Path, q: np.ndarray, action: np.ndarray, fps: float, episodes: int = 1) -> Path:
+    """A LeRobot dataset of episodes of one length: states and actions as lists of 32-bit floats."""
     rows = len(q)
     names = [f"{joint}.pos" for joint in JOINTS]
 
     def listed(values: np.ndarray) -> Any:
         return pa.FixedSizeListArray.from_arrays(pa.array(np.float32(values).ravel()), values.shape[1])
 
-    frame = np.arange(rows)
+    episode, frame = np.divmod(np.arange(rows), rows // episodes)
     table = pa.table({
         "observation.state": listed(q), "action": listed(action),
         "timestamp": pa.array(np.float32(frame / fps)), "frame_index": frame,
-        "episode_index": np.zeros(rows, np.int64), "index": frame, "task_index": np.zeros(rows, np.int64),
+        "episode_index": episode, "index": np.arange(rows), "task_index": np.zeros(rows, np.int64),
     })  # fmt: skip
     (folder / "data" / "chunk-000").mkdir(parents=True)
     (folder / "meta").mkdir()

@@ -20,7 +20,8 @@ from joint_logs import write_table
 from log_files import channels_of, read_log, write_lerobot, write_text
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.convert import write_csv, write_npz
-from mocobot_logs.draft import draft_joint_map, draft_of, team_draft
+from mocobot_logs.draft import draft_of, team_draft
+from mocobot_logs.draft_joints import draft_joint_map
 from mocobot_logs.draft_names import Candidate, find_channels, read_name
 from mocobot_logs.maps import LogMap, parse_map, read_map
 from recordings import small_recording

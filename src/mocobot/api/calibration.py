@@ -214,7 +214,8 @@ def calibrate(
         [given] if isinstance(given, Recording | Path | str) else list(given) for given in (logs, free)
     )
     labels, masses = _labels(chosen.payload_of or {}, held), _masses(chosen.known_mass)
-    read = list(recordings_of([*held, *alone], chosen.map, say=say, note=note))
+    given = recordings_of([*held, *alone], chosen.map, episode=chosen.episode, say=say, note=note)
+    read = list(given)
     carried = _labelled(read[: len(held)], labels)
     found = fit(carried, read[len(held) :], assumed, _weights(masses, carried), say)
     if chosen.parallel_flanges:

@@ -194,7 +194,7 @@ def map(
         draft = draft_of(Path(log), chosen.episode)
         return MapDraft(draft.text, _count(draft.robots, "robot"), draft.doubtful, draft.missing)
     from mocobot.api.joints import read_model
-    from mocobot_logs.draft import draft_joint_map
+    from mocobot_logs.draft_joints import draft_joint_map
 
     robot = read_model(model)
     made_of = draft_joint_map(Path(log), robot.joints, [bool(s) for s in robot.slides], chosen.episode)

@@ -184,7 +184,8 @@ def diagnose(
         return Diagnosis(_diagnosed_joints(model, logs, reference or (), chosen, say))
     known = read_tolerances(None if chosen.tolerances is None else Path(chosen.tolerances))
     given: Any = logs
-    recordings = list(recordings_of(given, chosen.map, Robots(chosen.calibration), say=say, note=note))
+    robots, episode = Robots(chosen.calibration), chosen.episode
+    recordings = list(recordings_of(given, chosen.map, robots, episode=episode, say=say, note=note))
     with workers_of(chosen.scheduler):
         found = diagnose_team(
             recordings, known, tuple(chosen.exclude),
@@ -204,7 +205,7 @@ def _diagnosed_joints(
 
     robot, tolerances = read_model(model), _joint_tolerances(chosen.tolerances)
     say("reading")
-    read = [read_logs(given, robot, map=chosen.map) for given in (logs, reference)]
+    read = [read_logs(given, robot, map=chosen.map, episode=chosen.episode) for given in (logs, reference)]
     verdict = judged(
         robot, read[0], reference=read[1], excluded=tuple(chosen.exclude), tolerances=tolerances,
         seconds=chosen.seconds, say=say,

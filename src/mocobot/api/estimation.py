@@ -74,7 +74,7 @@ def estimate(
     """
     chosen = made(EstimateOptions, options, fields)
     robots = Robots(chosen.calibration)
-    given = recordings_of(logs, chosen.map, robots, say=say, note=note)
+    given = recordings_of(logs, chosen.map, robots, episode=chosen.episode, say=say, note=note)
     if chosen.self_calibrate:
         found = _self_calibrated(list(given), chosen.cutoff_hz, say)
     elif robots.calibration is None:

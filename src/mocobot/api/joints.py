@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from discrepancy.joints.model import SerialModel, load_model
 from estimator.errors import InputError
 from mocobot.api.recordings import quiet
+from mocobot_logs.formats import log_kind
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, read_joint_map
 from mocobot_logs.joints.read import open_joint_log, read_joint_log
+from mocobot_logs.table.parquet import episodes_of
 
 MAP = "log.toml"
 """Name of the default map, searched beside the log and then beside the model."""
@@ -37,11 +41,13 @@ def read_logs(
 ) -> list[JointLog]:
     """Read joint logs in the units and order of the model's joints; long gaps split a log into several.
 
+    Every episode of a LeRobot dataset is a log.
+
     Args:
         logs: files in any format that ``convert`` reads, or logs that are already read.
         model: robot, or path of its file.
         map: map file (docs/serial/guide.md); default: ``log.toml`` beside the log or the model.
-        episode: episode of a LeRobot dataset that holds several.
+        episode: the only episode of a LeRobot dataset to read; None for all.
         advance: called with 1 after every file.
 
     Raises:
@@ -55,8 +61,13 @@ def read_logs(
                 raise InputError(f"{log.name}: its joints are not those of {robot.path}")
             found.append(log)
             continue
-        log_map = map_of(robot, Path(log), map)
-        found += read_joint_log(open_joint_log(log, log_map, episode), log_map)
+        log_map, every = map_of(robot, Path(log), map), [episode]
+        if episode is None and log_kind(Path(log)) == "lerobot":
+            every = [*episodes_of(Path(log))]
+        for each in every:
+            read = read_joint_log(open_joint_log(log, log_map, each), log_map)
+            several = f" (episode {each})" if len(every) > 1 else ""
+            found += [replace(part, name=part.name.replace(str(log), f"{log}{several}", 1)) for part in read]
         advance(1)
     return found
 
@@ -73,8 +84,8 @@ def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
         if beside.is_file():
             return beside
     raise InputError(
-        f"{log}: no map was given (--map), and there is no {MAP} beside it or beside {model.path}; `mocobot map {log} "
-        f"--model {model.path}` drafts one"
+        f"{log}: no map was given (--map), and there is no {MAP} beside it or beside {model.path}; `mocobot map "
+        f"{shlex.quote(str(log))} --model {shlex.quote(str(model.path))}` drafts one"
     )
 
 

@@ -89,6 +89,7 @@ def recordings_of(
     map: Path | str | None = None,
     robots: Robots | None = None,
     *,
+    episode: int | None = None,
     say: Say = quiet,
     note: Say = quiet,
 ) -> Iterator[Recording]:
@@ -98,6 +99,7 @@ def recordings_of(
         given: recordings, files of recordings, or logs, which are converted in memory.
         map: map of the logs, by file or built-in name; default: detected from the log.
         robots: robot parameters; None for those of each recording.
+        episode: episode of a LeRobot dataset that holds several.
         say: called with the name of each stage that begins.
         note: called with a text on how each log was read.
 
@@ -120,7 +122,7 @@ def recordings_of(
                 from mocobot_sim.scene.models import omnid_design  # imports MuJoCo
 
                 needed = True
-                source = open_log(path, log_map if is_log else None)
+                source = open_log(path, log_map if is_log else None, episode)
                 rate_hz = RATE_HZ if is_log or source.metadata is None else source.metadata.rate_hz
                 trial = log_map.trial if is_log and log_map is not None else None
                 done = convert(source, Labels(trial=trial), omnid_design(), rate_hz=rate_hz)

@@ -119,7 +119,7 @@ def _joint_replays(
 
     robot, replays = read_model(model), []
     for log, name in zip(logs, names, strict=True):
-        parts = read_logs(log, robot, map=chosen.map)
+        parts = read_logs(log, robot, map=chosen.map, episode=chosen.episode)
         for number, part in enumerate(parts, 1):
             replays.append(joint_replay(robot, part, f"{name}-part{number}" if len(parts) > 1 else name))
     return replays

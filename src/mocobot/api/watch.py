@@ -137,15 +137,15 @@ def watch(
     """
     chosen, seen = made(WatchOptions, options, fields), Watched()
     for path in [logs] if isinstance(logs, Path | str) else logs:
-        _look(seen, Path(path), chosen.map, say)
+        _look(seen, Path(path), chosen, say)
     _conclude(seen, chosen.jobs, say, simulated)
     return seen
 
 
-def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> None:
+def _look(seen: Watched, path: Path, chosen: WatchOptions, say: Say) -> None:
     """Inspect a file, and add its usable recordings to ``seen``."""
     say(f"inspecting {path.name}")
-    found = inspect(path, map=log_map)
+    found = inspect(path, map=chosen.map, episode=chosen.episode)
     ready = found.ready_for
     if ready.startswith("ready for: nothing"):
         why = "; ".join(finding.sentence for finding in found.findings)
@@ -155,7 +155,8 @@ def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> No
     if is_log or skewed:
         say(f"converting {path.name}")
     try:
-        recordings, done = _used(path, log_map if is_log else None, is_log=is_log, skewed=skewed)
+        how = {"map": chosen.map, "episode": chosen.episode} if is_log else {}
+        recordings, done = _used(path, how, is_log=is_log, skewed=skewed)
     except InputError as error:
         seen.lines.append(f"{path}: left out, it cannot be used as it is: {error}.")
         return
@@ -166,10 +167,8 @@ def _look(seen: Watched, path: Path, log_map: Path | str | None, say: Say) -> No
     seen.lines.append(f"{path}: {ready}.")
 
 
-def _used(
-    path: Path, log_map: Path | str | None, *, is_log: bool, skewed: bool
-) -> tuple[dict[str, Recording], str]:
-    """Read the usable recordings of a file.
+def _used(path: Path, how: dict[str, Any], *, is_log: bool, skewed: bool) -> tuple[dict[str, Recording], str]:
+    """Read the usable recordings of a file; ``how`` are options of its conversion.
 
     Returns:
         Recordings by name, and the steps that were necessary as text, empty if none.
@@ -178,11 +177,11 @@ def _used(
     try:
         if not is_log and not skewed:
             return {path.stem: read(path)}, ""
-        recording = convert(path, map=log_map, clock=clock).recording
+        recording = convert(path, clock=clock, **how).recording
         return {path.stem: recording}, f"converted{corrected}"
     except InputError as error:
         try:
-            parts = convert_parts(path, map=log_map, clock=clock)
+            parts = convert_parts(path, clock=clock, **how)
         except InputError:
             raise error from None
         many = "the part of it" if len(parts) == 1 else f"the {len(parts)} parts of it"

@@ -45,7 +45,7 @@ _REFUSED = {
     **dict.fromkeys((8, 9, 20, 21), "delimited CDR2"),
     **dict.fromkeys((10, 11, 18, 19), "PL_CDR2"),
 }  # numbers of RTPS and of older XTypes
-_TRAILING = 3  # most padding bytes, to a multiple of four
+_PADDING = 3  # most padding bytes, to a multiple of four
 _NEW_LAYOUTS = 4
 """Number of unstored layouts of one size that are matched against all messages of a group; later ones match one
 message."""
@@ -243,6 +243,7 @@ class Walk:
         leaves: the wanted numbers and arrays of numbers, by dotted path.
         joints: strings of the field ``name``, if wanted.
         fixed: positions of all bytes that determine the layout: encapsulation, lengths, and names if wanted.
+        unread: bytes after the last field, without padding; ROS 2 leaves them unread, too.
     """
 
     def __init__(self, message: bytes, kind: MessageType, wanted: set[str], names: bool) -> None:
@@ -272,8 +273,8 @@ class Walk:
         self.joints: list[str] = []
         self.fixed: list[int] = [0, 1]
         self._structure(kind.name, "")
-        if self._at + _TRAILING < len(message):
-            raise CdrError(f"it has {len(message)} bytes, {len(message) - self._at} more than its type says")
+        rest = len(message) - self._at
+        self.unread = rest if rest > _PADDING else 0
 
     def _structure(self, name: str, path: str) -> None:
         for field, description in self._kind.fields(name):
@@ -352,12 +353,19 @@ class Selector:
     joint: str | None = None
 
 
+EMPTY = "has no"
+"""First words of what a selector lacks if the array of a field is empty."""
+_UNEQUAL = "cannot be told from the others"
+
+
 class Layout:
     """Positions of the wanted numbers in messages of one size.
 
     Attributes:
         joints: names of the joints, if joints are wanted.
         lacking: for each selector, why messages of this layout lack the number; None if they have it.
+        named: for each selector, whether messages of this layout name its joint; true without a joint.
+        unread: bytes after the last field.
     """
 
     def __init__(self, message: bytes, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
@@ -370,7 +378,8 @@ class Layout:
         arrays = {re.sub(r"\[\d+\]$", "", selector.field) for selector in selectors}
         time = {_SEC, _NANOSEC} if stamp else set()
         walk = Walk(message, kind, arrays | time, names)
-        self.joints = walk.joints
+        self.joints, self.unread = walk.joints, walk.unread
+        self.named = np.array([s.joint is None or s.joint in walk.joints for s in selectors], bool)
         self._at = np.array(walk.fixed, np.intp)
         self._fixed = np.frombuffer(message, np.uint8)[self._at]
         places = {path: (walk.leaves[path].kind, walk.leaves[path].offset) for path in time}
@@ -398,8 +407,11 @@ class Layout:
                 return "is missing" if not times else "is named more than once"
             index = walk.joints.index(selector.joint)
         leaf = walk.leaves.get(path)
+        if selector.joint is not None and leaf is not None and leaf.count not in (0, len(walk.joints)):
+            # JointState.msg: "All arrays in this message should have the same size, or be empty."
+            return f"{_UNEQUAL}: {selector.field} holds {leaf.count} numbers for {len(walk.joints)} names"
         if leaf is None or index >= leaf.count:
-            return f"has no {selector.field}" if selector.joint is not None else "is missing"
+            return f"{EMPTY} {selector.field}" if selector.joint is not None else "is missing"
         return leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -436,6 +448,8 @@ class CdrReader:
         joints: names of all joints seen, in order.
         lacking: for each selector, why all messages so far lack the number; None if some had it.
         count: number of messages read.
+        unread: most bytes after the last field of a message.
+        senders: sets of joints that messages name, each sent by a publisher of its own; the first 64.
     """
 
     def __init__(self, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
@@ -444,12 +458,18 @@ class CdrReader:
         self._layouts: dict[int, list[Layout]] = {}
         self._kept = 0
         self.joints: dict[str, None] = {}
+        self.senders: set[frozenset[str]] = set()
         self.lacking: list[str | None] = ["is missing"] * len(self._selectors)
-        self.count = 0
+        self.count = self.unread = 0
 
     def read(self, messages: Messages) -> tuple[Stamps, Array]:
         """Return stamps [ns] (0 if not wanted), shape (q,), and numbers, NaN where lacking, shape (q, S)."""
+        return self.read_named(messages)[:2]
+
+    def read_named(self, messages: Messages) -> tuple[Stamps, Array, NDArray[np.bool_]]:
+        """Return stamps and numbers as ``read`` does, and whether a message names each joint, shape (q, S)."""
         stamps = np.zeros(len(messages), np.int64)
+        named = np.ones((len(messages), len(self._selectors)), bool)
         values = np.empty((len(messages), len(self._selectors)))
         memory = np.frombuffer(messages.block, np.uint8)
         for begin in range(0, len(messages), _GROUP):
@@ -460,12 +480,17 @@ class CdrReader:
                 if not size:
                     raise self._error(int(index[0]), CdrError("it is empty"))
                 rows = np.lib.stride_tricks.sliding_window_view(memory, int(size))[messages.start[index]]
-                self._read_rows(rows, index, stamps, values)
+                self._read_rows(rows, index, stamps, values, named)
         self.count += len(messages)
-        return stamps, values
+        return stamps, values, named
 
     def _read_rows(
-        self, rows: NDArray[np.uint8], index: NDArray[np.intp], stamps: Stamps, values: Array
+        self,
+        rows: NDArray[np.uint8],
+        index: NDArray[np.intp],
+        stamps: Stamps,
+        values: Array,
+        named: NDArray[np.bool_],
     ) -> None:
         """Read messages of one size: try the known layouts in turn, then learn new ones."""
         known = self._layouts.setdefault(rows.shape[1], [])
@@ -482,6 +507,7 @@ class CdrReader:
             here, at = (rows, index) if every else (rows[fits], index[fits])
             try:
                 stamps[at], values[at] = layout.read(here)
+                named[at] = layout.named
             except CdrError as error:
                 raise self._error(int(at[error.row]), error) from error
             for number, lacking in enumerate(layout.lacking):
@@ -494,6 +520,9 @@ class CdrReader:
             layout = Layout(row.tobytes(), self._kind, self._selectors, self._stamp)
         except CdrError as error:
             raise self._error(index, error) from error
+        self.unread = max(self.unread, layout.unread)
+        if len(self.senders) < _KEPT_LAYOUTS:
+            self.senders.add(frozenset(layout.joints))
         for joint in layout.joints:
             if len(self.joints) < 1000:
                 self.joints[joint] = None

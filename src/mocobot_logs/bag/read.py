@@ -2,8 +2,10 @@
 
 A map locates each channel: a topic and a joint of its sensor_msgs/msg/JointState, or a dotted path in another message.
 Time is ``header.stamp`` or, if the map says so, the time of logging. If a robot's channels come from several topics,
-``RowAligner`` brings them onto the stamps of the fastest. Optional commands are left out if their stamps differ from
-those of the samples. A joint that is missing in some messages gives NaN there.
+``RowAligner`` brings them onto the stamps of the fastest; so it does if publishers that share a topic each send some of
+the joints. Optional commands are left out if their stamps differ from those of the samples. A message without any
+wanted joint is no sample. Where the recorder's clock replaces header stamps that are zero, or messages are left out,
+a note says so.
 
 A bag of any length is read once from front to back, a few MiB at a time.
 """
@@ -13,6 +15,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +25,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.bag.cdr import (
+    EMPTY,
     JOINT_STATE,
     STRING,
     CdrReader,
@@ -173,7 +177,8 @@ STAMPS = 1000
 """Number of stamps per topic that are read before the bag itself."""
 _ENOUGH_BLOCKS = 64
 """Number of blocks after which the stamps found so far must suffice."""
-_NAMES_BYTES = 64 << 10  # several publishers may each send some of the joints
+_EARLY_NS = 1_000_000_000
+"""A clock that was just set to zero, as of a simulation, is before this; a stamp of zero counts then [ns]."""
 _MAPS = ("mocobot-ros2", "omnid-ros2")
 
 
@@ -184,6 +189,7 @@ class Look:
         """``bag`` is the bag's name in messages; nothing is read yet."""
         self._bag, self._files = bag, files
         self._joints: dict[str, tuple[str, ...]] = {}
+        self._senders: dict[str, set[frozenset[str]]] = {}
         self._stamps: dict[tuple[str, str], Stamps] = {}
 
     def first(self, topic: str, block_bytes: int) -> Messages | None:
@@ -192,6 +198,20 @@ class Look:
             return None
         found = self._files.blocks((topic,), lambda _: None, block_bytes)
         return next((block[topic] for block in found), None)
+
+    def firsts(self, topic: str) -> Iterator[Messages]:
+        """Yield the first messages of a topic, at least ``STAMPS`` if there are so many.
+
+        Several publishers may each send some of the joints, and one of them may start late.
+        """
+        count = 0
+        blocks = self._files.blocks((topic,), lambda _: None) if self._files.has_messages(topic) else ()
+        for block in islice(blocks, _ENOUGH_BLOCKS):
+            if topic in block:
+                yield block[topic]
+                count += len(block[topic])
+            if count >= STAMPS:
+                return
 
     def joints(self, topic: str) -> tuple[str, ...]:
         """Return the joints in the first messages of a topic, empty if it has no joint states or does not exist."""
@@ -202,10 +222,61 @@ class Look:
             reader = CdrReader(kind, [Selector("position", "")], stamp=False)
             if kind.name == JOINT_STATE:
                 kind.require_joints("position")
-                if (messages := self.first(topic, _NAMES_BYTES)) is not None:
+                for messages in self.firsts(topic):
                     reader.read(messages)
-            self._joints[topic] = tuple(reader.joints)
+            self._joints[topic], self._senders[topic] = tuple(reader.joints), reader.senders
         return self._joints[topic]
+
+    def together(self, topic: str, joints: Sequence[str]) -> list[set[str]]:
+        """Return the joints of a topic in groups, one for each publisher that sends joints of its own."""
+        groups: list[set[str]] = []
+        if self.joints(topic):
+            for sent in self._senders[topic]:
+                mine = set(joints) & sent
+                groups = [
+                    *(g for g in groups if not g & mine),
+                    mine.union(*(g for g in groups if g & mine)),
+                ]
+        return sorted(filter(None, groups), key=lambda group: min(map(joints.index, group)))
+
+    def sent(self, topic: str, joints: Sequence[str], clock: Clock) -> Stamps:
+        """Return stamps [ns] of the first messages of a topic that name some of the joints."""
+        kind, found = message_type(self._files.topics[topic], self._bag), [np.empty(0, np.int64)]
+        reader = CdrReader(kind, [Selector("position", joint) for joint in joints], clock == "header")
+        for messages in self.firsts(topic):
+            stamps, _, named = reader.read_named(messages)
+            found.append((stamps if clock == "header" else messages.log_ns)[named.any(axis=1)])
+        return np.concatenate(found)
+
+    def numbers(self, topic: str, joints: Sequence[str], field: str) -> dict[str, tuple[Array, str]]:
+        """Return the finite values of a field in the first messages by joint, and why there are none, if so."""
+        reader = CdrReader(
+            message_type(self._files.topics[topic], self._bag),
+            [Selector(field, joint) for joint in joints],
+            stamp=False,
+        )
+        values = np.concatenate(
+            [np.empty((0, len(joints))), *(reader.read(m)[1] for m in self.firsts(topic))]
+        )
+        found = {}
+        for joint, x, lacking in zip(joints, values.T, reader.lacking, strict=True):
+            why = (
+                f"{field} is NaN"
+                if lacking is None
+                else f"{field} is empty"
+                if lacking.startswith(EMPTY)
+                else lacking.partition(": ")[2]
+            )
+            found[joint] = x[np.isfinite(x)], f"{why} in the first {reader.count} messages"
+        return found
+
+    def is_stamped(self, topic: str) -> bool:
+        """Return whether messages have header stamps, and the first ones are not all zero."""
+        try:
+            message_type(self._files.topics[topic], self._bag).require_stamp()
+        except InputError:
+            return False
+        return bool(self.stamps((topic,), "header")[topic].any())
 
     def stamps(self, topics: Sequence[str], clock: Clock) -> dict[str, Stamps]:
         """Return stamps [ns] of the first messages of some topics, in a single pass over the bag."""
@@ -257,10 +328,20 @@ class _Use:
 
 @dataclass(frozen=True, eq=False)
 class _Topic:
-    """What to read from one topic: selectors with their meaning (channel and robot), and their uses."""
+    """What to read from one topic.
 
+    Attributes:
+        name: its name.
+        kind: type of its messages.
+        selectors: numbers to read, with their meaning (channel and robot).
+        optional: numbers that all messages may lack.
+        uses: uses by robots.
+    """
+
+    name: str
     kind: MessageType
     selectors: dict[Selector, str]
+    optional: set[Selector]
     uses: list[_Use]
 
 
@@ -282,7 +363,10 @@ class BagSource:
         self.channels = self._map.required
         if self._map.has_commands(self.robots, lambda channel: self._files.has_messages(channel.topic or "")):
             self.channels += REF
+        self.notes: list[str] = []
         self._plan()
+        self._unset = self._stamps_unset() if self._clock == "header" else set()
+        self._clock_notes = len(self.notes)
         if any(len(topics) > 1 for topics in self._parts):  # one pass for all topics
             self._look.stamps(tuple(self._topics), self._clock)
         may_lack = self.channels != self._map.required and self._map.common[REF[0]].optional
@@ -298,7 +382,10 @@ class BagSource:
         Raises:
             InputError: the bag is damaged, a message does not match its type, or no message holds what the map names.
         """
-        readers = {name: _Reader(topic, self._clock) for name, topic in self._topics.items()}
+        readers = {
+            name: _Reader(topic, self._clock, unset=name in self._unset)
+            for name, topic in self._topics.items()
+        }
         aligners = [self._aligner(robot) for robot in range(self.robots)]
         for block in self._files.blocks(tuple(readers), advance):
             parts: list[dict[int, Samples]] = [{} for _ in range(self.robots)]
@@ -313,6 +400,21 @@ class BagSource:
                 yield robot, samples
         for reader in readers.values():
             reader.check_end()
+        self.notes[self._clock_notes :] = [*(note for reader in readers.values() for note in reader.notes())]
+
+    def _stamps_unset(self) -> set[str]:
+        """Return the topics whose stamps of zero are none; take the recorder's clock if a topic has no others."""
+        unset = set()
+        for topic, stamps in self._look.stamps(tuple(self._topics), self._clock).items():
+            later = stamps[stamps != 0]
+            if len(later) and later[0] > _EARLY_NS:
+                unset.add(topic)
+            elif len(stamps) > 1 and not len(later):
+                self._clock = "log"
+                self.notes.append(
+                    f"The header stamps of topic {printable(topic)} are zero, so the recorder's time is taken."
+                )
+        return unset
 
     def _choose_map(self) -> LogMap:
         """Return the built-in map that names more of the first robot's joints."""
@@ -362,6 +464,7 @@ class BagSource:
         """Locate every channel of every robot: topics of each robot, columns of each topic, selectors of each
         message."""
         selected: dict[str, dict[Selector, str]] = {}
+        optional: set[Selector] = set()
         for robot, channel_maps in enumerate(self._maps, 1):
             for name in self.channels:
                 channel, meaning = channel_maps[name], self._map.meaning(name, robot)
@@ -376,22 +479,31 @@ class BagSource:
                         f"topic {printable(topic)}; every channel needs its own"
                     )
                 known[selector] = meaning
+                optional |= {selector} if channel.optional else set()
         self._topics = {
-            topic: _Topic(self._checked_type(topic, meanings), meanings, [])
+            topic: _Topic(topic, self._checked_type(topic, meanings), meanings, optional & set(meanings), [])
             for topic, meanings in selected.items()
         }
-        self._parts = [
-            tuple(dict.fromkeys(m[name].topic or "" for name in self.channels)) for m in self._maps
-        ]
+        self._parts: list[tuple[str, ...]] = []
         self._columns: list[list[NDArray[np.intp]]] = []
-        for robot, (topics, maps) in enumerate(zip(self._parts, self._maps, strict=True)):
-            own = [[k for k, name in enumerate(self.channels) if maps[name].topic == t] for t in topics]
-            self._columns.append([np.array(columns, np.intp) for columns in own])
-            for part, (topic, columns) in enumerate(zip(topics, own, strict=True)):
+        for robot, maps in enumerate(self._maps):
+            topics = dict.fromkeys(maps[name].topic or "" for name in self.channels)
+            own = [(topic, columns) for topic in topics for columns in self._sent_together(topic, maps)]
+            self._parts.append(tuple(topic for topic, _ in own))
+            self._columns.append([np.array(columns, np.intp) for _, columns in own])
+            for part, (topic, columns) in enumerate(own):
                 used = tuple(maps[self.channels[k]] for k in columns)
                 places = list(self._topics[topic].selectors)
                 numbers = [places.index(Selector(c.field or "", c.joint)) for c in used]
                 self._topics[topic].uses.append(_Use(robot, part, numbers, used))
+
+    def _sent_together(self, topic: str, maps: Mapping[str, ChannelMap]) -> list[list[int]]:
+        """Return a robot's columns of a topic in groups that come in the same messages."""
+        columns = [k for k, name in enumerate(self.channels) if maps[name].topic == topic]
+        joints = [maps[self.channels[k]].joint or "" for k in columns]
+        groups = self._look.together(topic, joints) if any(joints) else []
+        at = [next((n for n, group in enumerate(groups) if joint in group), 0) for joint in joints]
+        return [[k for k, n in zip(columns, at, strict=True) if n == each] for each in dict.fromkeys(at)]
 
     def _checked_type(self, topic: str, selectors: Mapping[Selector, str]) -> MessageType:
         kind = message_type(self._files.topics[topic], self.name)
@@ -413,11 +525,13 @@ class BagSource:
 
     def _aligner(self, robot: int) -> RowAligner | None:
         """Return the aligner of a robot's topics; a single topic needs none."""
-        topics = self._parts[robot]
+        topics, maps = self._parts[robot], self._maps[robot]
         if len(topics) == 1:
             return None
-        periods = []
-        for topic, stamps in self._look.stamps(topics, self._clock).items():
+        periods, every = [], self._look.stamps(topics, self._clock)
+        for topic, columns in zip(topics, self._columns[robot], strict=True):
+            joints = [maps[self.channels[k]].joint or "" for k in columns]
+            stamps = every[topic] if topics.count(topic) == 1 else self._look.sent(topic, joints, self._clock)
             steps = np.diff(stamps)
             if not (steps > 0).any():
                 raise InputError(
@@ -457,17 +571,20 @@ def open_bag(path: Path, log_map: LogMap | None = None) -> BagSource:
 class _Reader:
     """Reads one topic and checks that each selector occurs in some message."""
 
-    def __init__(self, topic: _Topic, clock: Clock) -> None:
-        self._topic, self._clock = topic, clock
+    def __init__(self, topic: _Topic, clock: Clock, *, unset: bool) -> None:
+        """``unset`` tells whether a stamp of zero is none."""
+        self._topic, self._clock, self._unset = topic, clock, unset
         self._cdr = CdrReader(topic.kind, tuple(topic.selectors), stamp=clock == "header")
-        self._stamped = clock == "log"
+        self._zeros = self._others = 0
 
     def read(self, messages: Messages, parts: list[dict[int, Samples]]) -> None:
         """Read the messages of a block into the robots' parts."""
-        stamps, numbers = self._cdr.read(messages)
+        stamps, numbers, named = self._cdr.read_named(messages)
         if self._clock == "log":
             stamps = messages.log_ns
-        self._stamped = self._stamped or bool(stamps.any())
+        stamped = (stamps != 0) | (messages.log_ns < _EARLY_NS) | (not self._unset)
+        self._zeros += int(np.sum(~stamped))
+        self._others += int(np.sum(~named.any(axis=1)))
         if self._cdr.count >= ENOUGH:
             self._check(f"all of the first {self._cdr.count} messages")
         for use in self._topic.uses:
@@ -475,7 +592,28 @@ class _Reader:
             with np.errstate(over="ignore", invalid="ignore"):  # later stages check the values
                 for k, (number, channel) in enumerate(zip(use.numbers, use.maps, strict=True)):
                     values[:, k] = channel.apply(numbers[:, number])
-            parts[use.robot][use.part] = Samples(stamps, values, messages.log_ns)
+            samples, sent = (
+                Samples(stamps, values, messages.log_ns),
+                stamped & named[:, use.numbers].any(axis=1),
+            )
+            if sent.all():
+                parts[use.robot][use.part] = samples
+            elif sent.any():
+                parts[use.robot][use.part] = rows_of(samples, sent)
+
+    def notes(self) -> Iterator[str]:
+        """Yield a sentence for each irregularity of the messages."""
+        topic = printable(self._topic.name)
+        if self._zeros:
+            s, are = ("s", "are") if self._zeros > 1 else ("", "is")
+            yield f"{self._zeros} header stamp{s} of topic {topic} {are} zero; these messages are left out."
+        if self._others:
+            yield f"{self._others} of {self._cdr.count} messages of topic {topic} hold other joints alone."
+        if self._cdr.unread:
+            yield (
+                f"Messages of topic {topic} have up to {self._cdr.unread} bytes after their last field, which are not "
+                "read."
+            )
 
     def check_end(self) -> None:
         """Refuse a topic without messages, and one that lacks a selected number in every message."""
@@ -488,6 +626,8 @@ class _Reader:
         for (selector, meaning), lacking in zip(
             self._topic.selectors.items(), self._cdr.lacking, strict=True
         ):
+            if lacking is not None and lacking.startswith(EMPTY) and selector in self._topic.optional:
+                continue  # later stages leave such a channel out
             if lacking is not None and selector.joint is not None:
                 raise InputError(
                     f"{where}: joint {selector.joint!r:.60}, wanted for {meaning}, {lacking} in {every}; the joints "
@@ -497,8 +637,3 @@ class _Reader:
                 raise InputError(
                     f"{where}: field {selector.field!r:.60}, wanted for {meaning}, {lacking} in {every}"
                 )
-        if not self._stamped:
-            raise InputError(
-                f"{where}: the header stamp is zero in {every}; with clock = 'log' in the map's [time], the recorder's "
-                "clock is taken"
-            )

@@ -163,7 +163,10 @@ class JointMap:
 
     def of_source(self) -> LogMap:
         """Return the map in the form that readers of logs use: one robot with all channels in order."""
-        mapped = {label(*key): channel for key, channel in self.channels.items()}
+        mapped = {
+            label(*key): replace(channel, optional=key[0] not in POSITIONS)
+            for key, channel in self.channels.items()
+        }
         return LogMap(self.name, "joint", 1, None, self.time, self.csv, mapped, required=tuple(mapped))
 
 
@@ -234,7 +237,7 @@ def parse_joint_map(
         control=control,
         overrides=overrides,
     )
-    if found.time.column is not None and "{" in found.time.column:
+    if "{" in f"{found.time.column}{found.time.nanosec}":
         raise InputError(f"{where}: time: column holds a placeholder; all joints share one column of time")
     return found
 

@@ -33,7 +33,7 @@ from mocobot_logs.joints.joint_map import (
 )
 from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated
 from mocobot_logs.open_log import open_log
-from mocobot_logs.resample import MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
+from mocobot_logs.resample import LARGEST, MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
 from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, on_grid
 
 MAX_GAP_S = 0.05
@@ -73,35 +73,76 @@ def read_joint_log(
     Raises:
         InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
     """
-    return joint_logs_of(source.name, collect(source, advance).streams[0], log_map)
+    log = collect(source, advance)
+    return joint_logs_of(source.name, log.streams[0], log_map, log.notes)
 
 
-def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointLog]:
+def joint_logs_of(
+    name: str, samples: Samples, log_map: JointMap, notes: Sequence[str] = ()
+) -> list[JointLog]:
     """Return the parts between long gaps of a log in memory.
 
     Args:
         name: path of the log; the map may set gains by its last part.
         samples: rows of the log, channels in the map's order.
         log_map: map of the log.
+        notes: sentences on how the log was read.
 
     Raises:
         InputError: see ``read_joint_log``.
     """
+    samples, log_map, without = _with_values(name, samples, log_map)
     channels = tuple(label(*key) for key in log_map.channels)
     at = [k for k, (quantity, _) in enumerate(log_map.channels) if QUANTITIES[quantity].kind == "position"]
-    positions, notes = unwrapped(samples.values[:, at], [channels[k] for k in at])
-    if notes:
+    positions, turned = unwrapped(samples.values[:, at], [channels[k] for k in at])
+    if turned:
         values = samples.values.copy()
         values[:, at] = positions
         samples = replace(samples, values=values)
     control = log_map.control_of(Path(name).name)
     logs = [
-        _joint_log(part, log_map, name, control, notes)
+        _joint_log(part, log_map, name, control, (*notes, *without, *turned))
         for part in _even_parts(name, channels, samples, log_map.rate_hz)
     ]
     if len(logs) == 1:
         return logs
     return [replace(log, name=f"{log.name} (part {number})") for number, log in enumerate(logs, 1)]
+
+
+def _with_values(name: str, samples: Samples, log_map: JointMap) -> tuple[Samples, JointMap, list[str]]:
+    """Leave out channels without a value in any row; return a sentence for each quantity. Positions stay.
+
+    Raises:
+        InputError: what is left does not say what the drives give.
+    """
+    empty = empty_channels(samples.values, log_map)
+    if not empty or not len(samples.values):
+        return samples, log_map, []
+    kept = [k for k, key in enumerate(log_map.channels) if key not in empty]
+    left = {key: channel for key, channel in log_map.channels.items() if key not in empty}
+    names = {quantity for quantity, _ in left}
+    joints = {quantity: ", ".join(of for q, of in empty if q == quantity) for quantity, _ in empty}
+    told = [label(*each) for each in joints.items()]
+    if not names & {*EFFORTS, *COMMANDS, *DUTIES}:
+        lacking = "; ".join(told)
+        raise InputError(
+            f"{name}: has no value in any row for {lacking}; without a torque, a current, a command or a duty there is "
+            "nothing to compare the model with"
+        )
+    control = log_map.control
+    if control.command != "none" and not names & {*COMMANDS, *DUTIES}:
+        control = replace(control, command="none")
+    log_map = replace(log_map, channels=left, control=control)
+    samples = replace(samples, values=samples.values[:, kept])
+    return samples, log_map, [f"No row has a value of {each}; it is left out." for each in told]
+
+
+def empty_channels(values: Array, log_map: JointMap) -> list[tuple[str, str]]:
+    """Return the channels, other than positions, that have no value in any row of ``values``, shape (q, C)."""
+    given = _given(values)
+    return [
+        key for key, some in zip(log_map.channels, given, strict=True) if not some and key[0] not in POSITIONS
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +321,7 @@ def _plain(rate_hz: float) -> float:
 def _check_values(name: str, channels: tuple[str, ...], values: Array) -> None:
     if not len(values):
         raise InputError(f"{name}: has no samples")
-    infinite = np.argwhere(np.isinf(values))
+    infinite = np.argwhere(np.abs(values) >= LARGEST)
     if len(infinite):
         row, k = infinite[0]
         raise InputError(

@@ -317,13 +317,31 @@ def _template(data_path: Any, name: str) -> str:
     return data_path
 
 
-def _choose(files: Files, episode: int | None, name: str) -> tuple[int, list[Path]]:
+def episodes_of(path: Path) -> list[int]:
+    """Return the episodes of a LeRobot dataset, or of one of its files.
+
+    Raises:
+        InputError: it cannot be read, or has none.
+    """
+    root, name = dataset_root(path), str(path)
+    if root is None or not path.is_dir():
+        return _every({path: None}, name)
+    return _every(_data_files(root, _read_info(root, name), name), name)
+
+
+def _every(files: Files, name: str) -> list[int]:
+    """Return all episodes of data files."""
     if not files:
         raise InputError(f"{name}: has no Parquet files under data")
     told = [known for known in files.values() if known is not None]
     every = sorted(set[int]().union(*told) if told else _episodes_in(list(files), name))
     if not every:
         raise InputError(f"{name}: has no episodes")
+    return every
+
+
+def _choose(files: Files, episode: int | None, name: str) -> tuple[int, list[Path]]:
+    every = _every(files, name)
     listed = f"{every[0]}" if len(every) == 1 else f"{every[0]} to {every[-1]}"
     if episode is None:
         if len(every) > 1:

@@ -3,7 +3,7 @@
 import difflib
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +94,8 @@ class Place:
 class TableSource:
     """A table as a ``LogSource``."""
 
+    notes: Sequence[str] = ()
+
     def __init__(self, table: Table, log_map: LogMap) -> None:
         """Locate every channel of every robot."""
         log_map.require("column", "tables")
@@ -104,7 +106,12 @@ class TableSource:
         has_commands = log_map.has_commands(self.robots, lambda channel: self._find(channel) is not None)
         self.channels: tuple[str, ...] = log_map.required + (REF if has_commands else ())
         self._places = [self._places_of(robot) for robot in range(1, self.robots + 1)]
-        self._clocks = [self._clock_of(robot) for robot in range(1, self.robots + 1)]
+        self._clocks = [
+            self._clock_of(log_map.time_column(robot) or table.time_column)
+            for robot in range(1, self.robots + 1)
+        ]
+        below = [log_map.nanosec_column(robot) for robot in range(1, self.robots + 1)]
+        self._below = [None if name is None else self._clock_of(name) for name in below]
         self._check_shared()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
@@ -114,12 +121,15 @@ class TableSource:
             InputError: the table is damaged, or a column holds no numbers.
         """
         maps = [self._map.channels(robot) for robot in range(1, self.robots + 1)]
-        columns = tuple(dict.fromkeys(place.column for places in self._places for place in places))
+        below = [name for name in self._below if name is not None]
+        columns = tuple(
+            dict.fromkeys([*(place.column for places in self._places for place in places), *below])
+        )
         clocks = tuple(dict.fromkeys(self._clocks))
         row = 0
         for block in self._table.blocks(Wanted(columns, clocks, self._map.time.unit_ns), advance):
             for robot, (places, channels) in enumerate(zip(self._places, maps, strict=True)):
-                stamps, given = block.clocks[self._clocks[robot]]
+                stamps, given = self._stamps(block, robot, row)
                 values = np.empty((len(stamps), len(self.channels)))
                 # Values beyond floats and signalling NaN of damaged files are checked later.
                 with np.errstate(invalid="ignore", over="ignore"):
@@ -136,6 +146,22 @@ class TableSource:
                 yield robot, Samples(stamps, values)
             row += len(next(iter(block.clocks.values()))[0])
 
+    def _stamps(self, block: Block, robot: int, row: int) -> tuple[Stamps, NDArray[np.bool_]]:
+        """Return the stamps [ns] of a block's rows, and which are present; ``row`` is the first row."""
+        stamps, given = block.clocks[self._clocks[robot]]
+        if (name := self._below[robot]) is None:
+            return stamps, given
+        below = np.asarray(block.columns[name], float).reshape(-1)
+        given = given & ~np.isnan(below)
+        below = np.where(given, below, 0.0)
+        if (bad := (below < 0) | (below >= 1e9)).any():
+            k = int(np.argmax(bad))
+            raise InputError(
+                f"{self.name}: column {name!r} is {below[k]:.12g} in row {row + k}; the nanoseconds of a stamp are 0 "
+                "to 999999999"
+            )
+        return stamps + np.rint(below).astype(np.int64), given
+
     def _has_robot(self, robot: int) -> bool:
         channels = self._map.channels(robot)
         return any(self._find(channels[name]) is not None for name in self._map.required)
@@ -149,8 +175,7 @@ class TableSource:
             places.append(place)
         return places
 
-    def _clock_of(self, robot: int) -> str:
-        name = self._map.time_column(robot) or self._table.time_column
+    def _clock_of(self, name: str) -> str:
         shape = self._table.shapes.get(name)
         if shape is None:
             raise InputError(self._missing(name, "time"))

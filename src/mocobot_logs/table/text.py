@@ -7,6 +7,7 @@ Time becomes integer nanoseconds: exact for integers and dates, rounded for floa
 import contextlib
 import csv
 import re
+import shlex
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -288,9 +289,10 @@ class CsvTable(Table):
         self._names = _cut(header, self._delimiter)
         if not self._names:
             raise InputError(f"{name}: its header {header!r:.60} has an unmatched quotation mark")
-        if all(_is_number(cell, options.decimal) for cell in self._names):
+        if _is_values(self._names, _cut(first_row, self._delimiter), options.decimal):
             raise InputError(
-                f"{name}: the first line holds numbers ({header.strip()!r:.60}); it must name the columns"
+                f"{name}: the first line holds values, not names ({header.strip()!r:.60}); write a line before it that "
+                f"names the {len(self._names)} columns{_names_of_echo(path, self._names)}"
             )
         self._empty = not first_row
         self.size = path.stat().st_size
@@ -443,6 +445,32 @@ def _first_lines(path: Path, name: str, decimal: str) -> tuple[str, str, int, in
     if header is None or not header:
         raise InputError(f"{name}: has no header; the first line must name the columns")
     return header, "", lines, size
+
+
+def _is_values(cells: list[str], below: list[str], decimal: str) -> bool:
+    """Return whether the first line holds values: numbers, and words that the line ``below`` repeats."""
+    numbers = [_is_number(cell, decimal) for cell in cells]
+    if all(numbers):
+        return True
+    again = [cell in ("", *below[k : k + 1]) for k, cell in enumerate(cells)]
+    return any(numbers) and all(a or b for a, b in zip(numbers, again, strict=True))
+
+
+def _names_of_echo(path: Path, cells: list[str]) -> str:
+    """Return the command that names the columns of joint states by `ros2 topic echo --csv`, "" for other rows.
+
+    Such a row has sec, nanosec, frame_id, the joints' names, then positions, velocities and efforts; an empty array
+    leaves no cell. With two arrays left, one cannot tell which they are.
+    """
+    joints = [cell for cell in cells[3:] if re.fullmatch(r"[A-Za-z_][\w/.-]*", cell)]
+    rest = len(cells) - 3 - len(joints)
+    arrays = {3: ("position", "velocity", "effort"), 1: ("position",)}.get(rest // max(len(joints), 1), ())
+    if not arrays or cells[3 : 3 + len(joints)] != joints or rest != len(arrays) * len(joints):
+        return ""
+    names = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id"]
+    names += [f"name_{k}" for k in range(1, len(joints) + 1)]
+    names += [f"{array}.{joint}" for array in arrays for joint in joints]
+    return f"; for joint states of `ros2 topic echo --csv`: sed -i '1i {','.join(names)}' {shlex.quote(str(path))}"
 
 
 def _is_row(text: str, decimal: str) -> bool:

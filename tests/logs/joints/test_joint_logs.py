@@ -422,8 +422,11 @@ def test_values_that_cannot_be_used(tmp_path) -> None:
     values["hip.tau"][:400] = np.nan
     with pytest.raises(InputError, match=r"torque of hip has no value in 26.7 % of the rows; at most 10 %"):
         read(write_csv(tmp_path / "log.csv", values))
-    values["hip.tau"][:] = np.nan
-    with pytest.raises(InputError, match="torque of hip has no value in any row"):
+    for joint in JOINTS:
+        values[f"{joint}.tau"][:] = np.nan
+    with pytest.raises(
+        InputError, match=r"has no value in any row for torque of hip, knee, lift; without a torque"
+    ):
         read(write_csv(tmp_path / "log.csv", values))
     with pytest.raises(InputError, match="has 20 samples; at least 32"):
         read(written(tmp_path, time[:20]))

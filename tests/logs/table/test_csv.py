@@ -326,7 +326,7 @@ def refused_map(path: Path, log_map: LogMap) -> str:
     [
         (b"", "has no header"),
         (b"\n \n", "has no header"),
-        (b"1,2,3\n4,5,6\n", "the first line holds numbers"),
+        (b"1,2,3\n4,5,6\n", "the first line holds values, not names"),
         (b"\x00\x01\x02\x03" * 100, "holds binary data"),
         (b"a,\xff\xfe,b\n1,2,3\n", "is not text in UTF-8"),
         ("time,a\n".encode("utf-16"), "holds binary data"),
