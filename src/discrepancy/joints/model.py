@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,28 +13,34 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.joints.locking import Lock, locked
+from discrepancy.joints.mechanics import Coupling
+from discrepancy.joints.reading import ERRORS, read_spec
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_logs.formats import shown
-from mocobot_sim.model_check import check_model
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+_NAMED = 6
+"""Most bodies or joints that an advice lists. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class SerialModel:
-    """A robot model with J joints.
+    """A robot model with J joints that move on their own.
 
     Attributes:
         path: the file.
-        model: the compiled model.
-        joints: names in the order of qpos; each joint has one degree of freedom, so nq = nv = J.
+        model: the compiled model; it has further joints if some follow others.
+        joints: names of the J joints in the order of qpos, without followers; each has one degree of freedom.
         bodies: name of the body that each joint moves.
         slides: whether a joint is prismatic, shape (J,); the others are revolute.
         lower: lower position limit [rad or m], -inf if there is none, shape (J,).
         upper: upper position limit [rad or m], inf if there is none, shape (J,).
         torque_limit: largest torque of a joint's actuators [N m or N], inf if there is no limit, shape (J,).
+        coupling: positions of all joints of ``model`` from those of the J joints.
+        notes: sentences on what was read otherwise than the file says.
+        source: the model for changes; ``spec`` copies it.
     """
 
     path: Path
@@ -43,157 +51,216 @@ class SerialModel:
     lower: Array
     upper: Array
     torque_limit: Array
+    coupling: Coupling
+    notes: tuple[str, ...]
+    source: mujoco.MjSpec
+
+    def spec(self) -> mujoco.MjSpec:
+        """A copy of the model to change and to compile."""
+        return self.source.copy()
 
 
 def load_spec(path: Path | str) -> mujoco.MjSpec:
-    """Read a model as an editable ``MjSpec``, without its meshes if it does not compile with them.
-
-    Inverse dynamics needs no meshes if inertias are given, and many URDF files lack their meshes.
+    """Read a model as an editable ``MjSpec``; see ``reading.read_spec``.
 
     Raises:
         InputError: MuJoCo cannot read or compile the file.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; a model is an MJCF or URDF file")
-    check_model(path)
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except (ValueError, RuntimeError, OSError) as error:
-        raise InputError(f"{path}: MuJoCo cannot read it ({_sentence(error)})") from error
-    if path.suffix.lower() == ".urdf":
-        _without_mass(spec)
-    try:
-        spec.compile()
-    except (ValueError, RuntimeError, OSError) as error:
-        said = _sentence(error)
-        if spec.meshes:
-            spec = mujoco.MjSpec.from_file(
-                str(path)
-            )  # a spec that failed to compile lists no joints, so read it again
-            body = _body_of_meshes(spec)
-            if body is not None:
-                raise InputError(
-                    f"{path}: MuJoCo cannot compile it ({said}); without its meshes: the inertia of {body} would be "
-                    "another (give the body an inertial)"
-                ) from error
-            _drop_meshes(spec)
-            try:
-                spec.compile()
-                return _named(spec)
-            except (ValueError, RuntimeError, OSError) as other:
-                said += f"; without its meshes: {_sentence(other)}"
-        raise InputError(f"{path}: MuJoCo cannot compile it ({said})") from error
-    return _named(spec)
+    return read_spec(Path(path)).spec
 
 
-def _named(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Give every unnamed body a name, because findings refer to bodies by name."""
-    taken = {body.name for body in spec.bodies}
-    for k, body in enumerate(spec.bodies):
-        if not body.name:
-            joint = body.joints[0].name if body.joints else ""
-            name = f"link of {joint}" if joint else f"body {k}"
-            body.name = f"{name} ({k})" if name in taken else name
-            taken.add(body.name)
-    return spec
-
-
-def _body_of_meshes(spec: mujoco.MjSpec) -> str | None:
-    """The first moving body whose inertia comes from a mesh, in words; None if there is none."""
-    of = spec.compiler
-    low, high = of.inertiagrouprange
-    for geom in spec.geoms:
-        massless = geom.mass == 0.0 or (np.isnan(geom.mass) and geom.density == 0.0)
-        if not geom.meshname or massless or not low <= geom.group <= high:
-            continue
-        body = geom.parent
-        given = (
-            body.explicitinertial and of.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-        )
-        if not given and _moves(body):
-            return (
-                f"body {body.name!r}"
-                if body.name
-                else f"a body without a name (its mesh is {geom.meshname!r})"
-            )
-    return None
-
-
-def _moves(body: mujoco.MjsBody) -> bool:
-    """Whether a body or one of its ancestors has a joint."""
-    while body is not None and body.name != "world":
-        if body.joints:
-            return True
-        body = body.parent
-    return False
-
-
-def _without_mass(spec: mujoco.MjSpec) -> None:
-    """Set URDF links without an inertial to zero mass; MuJoCo would use the mass of the shapes of fixed ones."""
-    for body in spec.bodies:
-        if not body.explicitinertial and not body.joints:
-            for geom in body.geoms:
-                geom.mass = 0.0
-
-
-def _drop_meshes(spec: mujoco.MjSpec) -> None:
-    """Delete meshes and the geoms that use them."""
-    for geom in [geom for geom in spec.geoms if geom.meshname]:
-        spec.delete(geom)
-    for mesh in list(spec.meshes):
-        spec.delete(mesh)
-
-
-def load_model(path: Path | str) -> SerialModel:
+def load_model(path: Path | str, lock: Lock = (), base: str | None = None) -> SerialModel:
     """Read and check the model of a fixed-base tree of hinge and slide joints.
 
+    Args:
+        path: MJCF or URDF.
+        lock: joints that do not move, each with its position; see ``locking.Lock``.
+        base: body whose subtree is the arm; its parent is fixed to the world. None: the whole model.
+
     Raises:
-        InputError: MuJoCo cannot read the file, or the model is of another kind: without joints, or with unnamed,
-            free or ball joints, equality constraints (closed chains), tendons, soft bodies or plugins.
+        InputError: MuJoCo cannot read the file, or the model is of another kind: without joints, or with free or ball
+            joints, closed chains, soft bodies or plugins that act on bodies.
     """
-    model = load_spec(path).compile()
-    _check(Path(path), model)
+    path = Path(path)
+    read = read_spec(path)
+    spec, notes = read.spec, list(read.notes)
+    try:
+        if lock or base is not None:
+            notes += locked(spec, lock, base)
+        model = spec.compile()
+        notes += _without_holds(spec, model)
+        model = spec.compile()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except ERRORS as error:
+        raise InputError(f"{path}: MuJoCo cannot compile what is left of it ({error})") from error
+    _check(path, model)
+    for name, moments in read.exact.items():
+        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        if body >= 0:  # MuJoCo fuses bodies that do not move on their own
+            model.body_inertia[body] = moments
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         model.opt.gravity[:] = 0.0  # so that no caller needs to check the flag
-    joint = range(model.njnt)
-    limited = model.jnt_limited.astype(bool)
+    coupling = Coupling.of(model)
+    own = coupling.own
+    follows = [model.joint(k).name for k in range(model.njnt) if k not in own]
+    if follows:
+        notes.append(f"Joints that follow others are no joints of their own: {', '.join(follows)}.")
+    limited, limits = model.jnt_limited.astype(bool), _torque_limits(model)
     return SerialModel(
-        path=Path(path),
+        path=path,
         model=model,
-        joints=tuple(model.joint(j).name for j in joint),
-        bodies=tuple(model.body(model.jnt_bodyid[j]).name for j in joint),
-        slides=model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE),
-        lower=np.where(limited, model.jnt_range[:, 0], -np.inf),
-        upper=np.where(limited, model.jnt_range[:, 1], np.inf),
-        torque_limit=_torque_limits(model),
+        joints=tuple(model.joint(j).name for j in own),
+        bodies=tuple(model.body(model.jnt_bodyid[j]).name for j in own),
+        slides=(model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE))[own],
+        lower=np.where(limited, model.jnt_range[:, 0], -np.inf)[own],
+        upper=np.where(limited, model.jnt_range[:, 1], np.inf)[own],
+        torque_limit=limits[own],
+        coupling=coupling,
+        notes=tuple(notes),
+        source=spec,
     )
 
 
+def _without_holds(spec: mujoco.MjSpec, model: mujoco.MjModel) -> Iterator[str]:
+    """Delete constraints that hold nothing: those inactive, within one rigid body, or to a mocap body."""
+    held = []
+    for e, equality in reversed(list(enumerate(spec.equalities))):
+        pair = _ends(model, e)
+        mocap = pair is not None and any(model.body_mocapid[b] >= 0 for b in pair)
+        rigid = pair is not None and model.body_weldid[pair[0]] == model.body_weldid[pair[1]]
+        if mocap:
+            held.append(model.body(next(b for b in pair if model.body_mocapid[b] < 0)).name)
+        if mocap or rigid or not model.eq_active0[e]:
+            spec.delete(equality)
+    if held:
+        yield f"Constraints to mocap bodies, an aid of simulations, are left out: they hold {', '.join(held)}."
+
+
+def _ends(model: mujoco.MjModel, e: int) -> tuple[int, int] | None:
+    """The two bodies of a connect or weld constraint; None for other constraints."""
+    kinds = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD
+    if model.eq_type[e] not in kinds:
+        return None
+    pair = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+    if model.eq_objtype[e] == mujoco.mjtObj.mjOBJ_SITE:
+        pair = int(model.site_bodyid[pair[0]]), int(model.site_bodyid[pair[1]])
+    return pair
+
+
 def _check(path: Path, model: mujoco.MjModel) -> None:
-    allowed = "a diagnosis of joint logs needs a fixed-base tree of hinges and slides"
+    needs = "a diagnosis of joint logs needs a fixed-base tree of hinges and slides"
     if not model.njnt:
-        raise InputError(f"{path}: the model has no joints; {allowed}")
+        raise InputError(f"{path}: the model has no joints; {needs}")
     for j in range(model.njnt):
         name, word = model.joint(j).name, _OTHER.get(int(model.jnt_type[j]))
-        if word is not None:
-            raise InputError(f"{path}: joint {name or j + 1!r} is a {word} joint; {allowed}")
         if not name.isprintable():
             raise InputError(f"{path}: joint {name!r:.80} must have a printable name")
-        if not name:
-            body = model.body(model.jnt_bodyid[j]).name
-            raise InputError(
-                f"{path}: joint {j + 1} (of body {body!r}) has no name; the map names every joint"
-            )
+        if word is not None:
+            raise InputError(f"{path}: joint {name!r} is a {word} joint; {_instead_of(model, j)}")
+    for e in range(model.neq):
+        said = _closes(model, e)
+        if said:
+            raise InputError(f"{path}: {said}")
     for count, what in (
-        (int(model.neq), "equality constraint"),
-        (int(model.ntendon), "tendon"),
-        (int(model.nflex), "flexible body"),
-        (int(model.nplugin), "plugin"),
+        (int(model.nflex), "flexible bodies"),
+        (int(np.sum(model.body_plugin >= 0)), "bodies with plugins"),
     ):
         if count:
-            plural = what[:-1] + "ies" if what.endswith("y") else what + "s"
-            raise InputError(f"{path}: the model has {count} {what if count == 1 else plural}; {allowed}")
+            more = f"; name the part that has none: {_bases(model)}" if _candidates(model) else ""
+            raise InputError(f"{path}: the model has {what} ({count}); {needs}{more}")
+    try:
+        Coupling.of(model)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _instead_of(model: mujoco.MjModel, j: int) -> str:
+    """What to type because of a free or ball joint."""
+    name = model.joint(j).name
+    lock = f"--lock {shlex.quote(f'{name}=0')}"
+    if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_BALL):
+        return f"one position does not say where it is; lock it as modelled: {lock}"
+    body = int(model.jnt_bodyid[j])
+    if not any(_above(model, int(b), body) for b in _moved(model)):  # an object beside the robot
+        return f"name the robot without what lies beside it: {_bases(model)}"
+    return (
+        f"if its base was held, type {lock}; if one limb moved alone, name it: {_bases(model)}"
+        if _candidates(model)
+        else f"if its base was held, type {lock}"
+    )
+
+
+def _moved(model: mujoco.MjModel) -> list[int]:
+    """Bodies with hinges or slides."""
+    return [int(model.jnt_bodyid[j]) for j in range(model.njnt) if int(model.jnt_type[j]) not in _OTHER]
+
+
+def _above(model: mujoco.MjModel, body: int, other: int) -> bool:
+    """Whether a body is another or descends from it."""
+    while body != other and body:
+        body = int(model.body_parentid[body])
+    return body == other
+
+
+def _candidates(model: mujoco.MjModel) -> list[str]:
+    """Bodies that may be the base of an arm, those with most joints first: the first below each floating or fixed one."""
+    moved = _moved(model)
+    tops = {b for b in moved if not any(b != a and _above(model, b, a) for a in moved)}
+    ranked = sorted(tops, key=lambda top: (-sum(_above(model, b, top) for b in moved), top))
+    return [model.body(b).name for b in ranked]
+
+
+def _bases(model: mujoco.MjModel) -> str:
+    first, *others = _candidates(model)
+    more = f" (or {', '.join(others[: _NAMED - 1])})" if others else ""
+    return f"--base {shlex.quote(first)}{more}"
+
+
+def _closes(model: mujoco.MjModel, e: int) -> str:
+    """Sentence on a constraint that joints cannot be read with, and what to type; empty if they can."""
+    kind, pair = model.eq_type[e], _ends(model, e)
+    if kind == mujoco.mjtEq.mjEQ_JOINT:
+        if not model.eq_data[e, 2:5].any():
+            return ""
+        follower, leader = model.joint(int(model.eq_obj1id[e])).name, int(model.eq_obj2id[e])
+        joints = [leader] if leader >= 0 else [int(model.eq_obj1id[e])]
+        what = f"joint {follower!r} follows another by a polynomial, of which only a constant and a ratio are read"
+    elif pair is not None:
+        one, two = (model.body(b).name for b in pair)
+        loop = [
+            j
+            for j in range(model.njnt)
+            if _above(model, pair[0], int(model.jnt_bodyid[j])) != _above(model, pair[1], int(model.jnt_bodyid[j]))
+        ]
+        joints = _leaders(model, loop)
+        what = f"an equality constraint closes a chain between {one} and {two}, which no tree of joints can"
+    else:
+        tendons = [int(t) for t in (model.eq_obj1id[e], model.eq_obj2id[e]) if t >= 0]
+        if kind != mujoco.mjtEq.mjEQ_TENDON:
+            return "an equality constraint holds a flexible body; name the part without it: " + _bases(model)
+        wraps = [w for t in tendons for w in range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])]
+        at_joint = int(mujoco.mjtWrap.mjWRAP_JOINT)
+        joints = _leaders(model, [int(model.wrap_objid[w]) for w in wraps if model.wrap_type[w] == at_joint])
+        what = "an equality constraint couples tendons"
+    if not joints:
+        return f"{what}; name a part without it: {_bases(model)}"
+    values = (float(model.qpos0[model.jnt_qposadr[j]]) if int(model.jnt_type[j]) not in _OTHER else 0 for j in joints)
+    locks = " ".join(
+        f"--lock {shlex.quote(f'{model.joint(j).name}={value:g}')}"
+        for j, value in zip(joints, values, strict=True)
+    )
+    return f"{what}; lock the joints where they stood, such as {locks}"
+
+
+def _leaders(model: mujoco.MjModel, joints: list[int]) -> list[int]:
+    """Joints without those that follow others by equality constraints: they are locked with their leader."""
+    led = {
+        int(model.eq_obj1id[e])
+        for e in range(model.neq)
+        if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj2id[e] >= 0
+    }
+    return [j for j in dict.fromkeys(joints) if j not in led]
 
 
 def _torque_limits(model: mujoco.MjModel) -> Array:
@@ -206,8 +273,3 @@ def _torque_limits(model: mujoco.MjModel) -> Array:
             most = np.abs(model.actuator_forcerange[own]).max(axis=1) * np.abs(model.actuator_gear[own, 0])
             limits[joint] = min(limits[joint], float(most.sum()))
     return limits
-
-
-def _sentence(error: BaseException) -> str:
-    """The message of MuJoCo on one line."""
-    return shown(" ".join(str(error).split()), 300) or type(error).__name__
