@@ -1,4 +1,5 @@
-"""How many of the robots that packages bring are read: `python benchmarks/models.py FOLDER...`, a row for each folder.
+"""How many of the robots that packages bring are read: `python benchmarks/models.py FOLDER...`, a row for each folder;
+`-v` prints the advice that was followed, too.
 
 A file counts if it has an actuated chain: a MJCF with actuators and hinges or slides, or a URDF with joints that move.
 A refused file is tried again with what its refusal says to type, at most ``TRIES`` times.
@@ -67,7 +68,7 @@ def tried(path: Path) -> tuple[int, str]:
 def main() -> None:
     """Print the table, and each refusal."""
     print("folder | files | with a chain | read as is | after advice | refused")
-    for folder in map(Path, sys.argv[1:]):
+    for folder in (Path(name) for name in sys.argv[1:] if name != "-v"):
         files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in (".xml", ".urdf", ".mjcf") and p.is_file())
         robots = [path for path in files if has_chain(path)]
         found = {path: tried(path) for path in robots}

@@ -18,7 +18,7 @@ from estimator.strict import check_known
 
 Lock = Mapping[str, float | str] | Sequence[str]
 """Values by joint [rad or m, or a text such as ``"30deg"``], or texts such as ``"wrist=30deg"``."""
-HINGE, SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
+HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|m|)\s*")
 
 
@@ -63,11 +63,17 @@ def locked(spec: mujoco.MjSpec, lock: Lock, base: str | None) -> Iterable[str]:
         while chain[-1].parent.name != "world":
             chain.append(chain[-1].parent)
         above = [joint for body in chain[1:] for joint in body.joints]
-        above += [joint for joint in chain[0].joints if joint.type not in (HINGE, SLIDE)]
+        above += [joint for joint in chain[0].joints if int(joint.type) not in (HINGE, SLIDE)]
         values |= {joint.name: _reference(model, joint.name) for joint in above if joint.name not in values}
         for body, kept in zip([*chain[1:], spec.worldbody], chain, strict=True):
             for other in [child for child in body.bodies if child.name != kept.name]:
                 spec.delete(other)
+        left = {body.name for body in spec.bodies}
+        for looking in [*spec.cameras, *spec.lights]:
+            if looking.targetbody and looking.targetbody not in left:
+                spec.delete(looking)
+        for skin in list(spec.skins):
+            spec.delete(skin)
     _with_followers(model, values)
     for body in spec.bodies[1:]:
         _move(model, body, {joint.name: values[joint.name] for joint in body.joints if joint.name in values})
@@ -83,7 +89,7 @@ def locked(spec: mujoco.MjSpec, lock: Lock, base: str | None) -> Iterable[str]:
 
 def _position(model: mujoco.MjModel, name: str, text: str) -> float:
     """Position at which a joint is locked [rad or m]; 0 for the reference pose of a free or ball joint."""
-    match, kind = _VALUE.fullmatch(text), model.joint(name).type[0]
+    match, kind = _VALUE.fullmatch(text), int(model.joint(name).type[0])
     number = float(match[1]) if match else math.nan
     if kind not in (HINGE, SLIDE):
         if number != 0.0:
@@ -103,7 +109,7 @@ def _position(model: mujoco.MjModel, name: str, text: str) -> float:
 
 
 def _shown(model: mujoco.MjModel, name: str, value: float) -> str:
-    kind = model.joint(name).type[0]
+    kind = int(model.joint(name).type[0])
     if kind not in (HINGE, SLIDE):
         return "its reference pose"
     return f"{value:.4g} {'rad' if kind == HINGE else 'm'}"
@@ -112,7 +118,7 @@ def _shown(model: mujoco.MjModel, name: str, value: float) -> str:
 def _reference(model: mujoco.MjModel, name: str) -> float:
     """Position of a hinge or slide in the reference pose; 0 for others."""
     joint = model.joint(name)
-    return float(joint.qpos0[0]) if joint.type[0] in (HINGE, SLIDE) else 0.0
+    return float(joint.qpos0[0]) if int(joint.type[0]) in (HINGE, SLIDE) else 0.0
 
 
 def _move(model: mujoco.MjModel, body: mujoco.MjsBody, values: Mapping[str, float]) -> None:
@@ -125,7 +131,7 @@ def _move(model: mujoco.MjModel, body: mujoco.MjsBody, values: Mapping[str, floa
             if position.any() or rotation.magnitude():
                 joint.axis, joint.pos = rotation.inv().apply(axis), rotation.inv().apply(anchor - position)
             continue
-        if at.type[0] not in (HINGE, SLIDE):
+        if int(at.type[0]) not in (HINGE, SLIDE):
             continue
         way = values[joint.name] - float(at.qpos0[0])
         turn = Rotation.from_rotvec(way * axis if at.type[0] == HINGE else np.zeros(3))

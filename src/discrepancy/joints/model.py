@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from discrepancy.joints.locking import Lock, locked
 from discrepancy.joints.mechanics import Coupling
-from discrepancy.joints.reading import ERRORS, read_spec
+from discrepancy.joints.reading import ERRORS, read_spec, sentence
 from estimator.arrays import Array
 from estimator.errors import InputError
 
@@ -93,7 +93,7 @@ def load_model(path: Path | str, lock: Lock = (), base: str | None = None) -> Se
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except ERRORS as error:
-        raise InputError(f"{path}: MuJoCo cannot compile what is left of it ({error})") from error
+        raise InputError(f"{path}: MuJoCo cannot compile what is left of it ({sentence(error)})") from error
     _check(path, model)
     for name, moments in read.exact.items():
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
@@ -139,8 +139,7 @@ def _without_holds(spec: mujoco.MjSpec, model: mujoco.MjModel) -> Iterator[str]:
 
 def _ends(model: mujoco.MjModel, e: int) -> tuple[int, int] | None:
     """The two bodies of a connect or weld constraint; None for other constraints."""
-    kinds = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD
-    if model.eq_type[e] not in kinds:
+    if int(model.eq_type[e]) not in (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)):
         return None
     pair = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
     if model.eq_objtype[e] == mujoco.mjtObj.mjOBJ_SITE:
@@ -149,46 +148,50 @@ def _ends(model: mujoco.MjModel, e: int) -> tuple[int, int] | None:
 
 
 def _check(path: Path, model: mujoco.MjModel) -> None:
+    """Raise InputError if a model is no fixed-base tree of hinges and slides, and say what to type."""
     needs = "a diagnosis of joint logs needs a fixed-base tree of hinges and slides"
-    if not model.njnt:
-        raise InputError(f"{path}: the model has no joints; {needs}")
+    if not _moved(model):
+        raise InputError(f"{path}: the model has no joints that turn or slide; {needs}")
     for j in range(model.njnt):
-        name, word = model.joint(j).name, _OTHER.get(int(model.jnt_type[j]))
-        if not name.isprintable():
-            raise InputError(f"{path}: joint {name!r:.80} must have a printable name")
-        if word is not None:
-            raise InputError(f"{path}: joint {name!r} is a {word} joint; {_instead_of(model, j)}")
-    for e in range(model.neq):
-        said = _closes(model, e)
-        if said:
-            raise InputError(f"{path}: {said}")
+        if not model.joint(j).name.isprintable():
+            raise InputError(f"{path}: joint {model.joint(j).name!r:.80} must have a printable name")
+    for said in (*_floating(model), *_loops(model)):
+        raise InputError(f"{path}: {said}")
     for count, what in (
         (int(model.nflex), "flexible bodies"),
         (int(np.sum(model.body_plugin >= 0)), "bodies with plugins"),
     ):
         if count:
-            more = f"; name the part that has none: {_bases(model)}" if _candidates(model) else ""
-            raise InputError(f"{path}: the model has {what} ({count}); {needs}{more}")
+            raise InputError(f"{path}: the model has {what} ({count}); name a part without them: {_bases(model)}")
     try:
         Coupling.of(model)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
 
 
-def _instead_of(model: mujoco.MjModel, j: int) -> str:
-    """What to type because of a free or ball joint."""
-    name = model.joint(j).name
-    lock = f"--lock {shlex.quote(f'{name}=0')}"
-    if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_BALL):
-        return f"one position does not say where it is; lock it as modelled: {lock}"
-    body = int(model.jnt_bodyid[j])
-    if not any(_above(model, int(b), body) for b in _moved(model)):  # an object beside the robot
-        return f"name the robot without what lies beside it: {_bases(model)}"
-    return (
-        f"if its base was held, type {lock}; if one limb moved alone, name it: {_bases(model)}"
-        if _candidates(model)
-        else f"if its base was held, type {lock}"
-    )
+def _floating(model: mujoco.MjModel) -> Iterator[str]:
+    """Sentences on free and ball joints, with what to type: a floating robot first, then all that is to be locked."""
+    others = [j for j in range(model.njnt) if int(model.jnt_type[j]) in _OTHER]
+    for j in others:
+        body, name = int(model.jnt_bodyid[j]), model.joint(j).name
+        if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_FREE) and any(
+            _above(model, b, body) for b in _moved(model)
+        ):
+            yield (
+                f"joint {name!r} is a free joint, so {model.body(body).name} floats; if it was held, type "
+                f"{_locks(model, [j])}, and if one limb moved alone, name the limb: {_bases(model)}"
+            )
+    if others:
+        first = model.joint(others[0]).name, _OTHER[int(model.jnt_type[others[0]])]
+        yield f"joint {first[0]!r} is a {first[1]} joint; lock all such joints as modelled: {_locks(model, others)}"
+
+
+def _locks(model: mujoco.MjModel, joints: list[int]) -> str:
+    """Options that lock joints in the reference pose."""
+    zero = [0.0 if int(model.jnt_type[j]) in _OTHER else float(model.qpos0[model.jnt_qposadr[j]]) for j in joints]
+    zero = [float(np.clip(z, *model.jnt_range[j])) if model.jnt_limited[j] else z for j, z in zip(joints, zero, strict=True)]
+    named = (f"{model.joint(j).name}={z:g}" for j, z in zip(joints, zero, strict=True))
+    return " ".join(f"--lock {shlex.quote(text)}" for text in named)
 
 
 def _moved(model: mujoco.MjModel) -> list[int]:
@@ -217,50 +220,33 @@ def _bases(model: mujoco.MjModel) -> str:
     return f"--base {shlex.quote(first)}{more}"
 
 
-def _closes(model: mujoco.MjModel, e: int) -> str:
-    """Sentence on a constraint that joints cannot be read with, and what to type; empty if they can."""
-    kind, pair = model.eq_type[e], _ends(model, e)
-    if kind == mujoco.mjtEq.mjEQ_JOINT:
-        if not model.eq_data[e, 2:5].any():
-            return ""
-        follower, leader = model.joint(int(model.eq_obj1id[e])).name, int(model.eq_obj2id[e])
-        joints = [leader] if leader >= 0 else [int(model.eq_obj1id[e])]
-        what = f"joint {follower!r} follows another by a polynomial, of which only a constant and a ratio are read"
-    elif pair is not None:
-        one, two = (model.body(b).name for b in pair)
-        loop = [
-            j
-            for j in range(model.njnt)
-            if _above(model, pair[0], int(model.jnt_bodyid[j])) != _above(model, pair[1], int(model.jnt_bodyid[j]))
-        ]
-        joints = _leaders(model, loop)
-        what = f"an equality constraint closes a chain between {one} and {two}, which no tree of joints can"
-    else:
-        tendons = [int(t) for t in (model.eq_obj1id[e], model.eq_obj2id[e]) if t >= 0]
-        if kind != mujoco.mjtEq.mjEQ_TENDON:
-            return "an equality constraint holds a flexible body; name the part without it: " + _bases(model)
-        wraps = [w for t in tendons for w in range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])]
-        at_joint = int(mujoco.mjtWrap.mjWRAP_JOINT)
-        joints = _leaders(model, [int(model.wrap_objid[w]) for w in wraps if model.wrap_type[w] == at_joint])
-        what = "an equality constraint couples tendons"
-    if not joints:
-        return f"{what}; name a part without it: {_bases(model)}"
-    values = (float(model.qpos0[model.jnt_qposadr[j]]) if int(model.jnt_type[j]) not in _OTHER else 0 for j in joints)
-    locks = " ".join(
-        f"--lock {shlex.quote(f'{model.joint(j).name}={value:g}')}"
-        for j, value in zip(joints, values, strict=True)
-    )
-    return f"{what}; lock the joints where they stood, such as {locks}"
-
-
-def _leaders(model: mujoco.MjModel, joints: list[int]) -> list[int]:
-    """Joints without those that follow others by equality constraints: they are locked with their leader."""
-    led = {
-        int(model.eq_obj1id[e])
-        for e in range(model.neq)
-        if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj2id[e] >= 0
-    }
-    return [j for j in dict.fromkeys(joints) if j not in led]
+def _loops(model: mujoco.MjModel) -> Iterator[str]:
+    """A sentence on constraints that joints cannot be read with, and what to type; nothing if there are none."""
+    found: list[tuple[str, list[int]]] = []
+    for e in range(model.neq):
+        kind, pair = model.eq_type[e], _ends(model, e)
+        one, two = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+        if kind == mujoco.mjtEq.mjEQ_JOINT:
+            if model.eq_data[e, 2:5].any():
+                what = "follows another by a polynomial, of which only a constant and a ratio are read"
+                found.append((f"joint {model.joint(one).name!r} {what}", [two if two >= 0 else one]))
+        elif pair is not None:
+            a, b = (model.body(k).name for k in pair)
+            sides = [[_above(model, k, int(body)) for body in model.jnt_bodyid] for k in pair]
+            loop = np.flatnonzero(sides[0] != np.array(sides[1])).tolist()
+            found.append((f"an equality constraint closes a chain between {a} and {b}", loop))
+        elif kind == mujoco.mjtEq.mjEQ_TENDON:
+            wraps = [range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t]) for t in (one, two) if t >= 0]
+            joint = int(mujoco.mjtWrap.mjWRAP_JOINT)
+            ends = [int(model.wrap_objid[w]) for each in wraps for w in each if model.wrap_type[w] == joint]
+            found.append(("an equality constraint couples tendons", ends))
+        else:
+            found.append(("an equality constraint holds a flexible body", []))
+    led = {int(model.eq_obj1id[e]) for e in range(model.neq) if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT}
+    joints = [j for j in dict.fromkeys(j for _, each in found for j in each) if j not in led]
+    if found:
+        name = f"lock these joints where they stood, for example {_locks(model, joints)}"
+        yield f"{found[0][0]}; {name if joints else f'name a part without it: {_bases(model)}'}"
 
 
 def _torque_limits(model: mujoco.MjModel) -> Array:

@@ -65,7 +65,7 @@ def read_spec(path: Path) -> Read:
         try:
             read = Read(mujoco.MjSpec.from_file(str(path)))
         except ERRORS as error:
-            raise InputError(f"{path}: MuJoCo cannot read it ({_sentence(error)})") from error
+            raise InputError(f"{path}: MuJoCo cannot read it ({sentence(error)}); correct the file there") from error
         spec = read.spec
         if root is not None and root[1] == b"robot":
             read.notes.extend(_as_urdf_says(spec, path, read.exact))
@@ -83,7 +83,7 @@ def read_spec(path: Path) -> Read:
             _name(spec)
             return read
         except ERRORS as error:
-            said += f"; without its meshes: {_sentence(error)}" if bare else _sentence(error)
+            said += f"; without its meshes: {sentence(error)}" if bare else sentence(error)
             if bare or not spec.meshes:
                 raise InputError(f"{path}: MuJoCo cannot compile it ({said})") from error
     raise AssertionError
@@ -109,7 +109,7 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
                 improper[body.name] = moments
                 set_inertial(body, body.mass, np.array(body.ipos), own @ matrix @ own.T)
                 body.inertia = np.maximum(body.inertia, LEAST_KGM2)
-                if moments[0] >= 0.0:
+                if moments[0] >= LEAST_KGM2 and body.joints:  # others are fused with the body that carries them
                     exact[body.name] = moments
         elif body.joints:
             massless.append(body.name)
@@ -119,18 +119,21 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
             f"{path}: no link that moves has a mass; give the links their <inertial> (MuJoCo would take 1000 kg/m^3 of "
             "their collision shapes)"
         )
-    for bodies, what in (
-        (massless, "without <inertial> move and are read without mass"),
-        ([name for name in improper if not improper[name].any()], "are read as points: their inertia is zero"),
+    points = [name for name, moments in improper.items() if not moments.any()]
+    for links, what in (
+        (massless, "move without an <inertial>; they are read without mass"),
+        (points, "have a mass without inertia; they are read as points"),
     ):
-        if bodies:
-            yield f"Links {what}: {', '.join(bodies)}."
-    for name, moments in improper.items():
-        if moments.any():
-            a, b, c = (f"{m:.3g}" for m in moments)
+        if links:
+            yield f"Links {', '.join(links)} {what}."
+    for name, (a, b, c) in improper.items():
+        if name not in points:
             yield (
-                f"The inertia of link {name} is that of no body (principal moments {a}, {b}, {c} kg m^2); it is read as "
-                "the file says where it can be, and simulated as the nearest possible one."
+                f"The inertia of link {name} is that of no body (principal moments {a:.3g}, {b:.3g}, {c:.3g} kg m^2); "
+                "torques are computed with it, and a simulation has the nearest possible one."
+                if name in exact
+                else f"The inertia of link {name} has no three positive principal moments ({a:.3g}, {b:.3g}, {c:.3g} "
+                "kg m^2); the nearest possible one is read."
             )
 
 
@@ -205,6 +208,6 @@ def _drop_meshes(spec: mujoco.MjSpec) -> None:
         spec.delete(mesh)
 
 
-def _sentence(error: BaseException) -> str:
+def sentence(error: BaseException) -> str:
     """The message of MuJoCo on one line."""
     return shown(" ".join(str(error).split()), 300) or type(error).__name__
