@@ -49,6 +49,18 @@ Scheduler = Annotated[
         help="Run on the workers of a Dask scheduler, by its address or its scheduler file (docs/commands/cluster.md).",
     ),
 ]
+Lock = Annotated[
+    AnyWords,
+    tyro.conf.UseAppendAction,
+    tyro.conf.arg(
+        metavar="JOINT=VALUE",
+        help="With --model: a joint that the arm has not, such as a gripper's, and where it stays [rad, 30deg, or m].",
+    ),
+]
+Base = Annotated[
+    AnyName | None,
+    tyro.conf.arg(metavar="BODY", help="With --model: the arm is what this body carries; its parent stands still."),
+]
 Model = Annotated[
     Path | None,
     tyro.conf.arg(
@@ -168,6 +180,19 @@ class Files:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PartOptions(Options):
+    """Options that take a part of a robot's model as the arm."""
+
+    lock: Lock = ()
+    base: Base = None
+
+    def check_part(self, model: object) -> None:
+        """Raise InputError if a part is named of no model."""
+        if model is None and (self.lock or self.base is not None):
+            raise InputError(f"{'lock' if self.lock else 'base'} goes with a model of one robot; name it with --model")
+
+
+@dataclass(frozen=True, kw_only=True)
 class EstimateOptions(Options):
     """Options of the payload estimate."""
 
@@ -240,7 +265,7 @@ class Calibrate(Files, CalibrateOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiagnoseOptions(Options):
+class DiagnoseOptions(PartOptions):
     """Options of the diagnosis of a team or of a single robot."""
 
     map: LogMap = None
@@ -270,6 +295,7 @@ class DiagnoseOptions(Options):
 
     def check_for(self, model: object, reference: object) -> None:
         """Raise InputError for an option that does not apply to a team, or to a single robot."""
+        self.check_part(model)
         if model is not None:
             refuse_teams(self, ("calibration", "scheduler", "laws", "odds", "whole", "jobs"))
         elif reference:
@@ -459,7 +485,7 @@ class Convert(Files, ConvertOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOptions(Options):
+class MapOptions(PartOptions):
     """Options of the draft of a map."""
 
     episode: Episode = None
@@ -477,7 +503,7 @@ class Map(Files, MapOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class InspectOptions(Options):
+class InspectOptions(PartOptions):
     """Options of the inspection of a log."""
 
     map: LogMap = None
@@ -487,7 +513,8 @@ class InspectOptions(Options):
     episode: Episode = None
 
     def check_for(self, model: object) -> None:
-        """Raise InputError for an option that does not apply to a single robot."""
+        """Raise InputError for an option that does not apply to a team, or to a single robot."""
+        self.check_part(model)
         if model is not None:
             refuse_teams(self, ("design", "calibration"))
 
@@ -637,7 +664,7 @@ class Simulate(SimulateOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReplayOptions(Options):
+class ReplayOptions(PartOptions):
     """Options of a replay."""
 
     map: LogMap = None
@@ -655,6 +682,7 @@ class ReplayOptions(Options):
 
     def check_for(self, path: object, model: object) -> None:
         """Raise InputError if options exclude each other or do not apply to a single robot."""
+        self.check_part(model)
         if path is not None and self.web:
             raise InputError("out and web are both given; choose a file or a browser")
         if model is not None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from discrepancy.evidence.findings import Finding, words_of
 from discrepancy.joints.causes import LINKS, WORDS, Said, joint_in_words, link_in_words, titled
-from discrepancy.joints.effects import all_effects
-from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.effects import all_effects, numbered
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.verdict import JointVerdict, Prediction
 from discrepancy.numbers import three_digits
 from discrepancy.result.folder import Diagnosed
@@ -210,7 +210,8 @@ def write_extended(verdict: JointVerdict, folder: Path) -> None:
     Raises:
         InputError: the folder cannot be written, MuJoCo refuses the model, or it refers to files outside its folder.
     """
-    effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
-    spec = load_spec(verdict.model.path)
+    effects = numbered((effect for _, effect in all_effects(verdict.findings, verdict.model)), verdict.model)
+    spec = verdict.model.spec()
     check_named(verdict.model.path, assets=False)
-    write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference))
+    notes = verdict.model.notes
+    write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference), notes=notes)

@@ -135,6 +135,13 @@ def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[F
     return sorted(pairs, key=lambda pair: pair[1].cause in LATE)
 
 
+def numbered(effects: Iterable[RobotEffect], model: SerialModel) -> list[RobotEffect]:
+    """Number the joints of effects among all joints of the MJCF, where some may follow others."""
+    own = model.coupling.own
+    of = {k: int(j) + 1 for k, j in enumerate(own, start=1)}
+    return [replace(e, joint=of.get(e.joint or 0), partner=of.get(e.partner or 0)) for e in effects]
+
+
 def label(finding: Finding) -> str:
     """A cause with its place in words."""
     return titled(WORDS[finding.cause].title, finding.place)

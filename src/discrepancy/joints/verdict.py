@@ -117,7 +117,7 @@ def judged(
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
     outcome = replace(outcome, state=without_unfounded(outcome.search, outcome.state))
-    return _JointJudge(model, trials, outcome).verdict([*notes_of([*logs, *reference])])
+    return _JointJudge(model, trials, outcome).verdict([*model.notes, *notes_of([*logs, *reference])])
 
 
 class _JointJudge(Judge):
