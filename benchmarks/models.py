@@ -39,7 +39,9 @@ def has_chain(path: Path) -> bool:
     except (ElementTree.ParseError, OSError, ValueError):
         return False
     if every[0].tag == "robot":
-        return any(e.get("type") in ("revolute", "continuous", "prismatic") for e in every if e.tag == "joint")
+        return any(
+            e.get("type") in ("revolute", "continuous", "prismatic") for e in every if e.tag == "joint"
+        )
     if every[0].tag != "mujoco":
         return False
     bodies = [joint for e in every if e.tag == "body" for joint in e.findall("joint")]
@@ -69,7 +71,9 @@ def main() -> None:
     """Print the table, and each refusal."""
     print("folder | files | with a chain | read as is | after advice | refused")
     for folder in (Path(name) for name in sys.argv[1:] if name != "-v"):
-        files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in (".xml", ".urdf", ".mjcf") and p.is_file())
+        files = sorted(
+            p for p in folder.rglob("*") if p.suffix.lower() in (".xml", ".urdf", ".mjcf") and p.is_file()
+        )
         robots = [path for path in files if has_chain(path)]
         found = {path: tried(path) for path in robots}
         count = Counter("as is" if n == 0 else "after" if n > 0 else "refused" for n, _ in found.values())

@@ -178,7 +178,10 @@ def _inputs_of_diagnosis(options: opt.Diagnose) -> list[Path]:
         return inputs_of(options)
     from mocobot.api.joints import map_path, read_model
 
-    robot, logs = read_model(options.model, lock=options.lock, base=options.base), [*options.rec, *options.reference]
+    robot, logs = (
+        read_model(options.model, lock=options.lock, base=options.base),
+        [*options.rec, *options.reference],
+    )
     maps = {map_path(robot, log, options.map) for log in logs}
     return [options.model, *sorted(maps), *logs, *_paths(options.tolerances)]
 

@@ -59,7 +59,9 @@ Lock = Annotated[
 ]
 Base = Annotated[
     AnyName | None,
-    tyro.conf.arg(metavar="BODY", help="With --model: the arm is what this body carries; its parent stands still."),
+    tyro.conf.arg(
+        metavar="BODY", help="With --model: the arm is what this body carries; its parent stands still."
+    ),
 ]
 Model = Annotated[
     Path | None,
@@ -189,7 +191,9 @@ class PartOptions(Options):
     def check_part(self, model: object) -> None:
         """Raise InputError if a part is named of no model."""
         if model is None and (self.lock or self.base is not None):
-            raise InputError(f"{'lock' if self.lock else 'base'} goes with a model of one robot; name it with --model")
+            raise InputError(
+                f"{'lock' if self.lock else 'base'} goes with a model of one robot; name it with --model"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,7 +34,9 @@ def pairs_of(lock: Lock) -> dict[str, str]:
     for entry in lock:
         name, equals, value = entry.rpartition("=")
         if not equals or not name:
-            raise InputError(f"lock is {entry!r:.80}; it must be JOINT=VALUE, such as wrist=0.5 or wrist=30deg")
+            raise InputError(
+                f"lock is {entry!r:.80}; it must be JOINT=VALUE, such as wrist=0.5 or wrist=30deg"
+            )
         if name in found:
             raise InputError(f"lock names joint {name!r:.80} twice")
         found[name] = value
@@ -93,7 +95,9 @@ def _position(model: mujoco.MjModel, name: str, text: str) -> float:
     number = float(match[1]) if match else math.nan
     if kind not in (HINGE, SLIDE):
         if number != 0.0:
-            raise InputError(f"lock of {name} is {text!r:.40}; a free or ball joint is locked at 0, as it is modelled")
+            raise InputError(
+                f"lock of {name} is {text!r:.40}; a free or ball joint is locked at 0, as it is modelled"
+            )
         return 0.0
     units = ("", "deg", "rad") if kind == HINGE else ("", "m")
     if match is None or match[2] not in units or not math.isfinite(number):
@@ -127,7 +131,9 @@ def _move(model: mujoco.MjModel, body: mujoco.MjsBody, values: Mapping[str, floa
     for joint in reversed(list(body.joints)):
         at = model.joint(joint.name)
         axis, anchor = np.array(at.axis), np.array(at.pos)
-        if joint.name not in values:  # what comes after it in the body is moved, so its axis is to be moved back
+        if (
+            joint.name not in values
+        ):  # what comes after it in the body is moved, so its axis is to be moved back
             if position.any() or rotation.magnitude():
                 joint.axis, joint.pos = rotation.inv().apply(axis), rotation.inv().apply(anchor - position)
             continue
@@ -150,18 +156,20 @@ def _orientation(body: mujoco.MjsBody) -> Rotation:
     quat = body.quat
     if body.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
         of = body.compiler
-        quat = mujoco.MjSpec.resolve_orientation(
-            degree=of.degree, sequence=of.eulerseq, orientation=body.alt
-        )
+        quat = mujoco.MjSpec.resolve_orientation(degree=of.degree, sequence=of.eulerseq, orientation=body.alt)
     return Rotation.from_quat(np.array(quat), scalar_first=True)
 
 
 def _with_followers(model: mujoco.MjModel, values: dict[str, float]) -> None:
     """Add the joints that follow locked ones, with the positions that their equality constraints ask for."""
-    each = [e for e in range(model.neq) if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and model.eq_active0[e]]
+    each = [
+        e for e in range(model.neq) if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and model.eq_active0[e]
+    ]
     for _ in each:  # a follower may lead another
         for e in each:
-            follower, leader = (model.joint(k).name if k >= 0 else "" for k in (model.eq_obj1id[e], model.eq_obj2id[e]))
+            follower, leader = (
+                model.joint(k).name if k >= 0 else "" for k in (model.eq_obj1id[e], model.eq_obj2id[e])
+            )
             if leader in values and follower not in values:
                 way = values[leader] - _reference(model, leader)
                 bent = np.polynomial.polynomial.polyval(way, model.eq_data[e, :5])
@@ -173,12 +181,20 @@ def _with_followers(model: mujoco.MjModel, values: dict[str, float]) -> None:
 def _remove(spec: mujoco.MjSpec, joints: Sequence[mujoco.MjsJoint]) -> None:
     """Delete joints and all that refers to them."""
     of, trn, eq = mujoco.mjtObj, mujoco.mjtTrn, mujoco.mjtEq
-    at = {trn.mjTRN_JOINT: of.mjOBJ_JOINT, trn.mjTRN_JOINTINPARENT: of.mjOBJ_JOINT, trn.mjTRN_TENDON: of.mjOBJ_TENDON}
+    at = {
+        trn.mjTRN_JOINT: of.mjOBJ_JOINT,
+        trn.mjTRN_JOINTINPARENT: of.mjOBJ_JOINT,
+        trn.mjTRN_TENDON: of.mjOBJ_TENDON,
+    }
     between = {eq.mjEQ_JOINT: of.mjOBJ_JOINT, eq.mjEQ_TENDON: of.mjOBJ_TENDON}
     gone: set[tuple[Any, str]] = {(of.mjOBJ_JOINT, joint.name) for joint in joints}
     wraps = mujoco.mjtWrap.mjWRAP_JOINT
     for elements, kind, refers in (
-        (spec.tendons, of.mjOBJ_TENDON, lambda e: [(of.mjOBJ_JOINT, w.target.name) for w in e.path if w.type == wraps]),
+        (
+            spec.tendons,
+            of.mjOBJ_TENDON,
+            lambda e: [(of.mjOBJ_JOINT, w.target.name) for w in e.path if w.type == wraps],
+        ),
         (spec.equalities, None, lambda e: [(between.get(e.type), e.name1), (between.get(e.type), e.name2)]),
         (spec.actuators, of.mjOBJ_ACTUATOR, lambda e: [(at.get(e.trntype), e.target)]),
         (spec.sensors, None, lambda e: [(e.objtype, e.objname)]),

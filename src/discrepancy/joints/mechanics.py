@@ -53,7 +53,9 @@ class Coupling:
                 return cls(own, ratio[:, own], offset)
             ratio, offset = ratio @ step, ratio @ shift + offset
         names = ", ".join(model.joint(int(j)).name for j in np.flatnonzero(ratio[:, ~leads].any(axis=1)))
-        raise ValueError(f"joints follow each other in a circle ({names}); delete one of the equality constraints")
+        raise ValueError(
+            f"joints follow each other in a circle ({names}); delete one of the equality constraints"
+        )
 
     def all(self, q: Array) -> Array:
         """Positions of all joints, shape (..., J) -> (..., N)."""
@@ -65,8 +67,10 @@ class Coupling:
 
     def driven(self, torque: Array) -> Array:
         """Torques at the J joints that do the work of those at all joints, shape (Q, N, ...) -> (Q, J, ...)."""
-        return torque if len(self.own) == len(self.ratio) else np.moveaxis(
-            np.tensordot(torque, self.ratio, axes=(1, 0)), -1, 1
+        return (
+            torque
+            if len(self.own) == len(self.ratio)
+            else np.moveaxis(np.tensordot(torque, self.ratio, axes=(1, 0)), -1, 1)
         )
 
 

@@ -162,7 +162,9 @@ def _check(path: Path, model: mujoco.MjModel) -> None:
         (int(np.sum(model.body_plugin >= 0)), "bodies with plugins"),
     ):
         if count:
-            raise InputError(f"{path}: the model has {what} ({count}); name a part without them: {_bases(model)}")
+            raise InputError(
+                f"{path}: the model has {what} ({count}); name a part without them: {_bases(model)}"
+            )
     try:
         Coupling.of(model)
     except ValueError as error:
@@ -188,8 +190,13 @@ def _floating(model: mujoco.MjModel) -> Iterator[str]:
 
 def _locks(model: mujoco.MjModel, joints: list[int]) -> str:
     """Options that lock joints in the reference pose."""
-    zero = [0.0 if int(model.jnt_type[j]) in _OTHER else float(model.qpos0[model.jnt_qposadr[j]]) for j in joints]
-    zero = [float(np.clip(z, *model.jnt_range[j])) if model.jnt_limited[j] else z for j, z in zip(joints, zero, strict=True)]
+    zero = [
+        0.0 if int(model.jnt_type[j]) in _OTHER else float(model.qpos0[model.jnt_qposadr[j]]) for j in joints
+    ]
+    zero = [
+        float(np.clip(z, *model.jnt_range[j])) if model.jnt_limited[j] else z
+        for j, z in zip(joints, zero, strict=True)
+    ]
     named = (f"{model.joint(j).name}={z:g}" for j, z in zip(joints, zero, strict=True))
     return " ".join(f"--lock {shlex.quote(text)}" for text in named)
 
@@ -236,7 +243,11 @@ def _loops(model: mujoco.MjModel) -> Iterator[str]:
             loop = np.flatnonzero(sides[0] != np.array(sides[1])).tolist()
             found.append((f"an equality constraint closes a chain between {a} and {b}", loop))
         elif kind == mujoco.mjtEq.mjEQ_TENDON:
-            wraps = [range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t]) for t in (one, two) if t >= 0]
+            wraps = [
+                range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
+                for t in (one, two)
+                if t >= 0
+            ]
             joint = int(mujoco.mjtWrap.mjWRAP_JOINT)
             ends = [int(model.wrap_objid[w]) for each in wraps for w in each if model.wrap_type[w] == joint]
             found.append(("an equality constraint couples tendons", ends))

@@ -65,7 +65,9 @@ def read_spec(path: Path) -> Read:
         try:
             read = Read(mujoco.MjSpec.from_file(str(path)))
         except ERRORS as error:
-            raise InputError(f"{path}: MuJoCo cannot read it ({sentence(error)}); correct the file there") from error
+            raise InputError(
+                f"{path}: MuJoCo cannot read it ({sentence(error)}); correct the file there"
+            ) from error
         spec = read.spec
         if root is not None and root[1] == b"robot":
             read.notes.extend(_as_urdf_says(spec, path, read.exact))
@@ -109,7 +111,9 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
                 improper[body.name] = moments
                 set_inertial(body, body.mass, np.array(body.ipos), own @ matrix @ own.T)
                 body.inertia = np.maximum(body.inertia, LEAST_KGM2)
-                if moments[0] >= LEAST_KGM2 and body.joints:  # others are fused with the body that carries them
+                if (
+                    moments[0] >= LEAST_KGM2 and body.joints
+                ):  # others are fused with the body that carries them
                     exact[body.name] = moments
         elif body.joints:
             massless.append(body.name)
