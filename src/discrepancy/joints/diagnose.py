@@ -17,13 +17,14 @@ from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, Until, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.mount import mount_of
 from discrepancy.joints.problem import Given, JointProblem, joint_problem
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, trials_of
 from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
 
-MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
+MOVED = (" zero", " turn", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Labels of columns whose values define the linearisation point."""
 CURVED = ("gravity_direction", "joint_zero", "link_length", "torque_delay")
@@ -69,6 +70,8 @@ def diagnose(
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
     smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
+    if given.changed is None and not given.motors and "gravity_direction" not in given.excluded:
+        given = replace(given, mount=mount_of(smooth, given.joints or range(len(model.joints))))
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
 

@@ -14,6 +14,7 @@ from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, parameter_name, titled
 from discrepancy.joints.mechanics import Tree, horizontal
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.mount import TURN, gravity_at, rotation_to
 from discrepancy.joints.problem import JointProblem
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
@@ -66,7 +67,15 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
         return load_of
     if group.cause == "gravity_direction":
         along = axes_of_tilt(tree.gravity) @ horizontal(tree.gravity).T
-        return lambda x: along @ x
+        labels = ("tilt 0", "tilt 1", TURN)
+        if problem.mount is None:
+            return lambda x: along @ x
+
+        def tilts(x: Array) -> Array:
+            there = gravity_at(tree.gravity, problem.mount, dict(zip(labels, x, strict=True)))
+            return -axes_of_tilt(tree.gravity) @ rotation_to(tree.gravity, there)
+
+        return tilts
     return None
 
 
