@@ -80,7 +80,7 @@ def main() -> None:
         print(
             f"{folder.name} | {len(files)} | {len(robots)} | {count['as is']} | {count['after']} | {count['refused']}"
         )
-        for path, (number, said) in found.items():
+        for number, said in found.values():
             if number < 0:
                 print(f"    {said.replace(f'{folder}/', '')}")
             elif number > 0 and "-v" in sys.argv:

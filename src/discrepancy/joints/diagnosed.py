@@ -45,11 +45,15 @@ class JointValues(Told):
     def __init__(self, verdict: JointVerdict) -> None:
         super().__init__(verdict)
         self.model = verdict.model
+        turned = (f.shape["turned_deg"] for f in verdict.findings if "turned_deg" in f.shape)
+        self.turned_deg: float = next(turned, 0.0)
         self.than = "than in the reference" if verdict.reference else "than modelled"
 
     def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
         """Cause and place as JSON values and in words."""
         title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
+        if cause == "gravity_direction" and self.turned_deg:
+            title = f"mount turned by {self.turned_deg:.0f} deg"
         if "{pair}" in title and joint is not None and partner is None:
             partner = joint - 1  # a drive is shared with the joint before
         where = self.where(cause, place, joint, partner)

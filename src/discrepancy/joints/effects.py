@@ -14,13 +14,15 @@ from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, parameter_name, titled
 from discrepancy.joints.mechanics import Tree, horizontal
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.mount import TURN, gravity_at, rotation_to
+from discrepancy.joints.mount import angle_between, gravity_at, ways
 from discrepancy.joints.problem import JointProblem
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
 ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push")
+GRAVITY = ("x_m_per_s2", "y_m_per_s2", "z_m_per_s2")
+"""Parameters of a base that is mounted another way than in the model: gravity in the base's frame."""
 LEAST_KG = 1e-3
 """Least payload mass with a defined centre of mass [kg]."""
 
@@ -35,7 +37,7 @@ def physical(
         group: a cause at a place, or at the place of one member.
         x, covariance: values of its columns and their covariance, shapes (k,) and (k, k).
     """
-    names = NAMES[group.cause]
+    names = NAMES[group.cause] if group.cause != "gravity_direction" or problem.mount is None else GRAVITY
     if group.cause == "link_mass" and len(x) > 1:
         names = (*names, *NAMES["link_com"], "inertia_share")
     change = _change(problem, group)
@@ -67,15 +69,10 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
         return load_of
     if group.cause == "gravity_direction":
         along = axes_of_tilt(tree.gravity) @ horizontal(tree.gravity).T
-        labels = ("tilt 0", "tilt 1", TURN)
         if problem.mount is None:
             return lambda x: along @ x
-
-        def tilts(x: Array) -> Array:
-            there = gravity_at(tree.gravity, problem.mount, dict(zip(labels, x, strict=True)))
-            return -axes_of_tilt(tree.gravity) @ rotation_to(tree.gravity, there)
-
-        return tilts
+        labels = ways(tree.gravity, problem.mount)
+        return lambda x: gravity_at(tree.gravity, problem.mount, dict(zip(labels, x, strict=True)))
     return None
 
 
@@ -101,6 +98,8 @@ def load_of(moments: Array) -> Array:
 def absolute(problem: JointProblem, group: Group) -> dict[str, Any]:
     """Shape parameters of a cause, with the physical values that a simulation needs."""
     shape: dict[str, Any] = dict(group.shape)
+    if group.cause == "gravity_direction" and problem.mount is not None:
+        shape["turned_deg"] = np.degrees(angle_between(problem.model.model.opt.gravity, problem.mount))
     if group.place not in problem.model.joints:
         return shape
     j = problem.model.joints.index(group.place)
@@ -174,11 +173,11 @@ def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect
         numbers |= {"start_s": finding.event.start_s, "duration_s": finding.event.duration_s}
     if finding.cause == "torque_scale":
         numbers = {"bend": 0.0} | numbers
-    if finding.cause == "gravity_direction":
+    if "tilt_1_rad" in numbers:
         gravity = np.array(model.model.opt.gravity)
         way = np.array([numbers["tilt_1_rad"], numbers["tilt_2_rad"]]) @ axes_of_tilt(gravity)
         turned = Rotation.from_rotvec(-way).apply(gravity)
-        numbers |= dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, turned), strict=True))
+        numbers |= dict(zip(GRAVITY, map(float, turned), strict=True))
     joint, body = member.joint, ""
     if finding.cause in LINKS:  # a link may have the name of another link's joint
         moved = member.place in model.bodies

@@ -126,12 +126,11 @@ def _without_holds(spec: mujoco.MjSpec, model: mujoco.MjModel) -> Iterator[str]:
     """Delete constraints that hold nothing: those inactive, within one rigid body, or to a mocap body."""
     held = []
     for e, equality in reversed(list(enumerate(spec.equalities))):
-        pair = _ends(model, e)
-        mocap = pair is not None and any(model.body_mocapid[b] >= 0 for b in pair)
-        rigid = pair is not None and model.body_weldid[pair[0]] == model.body_weldid[pair[1]]
+        pair = _ends(model, e) or ()
+        mocap = any(model.body_mocapid[b] >= 0 for b in pair)
         if mocap:
-            held.append(model.body(next(b for b in pair if model.body_mocapid[b] < 0)).name)
-        if mocap or rigid or not model.eq_active0[e]:
+            held += [model.body(b).name for b in pair if model.body_mocapid[b] < 0]
+        if mocap or len({int(model.body_weldid[b]) for b in pair}) == 1 or not model.eq_active0[e]:
             spec.delete(equality)
     if held:
         yield f"Constraints to mocap bodies, an aid of simulations, are left out: they hold {', '.join(held)}."
@@ -214,7 +213,7 @@ def _above(model: mujoco.MjModel, body: int, other: int) -> bool:
 
 
 def _candidates(model: mujoco.MjModel) -> list[str]:
-    """Bodies that may be the base of an arm, those with most joints first: the first below each floating or fixed one."""
+    """First moving bodies below what floats or is fixed, which may be the base of an arm; most joints first."""
     moved = _moved(model)
     tops = {b for b in moved if not any(b != a and _above(model, b, a) for a in moved)}
     ranked = sorted(tops, key=lambda top: (-sum(_above(model, b, top) for b in moved), top))

@@ -60,32 +60,28 @@ def mount_of(smooth: Sequence[Signals], joints: Sequence[int]) -> Array | None:
     change = np.linalg.lstsq(squares, products, rcond=1e-6)[0]
     after, there = before - float(products @ change), g + change
     ratio = float(np.linalg.norm(there)) / size
-    angle = float(np.arccos(np.clip(g @ there / (size**2 * max(ratio, 1e-12)), -1.0, 1.0)))
-    if angle < LEAST_RAD or before < LEAST_GAIN * after or not SIZE[0] < ratio < SIZE[1]:
+    if angle_between(g, there) < LEAST_RAD or before < LEAST_GAIN * after or not SIZE[0] < ratio < SIZE[1]:
         return None
     return there / ratio
 
 
-def gravity_at(g: Array, mount: Array | None, values: Mapping[str, float]) -> Array:
-    """Gravity [m/s^2] at values of the columns, shape (3,).
+def ways(g: Array, mount: Array | None) -> dict[str, Array]:
+    """Changes of gravity against which a unit of each column acts, by its label, shape (3,) each.
 
     Args:
-        g: gravity of the model, shape (3,).
-        mount: gravity of another mount, shape (3,), or None.
-        values: values by column label; absent ones are 0.
+        g: gravity of the model [m/s^2], shape (3,).
+        mount: gravity of another mount, shape (3,); None: small tilts about the model's.
     """
     middle = g if mount is None else mount
-    out = g + values.get(TURN, 0.0) * (middle - g)
-    for i, w in enumerate(horizontal(middle)):
-        out = out - values.get(f"tilt {i}", 0.0) * np.cross(w, middle)
-    return out
+    found = {f"tilt {i}": np.cross(w, middle) for i, w in enumerate(horizontal(middle))}
+    return found if mount is None else found | {TURN: g - mount}
 
 
-def rotation_to(g: Array, there: Array) -> Array:
-    """Horizontal rotation vector [rad] that turns the direction ``g`` into ``there``, shape (3,)."""
-    a, b = g / np.linalg.norm(g), there / np.linalg.norm(there)
-    axis, cosine = np.cross(a, b), float(a @ b)
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return (0.0 if cosine > 0 else np.pi) * horizontal(g)[0]
-    return np.arctan2(sine, cosine) * axis / sine
+def gravity_at(g: Array, mount: Array | None, values: Mapping[str, float]) -> Array:
+    """Gravity [m/s^2] at values of the columns, shape (3,); columns without a value are at 0."""
+    return g - sum(values.get(label, 0.0) * way for label, way in ways(g, mount).items())
+
+
+def angle_between(one: Array, other: Array) -> float:
+    """Angle between two directions [rad]."""
+    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))

@@ -22,14 +22,13 @@ from discrepancy.joints.mechanics import (
     by_acceleration,
     by_displacement,
     force_torque,
-    horizontal,
     inertial_parameters,
     rigid_torque,
     torque_of,
     with_load,
 )
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.mount import TURN, gravity_at
+from discrepancy.joints.mount import gravity_at, ways
 from discrepancy.joints.signals import Signals, along
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
@@ -380,8 +379,8 @@ class _Builder:
                 mass[b], com[b], inertia[b] = with_load(float(mass[b]), com[b], inertia[b], np.array(load))
         for j, n in enumerate(self.names):
             position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
-        gravity = gravity_at(t.gravity, self.more.mount, v)
-        return replace(t, mass=mass, com=com, inertia=inertia, position=position, gravity=gravity)
+        g = gravity_at(t.gravity, self.more.mount, v)
+        return replace(t, mass=mass, com=com, inertia=inertia, position=position, gravity=g)
 
     def _spans(self) -> list[Span]:
         def every(of: Callable[[Signals], Array]) -> Array:
@@ -624,16 +623,15 @@ class _Builder:
         g = self.tree.gravity
         if not g.any():
             return
-        by, mount = {id(s): by_acceleration(s.motion) for s in self.parts}, self.more.mount
-        middle = self.given.gravity if mount is None else mount
-        sizes = [self.sd("gravity_direction", f"tilt_{i}_rad", TILT_RAD) for i in (1, 2)]
-        tilts = [
-            self.add(f"tilt {i}", sizes[i], self.wide(lambda s, w=w: by[id(s)] @ np.cross(w, middle)))
-            for i, w in enumerate(horizontal(middle))
+        by = {id(s): by_acceleration(s.motion) for s in self.parts}
+        sizes = [*(self.sd("gravity_direction", f"tilt_{i}_rad", TILT_RAD) for i in (1, 2)), 0.0]
+        columns = [
+            self.add(label, size, self.wide(lambda s, way=way: by[id(s)] @ way))
+            for size, (label, way) in zip(
+                sizes, ways(self.given.gravity, self.more.mount).items(), strict=False
+            )
         ]
-        if mount is not None:
-            tilts.append(self.add(TURN, 0.0, self.wide(lambda s: by[id(s)] @ (self.given.gravity - mount))))
-        self.group("gravity_direction", "base", tilts, [0.1, 0.1, 1.0][: len(tilts)])
+        self.group("gravity_direction", "base", columns, [0.1, 0.1, 1.0][: len(columns)])
         share = self.add("gravity share", 0.0, self.wide(lambda s: by[id(s)] @ g))
         self.group("gravity_compensation", "robot", [share], [0.5])
 

@@ -215,6 +215,8 @@ class _JointJudge(Judge):
 
     def tolerances(self, group: Group) -> Mapping[str, float]:
         sizes = np.array([self.problem.tolerance[k] for k in group.columns])
+        if group.cause == "gravity_direction" and self.problem.mount is not None:
+            return physical(self.problem, group, np.array([0.0, 0.0, 1.0]), np.diag(sizes**2))[1]
         return physical(self.problem, group, sizes, np.diag(sizes**2))[0]
 
     def sizes(self, group: Group, sizes: Array, seen: Array) -> Mapping[str, float | None] | None:

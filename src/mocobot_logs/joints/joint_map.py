@@ -250,8 +250,8 @@ def _joint_names(top: Fields, model: Sequence[str]) -> tuple[str, ...]:
     if missing:
         raise InputError(
             f"{top.where}: joints lacks {', '.join(map(repr, missing[:8]))}; a map names every joint of the model; "
-            f"lock those that do not move, such as --lock {shlex.quote(f'{missing[0]}=0')}, or name the arm's first body "
-            "by --base"
+            f"lock those that do not move, such as --lock {shlex.quote(f'{missing[0]}=0')}, or name the arm's first "
+            "body by --base"
         )
     return tuple(names)
 
