@@ -255,6 +255,8 @@ def _loops(model: mujoco.MjModel) -> Iterator[str]:
     led = {int(model.eq_obj1id[e]) for e in range(model.neq) if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT}
     joints = [j for j in dict.fromkeys(j for _, each in found for j in each) if j not in led]
     if found:
+        if set(range(model.njnt)) <= {*joints, *led}:
+            yield f"{found[0][0]}, and all joints are part of such chains; only trees of joints can be diagnosed"
         name = f"lock these joints where they stood, for example {_locks(model, joints)}"
         yield f"{found[0][0]}; {name if joints else f'name a part without it: {_bases(model)}'}"
 
