@@ -78,10 +78,13 @@ def diagnose(
     def bent(state: State, new: frozenset[str]) -> bool:
         return given.changed is None and not new.isdisjoint(CURVED)
 
-    first = Outcome(problem, search, until.run(search, search.fixed(()), bent), finished=not until.broken)
+    again, first = partial(_around, smooth=smooth, given=given), Outcome(problem, search, search.fixed(()))
+    if given.mount is not None:  # all loads are others there, so look for further causes from there on
+        turned = [Chosen(g, 1.0) for g in problem.groups if g.cause == "gravity_direction"]
+        first = again(replace(first, state=search.fixed(turned)), floor=None)
+    first = replace(first, state=until.run(first.search, first.state, bent), finished=not until.broken)
     if given.changed is not None or until():
         return first  # with a reference, the common model error has no linearisation point
-    again = partial(_around, smooth=smooth, given=given)
     around = again(first, floor=None)
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, until.run(around.search, around.state))

@@ -13,7 +13,9 @@ from estimator.arrays import Array
 LEAST_RAD = 0.5
 """Smallest angle between modelled and fitted gravity that counts as another mount. Chosen: tilts below are linear."""
 LEAST_GAIN = 4.0
-"""Smallest factor by which another direction reduces the squared residual. Chosen: far beyond noise."""
+"""Smallest factor by which another direction reduces a joint's squared residual. Chosen: far beyond noise."""
+ROUNDS = 3
+"""Rounds of the fit, each with weights from the last. Chosen: the weights then stay."""
 SIZE = (0.7, 1.4)
 """Range of the fitted over the modelled size of gravity. Chosen: masses are known to a third."""
 MOST_SAMPLES = 4000
@@ -39,28 +41,29 @@ def mount_of(smooth: Sequence[Signals], joints: Sequence[int]) -> Array | None:
     size = float(np.linalg.norm(g))
     if not size:
         return None
-    rows, own = [], []
-    for s in smooth:
-        here = slice(None, None, max(1, len(s.time) // MOST_SAMPLES))
-        by, good = by_acceleration(s.motion)[here], s.usable[here]
-        weight = 1.0 / (np.sqrt(np.mean(s.torque**2, axis=0)) + 1e-12)
-        left, v, a = (s.torque - s.inverse)[here], s.dq[here], s.ddq[here]
-        for j in joints:
-            alone = np.column_stack([np.ones(len(v)), np.sign(v[:, j]), v[:, j], a[:, j]])
-            k = good[:, j]
-            rows.append(np.column_stack([-by[k, j], left[k, j]]) * weight[j])
-            own.append((j, alone[k] * weight[j]))
-    squares, products, before = np.zeros((3, 3)), np.zeros(3), 0.0
-    for j in joints:  # project the joint's own columns out
-        x = np.concatenate([r for r, (k, _) in zip(rows, own, strict=True) if k == j])
-        q = np.linalg.qr(np.concatenate([c for k, c in own if k == j]))[0]
+    by = {id(s): by_acceleration(s.motion) for s in smooth}
+    each: list[
+        Array
+    ] = []  # by joint: torque per gravity and residual, without what the joint's own columns explain
+    for j in joints:
+        rows, own = [], []
+        for s in smooth:
+            here = np.flatnonzero(s.usable[:, j])[:: max(1, len(s.time) // MOST_SAMPLES)]
+            v = s.dq[here, j]
+            rows.append(np.column_stack([-by[id(s)][here, j], (s.torque - s.inverse)[here, j]]))
+            own.append(np.column_stack([np.ones(len(v)), np.sign(v), v, s.ddq[here, j]]))
+        x, q = np.concatenate(rows), np.linalg.qr(np.concatenate(own))[0]
         x = x - q @ (q.T @ x)
-        squares, products = squares + x[:, :3].T @ x[:, :3], products + x[:, :3].T @ x[:, 3]
-        before += float(x[:, 3] @ x[:, 3])
-    change = np.linalg.lstsq(squares, products, rcond=1e-6)[0]
-    after, there = before - float(products @ change), g + change
+        each.append(x.T @ x)
+    noise, there = np.array([x[3, 3] + 1e-12 for x in each]), g
+    for _ in range(ROUNDS):  # weigh each joint by what is left of it
+        total = np.sum([x / n for x, n in zip(each, noise, strict=True)], axis=0)
+        there = g + np.linalg.lstsq(total[:3, :3], total[:3, 3], rcond=1e-6)[0]
+        with_it = np.append(g - there, 1.0)
+        noise = np.array([with_it @ x @ with_it + 1e-12 for x in each])
+    gain = max(x[3, 3] / n for x, n in zip(each, noise, strict=True))
     ratio = float(np.linalg.norm(there)) / size
-    if angle_between(g, there) < LEAST_RAD or before < LEAST_GAIN * after or not SIZE[0] < ratio < SIZE[1]:
+    if angle_between(g, there) < LEAST_RAD or gain < LEAST_GAIN or not SIZE[0] < ratio < SIZE[1]:
         return None
     return there / ratio
 
@@ -79,7 +82,7 @@ def ways(g: Array, mount: Array | None) -> dict[str, Array]:
 
 def gravity_at(g: Array, mount: Array | None, values: Mapping[str, float]) -> Array:
     """Gravity [m/s^2] at values of the columns, shape (3,); columns without a value are at 0."""
-    return g - sum(values.get(label, 0.0) * way for label, way in ways(g, mount).items())
+    return g - np.sum([values.get(label, 0.0) * way for label, way in ways(g, mount).items()], axis=0)
 
 
 def angle_between(one: Array, other: Array) -> float:

@@ -130,7 +130,7 @@ REFUSED = {
         mjcf(LINKS, '<equality><joint joint1="one" joint2="two"/><joint joint1="two" joint2="one"/></equality>'),
         r"follow each other in a circle \(one, two\)",
     ),
-    "xacro": ('<robot xmlns:xacro="http://x"><xacro:arg name="a" default="1"/></robot>', "ros2 run xacro xacro .* > robot"),
+    "xacro": ('<robot xmlns:xacro="x"><xacro:arg name="a" default="1"/></robot>', "ros2 run xacro xacro .* > robot"),
     "text": ("robot", "not a readable MJCF"),
     "empty": ("", "not a readable MJCF"),
     "other": ("<robot_description/>", "MuJoCo cannot read it"),

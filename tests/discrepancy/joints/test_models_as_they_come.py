@@ -315,7 +315,7 @@ def test_advice_for_objects_beside_the_arm_and_loops_of_a_gripper_works(tmp_path
     path.write_text(re.sub("<keyframe>.*</keyframe>", "", fixed), encoding="utf-8")
     ((first, _),) = advised(path)
     assert first == {"joint of ball": "0"}
-    with pytest.raises(InputError, match="closes a chain between finger and fore; lock .* --lock grip=0$"):
+    with pytest.raises(InputError, match=r"closes a chain between finger and fore; lock .* --lock grip=0$"):
         load_model(path, first)
     assert load_model(path, {**first, "grip": "0"}).joints == ("hip", "yaw", "pitch", "out", "elbow")
 
