@@ -215,7 +215,7 @@ def write_extended(verdict: JointVerdict, folder: Path) -> None:
         InputError: the folder cannot be written, MuJoCo refuses the model, or it refers to files outside its folder.
     """
     effects = numbered((effect for _, effect in all_effects(verdict.findings, verdict.model)), verdict.model)
-    spec = verdict.model.spec()
+    spec = verdict.model.source.copy()
     check_named(verdict.model.path, assets=False)
     notes = verdict.model.notes
     write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference), notes=notes)

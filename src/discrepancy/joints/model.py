@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.joints.locking import Lock, locked
+from discrepancy.joints.locking import Lock, locked, reference
 from discrepancy.joints.mechanics import Coupling
 from discrepancy.joints.reading import ERRORS, read_spec, sentence
 from estimator.arrays import Array
@@ -40,7 +40,7 @@ class SerialModel:
         torque_limit: largest torque of a joint's actuators [N m or N], inf if there is no limit, shape (J,).
         coupling: positions of all joints of ``model`` from those of the J joints.
         notes: sentences on what was read otherwise than the file says.
-        source: the model for changes; ``spec`` copies it.
+        source: the model to copy, change and compile.
     """
 
     path: Path
@@ -54,10 +54,6 @@ class SerialModel:
     coupling: Coupling
     notes: tuple[str, ...]
     source: mujoco.MjSpec
-
-    def spec(self) -> mujoco.MjSpec:
-        """A copy of the model to change and to compile."""
-        return self.source.copy()
 
 
 def load_spec(path: Path | str) -> mujoco.MjSpec:
@@ -90,18 +86,18 @@ def load_model(path: Path | str, lock: Lock = (), base: str | None = None) -> Se
         model = spec.compile()
         notes += _without_holds(spec, model)
         model = spec.compile()
+        _check(model)
+        coupling = Coupling.of(model)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except ERRORS as error:
         raise InputError(f"{path}: MuJoCo cannot compile what is left of it ({sentence(error)})") from error
-    _check(path, model)
     for name, moments in read.exact.items():
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
         if body >= 0:  # MuJoCo fuses bodies that do not move on their own
             model.body_inertia[body] = moments
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         model.opt.gravity[:] = 0.0  # so that no caller needs to check the flag
-    coupling = Coupling.of(model)
     own = coupling.own
     follows = [model.joint(k).name for k in range(model.njnt) if k not in own]
     if follows:
@@ -146,28 +142,21 @@ def _ends(model: mujoco.MjModel, e: int) -> tuple[int, int] | None:
     return pair
 
 
-def _check(path: Path, model: mujoco.MjModel) -> None:
+def _check(model: mujoco.MjModel) -> None:
     """Raise InputError if a model is no fixed-base tree of hinges and slides, and say what to type."""
-    needs = "a diagnosis of joint logs needs a fixed-base tree of hinges and slides"
     if not _moved(model):
-        raise InputError(f"{path}: the model has no joints that turn or slide; {needs}")
-    for j in range(model.njnt):
-        if not model.joint(j).name.isprintable():
-            raise InputError(f"{path}: joint {model.joint(j).name!r:.80} must have a printable name")
+        raise InputError(
+            "the model has no joints that turn or slide; a diagnosis of joint logs needs a fixed-base tree of them"
+        )
+    for name in (model.joint(j).name for j in range(model.njnt)):
+        if not name.isprintable():
+            raise InputError(f"joint {name!r:.80} must have a printable name")
     for said in (*_floating(model), *_loops(model)):
-        raise InputError(f"{path}: {said}")
-    for count, what in (
-        (int(model.nflex), "flexible bodies"),
-        (int(np.sum(model.body_plugin >= 0)), "bodies with plugins"),
-    ):
-        if count:
-            raise InputError(
-                f"{path}: the model has {what} ({count}); name a part without them: {_bases(model)}"
-            )
-    try:
-        Coupling.of(model)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(said)
+    if model.nflex or (model.body_plugin >= 0).any():
+        raise InputError(
+            f"the model has flexible bodies or plugins; name a part without them: {_bases(model)}"
+        )
 
 
 def _floating(model: mujoco.MjModel) -> Iterator[str]:
@@ -175,9 +164,7 @@ def _floating(model: mujoco.MjModel) -> Iterator[str]:
     others = [j for j in range(model.njnt) if int(model.jnt_type[j]) in _OTHER]
     for j in others:
         body, name = int(model.jnt_bodyid[j]), model.joint(j).name
-        if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_FREE) and any(
-            _above(model, b, body) for b in _moved(model)
-        ):
+        if _OTHER[int(model.jnt_type[j])] == "free" and any(_above(model, b, body) for b in _moved(model)):
             yield (
                 f"joint {name!r} is a free joint, so {model.body(body).name} floats; if it was held, type "
                 f"{_locks(model, [j])}, and if one limb moved alone, name the limb: {_bases(model)}"
@@ -188,16 +175,11 @@ def _floating(model: mujoco.MjModel) -> Iterator[str]:
 
 
 def _locks(model: mujoco.MjModel, joints: list[int]) -> str:
-    """Options that lock joints in the reference pose."""
-    zero = [
-        0.0 if int(model.jnt_type[j]) in _OTHER else float(model.qpos0[model.jnt_qposadr[j]]) for j in joints
-    ]
-    zero = [
-        float(np.clip(z, *model.jnt_range[j])) if model.jnt_limited[j] else z
-        for j, z in zip(joints, zero, strict=True)
-    ]
-    named = (f"{model.joint(j).name}={z:g}" for j, z in zip(joints, zero, strict=True))
-    return " ".join(f"--lock {shlex.quote(text)}" for text in named)
+    """Options that lock joints in the reference pose, or as near as their ranges allow."""
+    ends = [model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf) for j in joints]
+    names = [model.joint(j).name for j in joints]
+    rest = [np.clip(reference(model, name), *end) for name, end in zip(names, ends, strict=True)]
+    return " ".join(f"--lock {shlex.quote(f'{n}={x:g}')}" for n, x in zip(names, rest, strict=True))
 
 
 def _moved(model: mujoco.MjModel) -> list[int]:
@@ -242,13 +224,9 @@ def _loops(model: mujoco.MjModel) -> Iterator[str]:
             loop = np.flatnonzero(sides[0] != np.array(sides[1])).tolist()
             found.append((f"an equality constraint closes a chain between {a} and {b}", loop))
         elif kind == mujoco.mjtEq.mjEQ_TENDON:
-            wraps = [
-                range(model.tendon_adr[t], model.tendon_adr[t] + model.tendon_num[t])
-                for t in (one, two)
-                if t >= 0
-            ]
-            joint = int(mujoco.mjtWrap.mjWRAP_JOINT)
-            ends = [int(model.wrap_objid[w]) for each in wraps for w in each if model.wrap_type[w] == joint]
+            first, joint = model.tendon_adr, int(mujoco.mjtWrap.mjWRAP_JOINT)
+            wraps = [w for t in (one, two) if t >= 0 for w in range(first[t], first[t] + model.tendon_num[t])]
+            ends = [int(model.wrap_objid[w]) for w in wraps if model.wrap_type[w] == joint]
             found.append(("an equality constraint couples tendons", ends))
         else:
             found.append(("an equality constraint holds a flexible body", []))

@@ -174,7 +174,9 @@ class Robot:
         pairs = all_effects(findings, model)
         acting = [pair for pair in pairs if pair[1].cause not in KNOWN]
         every = max(1, math.ceil((1.0 - 1e-9) / rate_hz / LONGEST_STEP_S))
-        built = build(model.spec(), numbered([effect for _, effect in acting], model), 1.0 / rate_hz / every)
+        built = build(
+            model.source.copy(), numbered([effect for _, effect in acting], model), 1.0 / rate_hz / every
+        )
         left = dict.fromkeys(label(acting[k][0]) for k in built.left_out)
         readings = Readings.of([e for _, e in pairs if e.cause in KNOWN], len(model.joints))
         return cls(built, readings, every, tuple(left), model.coupling)

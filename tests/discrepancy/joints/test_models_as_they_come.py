@@ -219,9 +219,9 @@ def test_locked_joints_stay_where_they_are_locked(tmp_path, case) -> None:
     names = ("hip", "yaw", "pitch", "out", "elbow", "grip")
     assert found.joints == tuple(name for name in names if name not in lock)
     compare(found, whole, {name: rad(value) for name, value in lock.items() if name != "root"})
-    assert found.spec().compile().nu == sum(name in found.joints for name in ("hip", "pitch", "elbow")) + (
-        {"hip", "elbow"} <= set(found.joints)
-    )
+    assert found.source.copy().compile().nu == sum(
+        name in found.joints for name in ("hip", "pitch", "elbow")
+    ) + ({"hip", "elbow"} <= set(found.joints))
 
 
 def rad(value: float | str) -> float:
@@ -267,12 +267,11 @@ def test_a_base_stands_still_with_all_above_it(tmp_path, base, lock, joints) -> 
 
 REFUSED = {
     ("wrist=1",): "lock: unknown joint 'wrist'",
-    ("elbow=120deg",): "lock of elbow is '120deg'; its range in the model is -2 rad to 2 rad",
+    ("elbow=120deg",): "lock of elbow is '120deg'; its range in the model is -2 to 2 rad",
     ("elbow=x",): "lock of elbow is 'x'; it must be a number in rad, or in degrees such as 30deg",
     ("grip=2deg",): "lock of grip is '2deg'; it must be a number in m$",
-    ("root=1",): "a free or ball joint is locked at 0",
+    ("root=1",): "lock of root is '1'; it must be 0, which leaves a free or ball joint as it is modelled",
     ("elbow",): "lock is 'elbow'; it must be JOINT=VALUE, such as wrist=0.5",
-    ("hip=0", "hip=1"): "lock names joint 'hip' twice",
 }
 
 
@@ -282,7 +281,7 @@ def test_locks_that_cannot_be(tmp_path, lock) -> None:
     path.write_text(TORSO, encoding="utf-8")
     with pytest.raises(InputError, match=REFUSED[lock]):
         load_model(path, lock)
-    with pytest.raises(InputError, match=r"base: unknown body 'arm'.*bodies? are torso|bodys are torso"):
+    with pytest.raises(InputError, match="base: unknown body name 'arm'; the body names are torso, leg"):
         load_model(path, base="arm")
 
 
@@ -349,7 +348,7 @@ def test_gravcomp_is_no_part_of_the_robot(tmp_path) -> None:
     same_torques(found, mujoco.MjModel.from_xml_string(plain))
     (note,) = found.notes
     assert note.startswith("The file cancels 50 % to 100 % of gravity by gravcomp on upper, fore,")
-    write_extended(found.spec(), [], tmp_path / "out", [], notes=found.notes)
+    write_extended(found.source.copy(), [], tmp_path / "out", [], notes=found.notes)
     assert "gravcomp" not in (tmp_path / "out" / "robot.xml").read_text()
     assert note in (tmp_path / "out" / "README.md").read_text()
 
