@@ -49,20 +49,6 @@ Scheduler = Annotated[
         help="Run on the workers of a Dask scheduler, by its address or its scheduler file (docs/commands/cluster.md).",
     ),
 ]
-Lock = Annotated[
-    AnyWords,
-    tyro.conf.UseAppendAction,
-    tyro.conf.arg(
-        metavar="JOINT=VALUE",
-        help="With --model: a joint that the arm has not, such as a gripper's, and where it stays [rad, 30deg, or m].",
-    ),
-]
-Base = Annotated[
-    AnyName | None,
-    tyro.conf.arg(
-        metavar="BODY", help="With --model: the arm is what this body carries; its parent stands still."
-    ),
-]
 Model = Annotated[
     Path | None,
     tyro.conf.arg(
@@ -185,15 +171,15 @@ class Files:
 class PartOptions(Options):
     """Options that take a part of a robot's model as the arm."""
 
-    lock: Lock = ()
-    base: Base = None
+    lock: Annotated[AnyWords, tyro.conf.UseAppendAction, tyro.conf.arg(metavar="JOINT=VALUE")] = ()
+    """With --model: a joint that does not move, such as a gripper's, and its position [rad, 30deg, or m]."""
+    base: Annotated[AnyName | None, tyro.conf.arg(metavar="BODY")] = None
+    """With --model: the arm is what this body carries; its parent stands still."""
 
     def check_part(self, model: object) -> None:
         """Raise InputError if a part is named of no model."""
         if model is None and (self.lock or self.base is not None):
-            raise InputError(
-                f"{'lock' if self.lock else 'base'} goes with a model of one robot; name it with --model"
-            )
+            raise InputError("lock and base take a part of a model; name the model with --model")
 
 
 @dataclass(frozen=True, kw_only=True)

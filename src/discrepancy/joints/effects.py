@@ -71,8 +71,8 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
         along = axes_of_tilt(tree.gravity) @ horizontal(tree.gravity).T
         if problem.mount is None:
             return lambda x: along @ x
-        labels = ways(tree.gravity, problem.mount)
-        return lambda x: gravity_at(tree.gravity, problem.mount, dict(zip(labels, x, strict=True)))
+        g, mount = tree.gravity, problem.mount
+        return lambda x: gravity_at(g, mount, dict(zip(ways(g, mount), x, strict=True)))
     return None
 
 
@@ -145,8 +145,7 @@ def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[F
 
 def numbered(effects: Iterable[RobotEffect], model: SerialModel) -> list[RobotEffect]:
     """Number the joints of effects among all joints of the MJCF, where some may follow others."""
-    own = model.coupling.own
-    of = {k: int(j) + 1 for k, j in enumerate(own, start=1)}
+    of = {k: int(j) + 1 for k, j in enumerate(model.coupling.own, start=1)}
     return [replace(e, joint=of.get(e.joint or 0), partner=of.get(e.partner or 0)) for e in effects]
 
 

@@ -34,11 +34,8 @@ def locked(spec: mujoco.MjSpec, lock: Lock, base: str | None) -> Iterable[str]:
         InputError: a joint or body does not exist, or a value is none or out of the joint's range.
     """
     entries = [f"{name}={value}" for name, value in lock.items()] if isinstance(lock, Mapping) else list(lock)
-    for entry in entries:
-        if not entry.rpartition("=")[0]:
-            raise InputError(
-                f"lock is {entry!r:.80}; it must be JOINT=VALUE, such as wrist=0.5 or wrist=30deg"
-            )
+    for entry in (entry for entry in entries if not entry.rpartition("=")[0]):
+        raise InputError(f"lock is {entry!r:.80}; it must be JOINT=VALUE, such as wrist=0.5 or wrist=30deg")
     given = {name: text for name, _, text in (entry.rpartition("=") for entry in entries)}
     model = spec.compile()
     check_known(given, [joint.name for joint in spec.joints], "lock", "joint")
@@ -85,8 +82,7 @@ def _position(model: mujoco.MjModel, name: str, text: str) -> float:
 
 def reference(model: mujoco.MjModel, name: str) -> float:
     """Position of a hinge or slide in the reference pose [rad or m]; 0 for others."""
-    joint = model.joint(name)
-    return float(joint.qpos0[0]) if int(joint.type[0]) in (HINGE, SLIDE) else 0.0
+    return float(model.joint(name).qpos0[0]) if int(model.joint(name).type[0]) in (HINGE, SLIDE) else 0.0
 
 
 def _move(model: mujoco.MjModel, body: mujoco.MjsBody, values: Mapping[str, float]) -> None:
@@ -121,9 +117,8 @@ def _move(model: mujoco.MjModel, body: mujoco.MjsBody, values: Mapping[str, floa
 def _with_followers(model: mujoco.MjModel, values: dict[str, float]) -> None:
     """Add the joints that follow locked ones, with the positions that their equality constraints ask for."""
     joint = int(mujoco.mjtEq.mjEQ_JOINT)
-    each = [e for e in range(model.neq) if model.eq_type[e] == joint and model.eq_active0[e]]
-    each = [e for e in each if model.eq_obj2id[e] >= 0]
-    for e in each * len(each):  # a follower may lead another
+    each = np.flatnonzero((model.eq_type == joint) & model.eq_active0.astype(bool) & (model.eq_obj2id >= 0))
+    for e in np.tile(each, len(each)):  # a follower may lead another
         follower, leader = model.joint(model.eq_obj1id[e]).name, model.joint(model.eq_obj2id[e]).name
         if leader in values and follower not in values:
             way = values[leader] - reference(model, leader)

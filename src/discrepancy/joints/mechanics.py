@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
+from estimator.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Coupling:
         """Read the linear equality constraints between joints of a model of hinges and slides.
 
         Raises:
-            ValueError: joints follow each other in a circle.
+            InputError: joints follow each other in a circle.
         """
         N = model.njnt
         ratio, offset, leads = np.eye(N), np.zeros(N), np.ones(N, dtype=bool)
@@ -53,25 +54,17 @@ class Coupling:
                 return cls(own, ratio[:, own], offset)
             ratio, offset = ratio @ step, ratio @ shift + offset
         names = ", ".join(model.joint(int(j)).name for j in np.flatnonzero(ratio[:, ~leads].any(axis=1)))
-        raise ValueError(
-            f"joints follow each other in a circle ({names}); delete one of the equality constraints"
-        )
+        raise InputError(f"joints follow each other in a circle ({names}); delete an equality constraint")
 
-    def all(self, q: Array) -> Array:
-        """Positions of all joints, shape (..., J) -> (..., N)."""
-        return q @ self.ratio.T + self.offset
-
-    def rates(self, dq: Array) -> Array:
-        """Velocities or accelerations of all joints, shape (..., J) -> (..., N)."""
-        return dq @ self.ratio.T
+    def all(self, q: Array, *rates: Array) -> list[Array]:
+        """Positions of all joints, and their derivatives, from those of the J joints, (..., J) -> (..., N) each."""
+        return [q @ self.ratio.T + self.offset, *(x @ self.ratio.T for x in rates)]
 
     def driven(self, torque: Array) -> Array:
         """Torques at the J joints that do the work of those at all joints, shape (Q, N, ...) -> (Q, J, ...)."""
-        return (
-            torque
-            if len(self.own) == len(self.ratio)
-            else np.moveaxis(np.tensordot(torque, self.ratio, axes=(1, 0)), -1, 1)
-        )
+        if len(self.own) == len(self.ratio):
+            return torque
+        return np.moveaxis(np.tensordot(torque, self.ratio, axes=(1, 0)), -1, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +185,7 @@ class Motion:
     def of(cls, tree: Tree, q: Array, dq: Array, ddq: Array) -> Motion:
         """Forward kinematics from joint positions, velocities and accelerations, shape (Q, J) each."""
         Q, B, J = len(q), len(tree.parent), len(tree.joint_body)
-        q, dq, ddq = tree.coupling.all(q), tree.coupling.rates(dq), tree.coupling.rates(ddq)
+        q, dq, ddq = tree.coupling.all(q, dq, ddq)
         R = np.moveaxis(np.zeros((B, 3, 3, Q)), -1, 1)
         p, w, al, a = (vectors(B, Q) for _ in range(4))
         axis, anchor = vectors(J, Q), vectors(J, Q)
@@ -294,7 +287,7 @@ def inverse_torque(model: mujoco.MjModel, q: Array, dq: Array, ddq: Array) -> Ar
     bare.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)  # ddq is continuous
     bare.dof_damping[:] = 0.0
     data, coupling = mujoco.MjData(bare), Coupling.of(model)
-    q, dq, ddq = coupling.all(q), coupling.rates(dq), coupling.rates(ddq)
+    q, dq, ddq = coupling.all(q, dq, ddq)
     out = np.empty_like(q)
     for k in range(len(q)):
         data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]

@@ -21,8 +21,6 @@ from estimator.errors import InputError
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-_NAMED = 6
-"""Most bodies or joints that an advice lists. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +52,6 @@ class SerialModel:
     coupling: Coupling
     notes: tuple[str, ...]
     source: mujoco.MjSpec
-
-
-def load_spec(path: Path | str) -> mujoco.MjSpec:
-    """Read a model as an editable ``MjSpec``; see ``reading.read_spec``.
-
-    Raises:
-        InputError: MuJoCo cannot read or compile the file.
-    """
-    return read_spec(Path(path)).spec
 
 
 def load_model(path: Path | str, lock: Lock = (), base: str | None = None) -> SerialModel:
@@ -178,7 +167,7 @@ def _locks(model: mujoco.MjModel, joints: list[int]) -> str:
     """Options that lock joints in the reference pose, or as near as their ranges allow."""
     ends = [model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf) for j in joints]
     names = [model.joint(j).name for j in joints]
-    rest = [np.clip(reference(model, name), *end) for name, end in zip(names, ends, strict=True)]
+    rest = [min(max(reference(model, n), low), high) for n, (low, high) in zip(names, ends, strict=True)]
     return " ".join(f"--lock {shlex.quote(f'{n}={x:g}')}" for n, x in zip(names, rest, strict=True))
 
 
@@ -194,18 +183,13 @@ def _above(model: mujoco.MjModel, body: int, other: int) -> bool:
     return body == other
 
 
-def _candidates(model: mujoco.MjModel) -> list[str]:
-    """First moving bodies below what floats or is fixed, which may be the base of an arm; most joints first."""
+def _bases(model: mujoco.MjModel) -> str:
+    """Option that names a base: a first moving body below what floats or is fixed; those with most joints first."""
     moved = _moved(model)
     tops = {b for b in moved if not any(b != a and _above(model, b, a) for a in moved)}
     ranked = sorted(tops, key=lambda top: (-sum(_above(model, b, top) for b in moved), top))
-    return [model.body(b).name for b in ranked]
-
-
-def _bases(model: mujoco.MjModel) -> str:
-    first, *others = _candidates(model)
-    more = f" (or {', '.join(others[: _NAMED - 1])})" if others else ""
-    return f"--base {shlex.quote(first)}{more}"
+    first, *others = (model.body(b).name for b in ranked[:6])  # the reader needs no more
+    return f"--base {shlex.quote(first)}" + (f" (or {', '.join(others)})" if others else "")
 
 
 def _loops(model: mujoco.MjModel) -> Iterator[str]:

@@ -14,12 +14,8 @@ LEAST_RAD = 0.5
 """Smallest angle between modelled and fitted gravity that counts as another mount. Chosen: tilts below are linear."""
 LEAST_GAIN = 4.0
 """Smallest factor by which another direction reduces a joint's squared residual. Chosen: far beyond noise."""
-ROUNDS = 3
-"""Rounds of the fit, each with weights from the last. Chosen: the weights then stay."""
 SIZE = (0.7, 1.4)
 """Range of the fitted over the modelled size of gravity. Chosen: masses are known to a third."""
-MOST_SAMPLES = 4000
-"""Most samples of a log in the fit. Chosen: a few hundred parameters' worth."""
 TURN = "gravity turn"
 """Label of the column from the model's gravity (0) to that of the other mount (1)."""
 
@@ -48,7 +44,7 @@ def mount_of(smooth: Sequence[Signals], joints: Sequence[int]) -> Array | None:
     for j in joints:
         rows, own = [], []
         for s in smooth:
-            here = np.flatnonzero(s.usable[:, j])[:: max(1, len(s.time) // MOST_SAMPLES)]
+            here = np.flatnonzero(s.usable[:, j])
             v = s.dq[here, j]
             rows.append(np.column_stack([-by[id(s)][here, j], (s.torque - s.inverse)[here, j]]))
             own.append(np.column_stack([np.ones(len(v)), np.sign(v), v, s.ddq[here, j]]))
@@ -56,7 +52,7 @@ def mount_of(smooth: Sequence[Signals], joints: Sequence[int]) -> Array | None:
         x = x - q @ (q.T @ x)
         each.append(x.T @ x)
     noise, there = np.array([x[3, 3] + 1e-12 for x in each]), g
-    for _ in range(ROUNDS):  # weigh each joint by what is left of it
+    for _ in range(3):  # weigh each joint by what is left of it, until the weights stay
         total = np.sum([x / n for x, n in zip(each, noise, strict=True)], axis=0)
         there = g + np.linalg.lstsq(total[:3, :3], total[:3, 3], rcond=1e-6)[0]
         with_it = np.append(g - there, 1.0)
@@ -69,12 +65,7 @@ def mount_of(smooth: Sequence[Signals], joints: Sequence[int]) -> Array | None:
 
 
 def ways(g: Array, mount: Array | None) -> dict[str, Array]:
-    """Changes of gravity against which a unit of each column acts, by its label, shape (3,) each.
-
-    Args:
-        g: gravity of the model [m/s^2], shape (3,).
-        mount: gravity of another mount, shape (3,); None: small tilts about the model's.
-    """
+    """Changes of gravity against which a unit of each column acts, by its label; ``mount`` None: about the model's."""
     middle = g if mount is None else mount
     found = {f"tilt {i}": np.cross(w, middle) for i, w in enumerate(horizontal(middle))}
     return found if mount is None else found | {TURN: g - mount}

@@ -57,9 +57,8 @@ def read_spec(path: Path) -> Read:
     text = _COMMENT.sub(b"", read_input(path, JSON_BYTES))
     root, said = _TAG.search(text), ""
     if b"<xacro:" in text:
-        name = path.name.removesuffix(".xacro").removesuffix(".urdf")
         raise InputError(
-            f"{path}: is a xacro file, which makes a URDF; type: ros2 run xacro xacro {path} > {name}.urdf"
+            f"{path}: is a xacro file; make a URDF of it: ros2 run xacro xacro {path} > robot.urdf"
         )
     for bare in (False, True):
         try:
@@ -95,50 +94,39 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
     """Give every link the mass and inertia of its ``inertial``, which MuJoCo takes from shapes or refuses."""
     if spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
         return
-    massless, improper = [], {}
+    said: dict[str, list[str]] = {}
     for body in spec.bodies[1:]:
         for geom in body.geoms:
             geom.mass = 0.0
-        massive = body.explicitinertial and body.mass > 0
-        if massive:
-            xx, yy, zz, xy, xz, yz = body.fullinertia
-            matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            if np.isnan(xx):
-                matrix = np.diag(body.inertia)
-            moments = np.linalg.eigvalsh(matrix)
-            if moments[0] < LEAST_KGM2 or moments[0] + moments[1] < moments[2]:
-                own = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
-                improper[body.name] = moments
-                set_inertial(body, body.mass, np.array(body.ipos), own @ matrix @ own.T)
-                body.inertia = np.maximum(body.inertia, LEAST_KGM2)
-                if (
-                    moments[0] >= LEAST_KGM2 and body.joints
-                ):  # others are fused with the body that carries them
-                    exact[body.name] = moments
-        elif body.joints:
-            massless.append(body.name)
-            set_inertial(body, LEAST_KG, np.zeros(3), LEAST_KGM2 * np.eye(3))
-    if massless and not any(b.mass > LEAST_KG and _moves(b) for b in spec.bodies[1:]):
-        raise InputError(
-            f"{path}: no link that moves has a mass; give the links their <inertial> (MuJoCo would take 1000 kg/m^3 of "
-            "their collision shapes)"
-        )
-    points = [name for name, moments in improper.items() if not moments.any()]
-    for links, what in (
-        (massless, "move without an <inertial>; they are read without mass"),
-        (points, "have a mass without inertia; they are read as points"),
-    ):
-        if links:
-            yield f"Links {', '.join(links)} {what}."
-    for name, (a, b, c) in improper.items():
-        if name not in points:
-            yield (
-                f"The inertia of link {name} is that of no body (principal moments {a:.3g}, {b:.3g}, {c:.3g} kg m^2); "
-                "torques are computed with it, and a simulation has the nearest possible one."
-                if name in exact
-                else f"The inertia of link {name} has no three positive principal moments ({a:.3g}, {b:.3g}, {c:.3g} "
-                "kg m^2); the nearest possible one is read."
+        if not (body.explicitinertial and body.mass > 0):
+            if body.joints:
+                said.setdefault("move without an <inertial> and are read without mass", []).append(body.name)
+                set_inertial(body, LEAST_KG, np.zeros(3), LEAST_KGM2 * np.eye(3))
+            continue
+        xx, yy, zz, xy, xz, yz = body.fullinertia
+        full = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        matrix = np.diag(body.inertia) if np.isnan(xx) else full
+        moments = np.linalg.eigvalsh(matrix)
+        if moments[0] >= LEAST_KGM2 and moments[0] + moments[1] >= moments[2]:
+            continue
+        own = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
+        set_inertial(body, body.mass, np.array(body.ipos), own @ matrix @ own.T)
+        body.inertia = np.maximum(body.inertia, LEAST_KGM2)
+        what, name = "have a mass without inertia and are read as points", body.name
+        if moments.any():
+            what = "have an inertia that no body has, and the nearest possible one is read"
+            name = f"{name} ({', '.join(f'{x:.3g}' for x in moments)} kg m^2)"
+        if moments[0] >= LEAST_KGM2 and body.joints:  # MuJoCo fuses the others with what carries them
+            what = (
+                "have an inertia that no body has; torques are computed with it, simulations with the nearest"
             )
+            exact[body.name] = moments
+        said.setdefault(what, []).append(name)
+    if not any(b.mass > LEAST_KG and _moves(b) for b in spec.bodies[1:]) and any(
+        b.joints for b in spec.bodies
+    ):
+        raise InputError(f"{path}: no link that moves has a mass; give the links their <inertial>")
+    yield from (f"Links {', '.join(links)} {what}." for what, links in said.items())
 
 
 def _with_gravity(spec: mujoco.MjSpec) -> Iterable[str]:
@@ -149,11 +137,10 @@ def _with_gravity(spec: mujoco.MjSpec) -> Iterable[str]:
         body.gravcomp = 0.0
     if bodies:
         share = " to ".join(dict.fromkeys(f"{100.0 * x:.3g} %" for x in (shares[0], shares[-1])))
-        names = ", ".join(body.name or "a body without a name" for body in bodies[:8])
-        more = f" and {len(bodies) - 8} more" if len(bodies) > 8 else ""
+        names = ", ".join(body.name or "a body without a name" for body in bodies)
         yield (
-            f"The file cancels {share} of gravity by gravcomp on {names}{more}, an aid of simulations; it is read "
-            "without, so that its drives carry the weight."
+            f"The file cancels {share} of gravity by gravcomp on {names:.300}, an aid of simulations; it is read "
+            "without, so that the drives carry the weight."
         )
 
 
@@ -166,12 +153,8 @@ def _name(spec: mujoco.MjSpec) -> None:
             name = f"link of {joint}" if joint else f"body {k}"
             body.name = f"{name} ({k})" if name in taken else name
             taken.add(body.name)
-    taken = {joint.name for joint in spec.joints}
-    for k, joint in enumerate(spec.joints):
-        if not joint.name:
-            name = f"joint of {joint.parent.name}"
-            joint.name = f"{name} ({k})" if name in taken else name
-            taken.add(joint.name)
+    for k, joint in enumerate(spec.joints, start=1):
+        joint.name = joint.name or f"joint {k} of {joint.parent.name}"
 
 
 def _body_of_meshes(spec: mujoco.MjSpec) -> str | None:

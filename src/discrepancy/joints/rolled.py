@@ -174,9 +174,8 @@ class Robot:
         pairs = all_effects(findings, model)
         acting = [pair for pair in pairs if pair[1].cause not in KNOWN]
         every = max(1, math.ceil((1.0 - 1e-9) / rate_hz / LONGEST_STEP_S))
-        built = build(
-            model.source.copy(), numbered([effect for _, effect in acting], model), 1.0 / rate_hz / every
-        )
+        effects = numbered((effect for _, effect in acting), model)
+        built = build(model.source.copy(), effects, 1.0 / rate_hz / every)
         left = dict.fromkeys(label(acting[k][0]) for k in built.left_out)
         readings = Readings.of([e for _, e in pairs if e.cause in KNOWN], len(model.joints))
         return cls(built, readings, every, tuple(left), model.coupling)
@@ -194,7 +193,7 @@ class Robot:
             tick: receives the log time at every step.
         """
 
-        c, own = self.coupling, self.coupling.own
+        own = self.coupling.own
 
         def watched(time: float, q: Array, dq: Array) -> Array:
             tick(time)
@@ -203,7 +202,7 @@ class Robot:
             return torque
 
         first, measured = piece.start, s.q[piece]
-        start = Start(float(s.time[first]), c.all(s.q[first]), c.rates(s.dq[first]), c.rates(s.ddq[first]))
+        start = Start(float(s.time[first]), *self.coupling.all(s.q[first], s.dq[first], s.ddq[first]))
         there = rollout(self.built, start, watched, len(measured) - 1, self.every)[:, own]
         error = np.full(measured.shape, np.nan)
         error[: len(there)] = there - measured[: len(there)]

@@ -202,10 +202,8 @@ def _diagnosed_joints(
     from discrepancy.joints.verdict import judged
     from mocobot.api.joints import read_logs, read_model
 
-    robot, tolerances = (
-        read_model(model, lock=chosen.lock, base=chosen.base),
-        _joint_tolerances(chosen.tolerances),
-    )
+    robot = read_model(model, lock=chosen.lock, base=chosen.base)
+    tolerances = _joint_tolerances(chosen.tolerances)
     for text in robot.notes:
         note(f"{robot.path.name}: {text}")
     say("reading")

@@ -24,13 +24,11 @@ def read_model(given: GivenModel, *, lock: Lock = (), base: str | None = None) -
 
     Args:
         given: the file, or a model.
-        lock: joints that do not move, with their positions: ``{"wrist": 0.5}`` [rad or m], or texts such as
-            ``["wrist=30deg"]``.
+        lock: joints that do not move: ``{"wrist": 0.5}`` [rad or m], or texts such as ``["wrist=30deg"]``.
         base: name of the body whose subtree is the arm; its parent is fixed to the world.
 
     Raises:
-        InputError: MuJoCo cannot read the file; the model is no such tree; a joint or body does not exist; or a part is
-            to be taken of a model that is already read.
+        InputError: MuJoCo cannot read the file; the model or its part is no such tree; or it is already read.
     """
     if not isinstance(given, SerialModel):
         return load_model(given, lock, base)

@@ -97,7 +97,7 @@ def test_a_link_without_inertial_that_moves_alone_is_massless(tmp_path) -> None:
     np.testing.assert_allclose(
         asked[:, :2], inverse_torque(plain, q[:, :2], dq[:, :2], ddq[:, :2]), atol=1e-6
     )
-    assert "Links wrist move without an <inertial>; they are read without mass." in found.notes
+    assert "Links wrist move without an <inertial> and are read without mass." in found.notes
 
 
 def test_a_frame_that_moves_without_inertia_is_a_point(tmp_path) -> None:
@@ -107,7 +107,7 @@ def test_a_frame_that_moves_without_inertia_is_a_point(tmp_path) -> None:
     found = load_model(urdf(tmp_path, DUO + frame))
     tiny = frame.replace('ixx="0" iyy="0" izz="0"', 'ixx="1e-10" iyy="1e-10" izz="1e-10"')
     same_torques(found, mujoco.MjModel.from_xml_path(str(urdf(tmp_path, DUO + tiny, "plain.urdf"))))
-    assert "Links imu have a mass without inertia; they are read as points." in found.notes
+    assert "Links imu have a mass without inertia and are read as points." in found.notes
 
 
 @pytest.mark.parametrize(("axis", "moment"), [("1 0 0", 0.006), ("0 1 0", 0.044), ("0 0 1", 0.0505)])
@@ -122,7 +122,7 @@ def test_an_inertia_that_no_body_has_is_computed_with_as_written(tmp_path, axis,
     np.testing.assert_allclose(gain, moment + 2.5 * away, rtol=1e-9)
     (note,) = found.notes
     assert note.startswith(
-        "The inertia of link boom is that of no body (principal moments 0.006, 0.044, 0.0505 kg m^2)"
+        "Links boom (0.006, 0.044, 0.0505 kg m^2) have an inertia that no body has; torques are"
     )
 
 
@@ -313,7 +313,7 @@ def test_advice_for_objects_beside_the_arm_and_loops_of_a_gripper_works(tmp_path
     path = tmp_path / "torso.xml"
     path.write_text(re.sub("<keyframe>.*</keyframe>", "", fixed), encoding="utf-8")
     ((first, _),) = advised(path)
-    assert first == {"joint of ball": "0"}
+    assert first == {"joint 7 of ball": "0"}
     with pytest.raises(InputError, match=r"closes a chain between finger and fore; lock .* --lock grip=0$"):
         load_model(path, first)
     assert load_model(path, {**first, "grip": "0"}).joints == ("hip", "yaw", "pitch", "out", "elbow")
