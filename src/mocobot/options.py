@@ -694,11 +694,6 @@ class Replay(Files, ReplayOptions):
     """Write a file for the Rerun viewer instead of opening it."""
 
 
-OLD_NAMES = {
-    "duration": "duration-s",
-    "rate": "rate-hz",
-    "max-gap": "max-gap-s",
-    "out-dir": "out",
-    "save": "out",
-}
+OLD_NAMES = {"duration": "duration-s", "rate": "rate-hz", "max-gap": "max-gap-s", "out-dir": "out",
+             "save": "out"}  # fmt: skip
 """Earlier names of options, which commands that have the new option still accept."""

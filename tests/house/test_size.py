@@ -14,11 +14,11 @@ CEILINGS = {
     "estimator": 6_660,
     "mocobot_logs": 6_310,
     "mocobot_inspect": 2_950,
-    "mocobot_sim": 5_670,
-    "discrepancy": 11_530,
+    "mocobot_sim": 5_680,
+    "discrepancy": 11_930,
     "mocobot_view": 2_100,
     "mocobot_report": 2_620,
-    "mocobot": 4_450,
+    "mocobot": 4_470,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700

@@ -126,6 +126,14 @@ def test_an_inertia_that_no_body_has_is_computed_with_as_written(tmp_path, axis,
     )
 
 
+def test_the_inertial_frame_of_a_urdf_may_be_turned(tmp_path) -> None:
+    """Torque per acceleration of a link whose tensor is given in a frame turned by 0.7 rad about z."""
+    arm = inertial(2.0, "0 0 0", "0.01 0.05 0.055 0 0 0").replace("<origin ", '<origin rpy="0 0 0.7" ')
+    found = load_model(urdf(tmp_path, link("base") + link("a", arm) + joint("j", "base", "a", "0 0 0")))
+    gain = inverse_torque(found.model, *np.array([[[0.3]], [[0.0]], [[1.0]]]))
+    np.testing.assert_allclose(gain, 0.01 * np.sin(0.7) ** 2 + 0.05 * np.cos(0.7) ** 2, rtol=1e-9)
+
+
 def jaw(name: str, side: int, more: str = "") -> str:
     tool = inertial(0.25, f"0 {0.01 * side} 0.03", "2e-5 2e-5 1e-5 0 0 0")
     text = joint(f"{name}_joint", "hand", name, "0.3 0 0", "prismatic", more)
