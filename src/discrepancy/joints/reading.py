@@ -100,7 +100,9 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
             geom.mass = 0.0
         if not (body.explicitinertial and body.mass > 0):
             if body.joints:
-                said.setdefault("move without an <inertial> and are read without mass", []).append(body.name)
+                said.setdefault("Links that move without an <inertial> are read without mass", []).append(
+                    body.name
+                )
                 set_inertial(body, LEAST_KG, np.zeros(3), LEAST_KGM2 * np.eye(3))
             continue
         xx, yy, zz, xy, xz, yz = body.fullinertia
@@ -112,21 +114,20 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
         own = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
         set_inertial(body, body.mass, np.array(body.ipos), own @ matrix @ own.T)
         body.inertia = np.maximum(body.inertia, LEAST_KGM2)
-        what, name = "have a mass without inertia and are read as points", body.name
+        what, name = "Links with a mass and no inertia are read as points", body.name
         if moments.any():
-            what = "have an inertia that no body has, and the nearest possible one is read"
+            what = "Links with an inertia that no body has are read with the nearest possible one"
             name = f"{name} ({', '.join(f'{x:.3g}' for x in moments)} kg m^2)"
         if moments[0] >= LEAST_KGM2 and body.joints:  # MuJoCo fuses the others with what carries them
-            what = (
-                "have an inertia that no body has; torques are computed with it, simulations with the nearest"
-            )
+            what = "Links have an inertia that no body has; torques are computed with it, simulations with the nearest"
             exact[body.name] = moments
-        said.setdefault(what, []).append(name)
+        if _moves(body):
+            said.setdefault(what, []).append(name)
     if not any(b.mass > LEAST_KG and _moves(b) for b in spec.bodies[1:]) and any(
         b.joints for b in spec.bodies
     ):
         raise InputError(f"{path}: no link that moves has a mass; give the links their <inertial>")
-    yield from (f"Links {', '.join(links)} {what}." for what, links in said.items())
+    yield from (f"{what}: {', '.join(links)}." for what, links in said.items())
 
 
 def _with_gravity(spec: mujoco.MjSpec) -> Iterable[str]:
