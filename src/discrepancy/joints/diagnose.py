@@ -25,7 +25,7 @@ from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
 
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
-         " turn", " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
+         " gravity turn", " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Labels of columns whose values define the linearisation point."""
 CURVED = ("gravity_direction", "joint_zero", "link_length", "torque_delay")
 """Causes with nonlinear effects: other causes show only after linearisation around their values."""
