@@ -22,8 +22,11 @@ MOUNTS = {
 }
 
 
+COULOMB_NM, VISCOUS_NMS = np.array([0.5, 0.5, 0.5, 0.1]), np.array([0.2, 0.2, 0.2, 0.04])
+
+
 def rubs(q: np.ndarray, v: np.ndarray, torque: np.ndarray, time: float) -> np.ndarray:
-    return 0.5 * np.tanh(v / 1e-3) + 0.2 * v
+    return COULOMB_NM * np.tanh(v / 1e-3) + VISCOUS_NMS * v
 
 
 @pytest.fixture
