@@ -19,7 +19,8 @@ import numpy as np
 import tyro
 from mujoco import sysid
 
-from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.reading import read_spec
 from discrepancy.joints.signals import Signals
 from estimator.filtering import differentiate, low_pass
 from mocobot_logs.joints.joint_log import JointLog
@@ -39,7 +40,7 @@ LEAST = 0.05
 
 def servoed() -> mujoco.MjSpec:
     """The model with a servo at every joint, its torque as a sensor, and the tendon of the coupled drive."""
-    spec = load_spec(TOP / "models" / "tx40" / "tx40.xml")
+    spec = read_spec(TOP / "models" / "tx40" / "tx40.xml").spec
     spec.option.timestep, spec.option.integrator = 1.0 / RATE_HZ, mujoco.mjtIntegrator.mjINT_EULER
     stiffness = (2.0 * np.pi * SERVO_HZ) ** 2 * INERTIA
     damping = 2.0 * 2.0 * np.pi * SERVO_HZ * INERTIA
@@ -153,7 +154,7 @@ def fitted(log: JointLog, *, masses: bool) -> tuple[dict[str, float], float, int
 
 def left(model: SerialModel, log: JointLog, value: dict[str, float]) -> tuple[np.ndarray, Signals]:
     """What a fitted model leaves of the last third, by inverse dynamics as those of the diagnosis, and that third."""
-    spec = load_spec(TOP / "models" / "tx40" / "tx40.xml")
+    spec = read_spec(TOP / "models" / "tx40" / "tx40.xml").spec
     put(spec, value)
     _, s = parts(replace(model, model=spec.compile()), log)
     joints = ([value[f"{name}_{j}"] for j in range(6)] for name in ("coulomb", "viscous"))

@@ -52,7 +52,7 @@ class Numbers:
 
 
 TOKENS = {
-    "Nm": "N m", "Nms": "N m s", "Ns": "N s", "Ns2": "N s^2",
+    "Nm": "N m", "Nms": "N m s", "Ns": "N s", "Ns2": "N s^2", "s2": "s^2",
     "Nms2": "N m s^2", "rad2": "rad^2", "mps": "m/s", "rad": "rad", "rad3": "rad^3", "m": "m", "N": "N", "s": "s",
     "kg": "kg", "kgm": "kg m", "V": "V", "Vs": "V s", "Hz": "Hz", "deg": "deg", "m2": "m^2", "kgm2": "kg m^2",
 }  # fmt: skip

@@ -180,7 +180,10 @@ def _inputs_with_model(options: opt.Diagnose | opt.Calibrate) -> list[Path]:
         return inputs_of(options)
     from mocobot.api.joints import map_path, read_model
 
-    robot, logs = read_model(options.model), [*options.rec, *getattr(options, "reference", ())]
+    robot, logs = (
+        read_model(options.model, lock=options.lock, base=options.base),
+        [*options.rec, *getattr(options, "reference", ())],
+    )
     maps = {map_path(robot, log, options.map) for log in logs}
     return [options.model, *sorted(maps), *logs, *_paths(getattr(options, "tolerances", None))]
 

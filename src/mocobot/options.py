@@ -168,6 +168,21 @@ class Files:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PartOptions(Options):
+    """Options that take a part of a robot's model as the arm."""
+
+    lock: Annotated[AnyWords, tyro.conf.UseAppendAction, tyro.conf.arg(metavar="JOINT=VALUE")] = ()
+    """With --model: a joint that does not move, such as a gripper's, and its position [rad, 30deg, or m]."""
+    base: Annotated[AnyName | None, tyro.conf.arg(metavar="BODY")] = None
+    """With --model: the arm is what this body carries; its parent stands still."""
+
+    def check_part(self, model: object) -> None:
+        """Raise InputError if a part is named of no model."""
+        if model is None and (self.lock or self.base is not None):
+            raise InputError("lock and base take a part of a model; name the model with --model")
+
+
+@dataclass(frozen=True, kw_only=True)
 class EstimateOptions(Options):
     """Options of the payload estimate."""
 
@@ -254,7 +269,7 @@ class Calibrate(Files, CalibrateOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiagnoseOptions(Options):
+class DiagnoseOptions(PartOptions):
     """Options of the diagnosis of a team or of a single robot."""
 
     map: LogMap = None
@@ -285,6 +300,7 @@ class DiagnoseOptions(Options):
 
     def check_for(self, model: object, reference: object) -> None:
         """Raise InputError for an option that does not apply to a team, or to a single robot."""
+        self.check_part(model)
         if model is not None:
             refuse_teams(self, ("calibration", "scheduler", "laws", "odds", "whole", "jobs"))
         elif reference:
@@ -475,7 +491,7 @@ class Convert(Files, ConvertOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOptions(Options):
+class MapOptions(PartOptions):
     """Options of the draft of a map."""
 
     episode: Episode = None
@@ -493,7 +509,7 @@ class Map(Files, MapOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class InspectOptions(Options):
+class InspectOptions(PartOptions):
     """Options of the inspection of a log."""
 
     map: LogMap = None
@@ -503,7 +519,8 @@ class InspectOptions(Options):
     episode: Episode = None
 
     def check_for(self, model: object) -> None:
-        """Raise InputError for an option that does not apply to a single robot."""
+        """Raise InputError for an option that does not apply to a team, or to a single robot."""
+        self.check_part(model)
         if model is not None:
             refuse_teams(self, ("design", "calibration"))
 
@@ -653,7 +670,7 @@ class Simulate(SimulateOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReplayOptions(Options):
+class ReplayOptions(PartOptions):
     """Options of a replay."""
 
     map: LogMap = None
@@ -672,6 +689,7 @@ class ReplayOptions(Options):
 
     def check_for(self, path: object, model: object) -> None:
         """Raise InputError if options exclude each other or do not apply to a single robot."""
+        self.check_part(model)
         if path is not None and self.web:
             raise InputError("out and web are both given; choose a file or a browser")
         if model is not None:
@@ -694,11 +712,6 @@ class Replay(Files, ReplayOptions):
     """Write a file for the Rerun viewer instead of opening it."""
 
 
-OLD_NAMES = {
-    "duration": "duration-s",
-    "rate": "rate-hz",
-    "max-gap": "max-gap-s",
-    "out-dir": "out",
-    "save": "out",
-}
+OLD_NAMES = {"duration": "duration-s", "rate": "rate-hz", "max-gap": "max-gap-s", "out-dir": "out",
+             "save": "out"}  # fmt: skip
 """Earlier names of options, which commands that have the new option still accept."""

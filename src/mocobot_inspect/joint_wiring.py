@@ -74,6 +74,7 @@ class Robot:
         regressor: torque regressor of the last link from the same inputs, shape (Q, J, 10). Its inertial parameters are
             mass, first moments, Ixx, Iyy, Izz, Ixy, Ixz and Iyz about the frame's origin.
         mass_kg: mass of all moving links.
+        notes: sentences on what was read otherwise than the model's file says.
     """
 
     joints: tuple[str, ...]
@@ -84,6 +85,7 @@ class Robot:
     inverse: Callable[[Array, Array, Array], Array]
     regressor: Callable[[Array, Array, Array], Array]
     mass_kg: float
+    notes: tuple[str, ...] = ()
 
     @property
     def units(self) -> tuple[str, ...]:

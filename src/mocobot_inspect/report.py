@@ -234,6 +234,7 @@ def _hidden_words(mistakes: Sequence[Mistake]) -> list[str]:
 def _joint_lines(found: JointInspection) -> Iterator[str]:
     t, joints = found.timing, _plural(len(found.robot.joints), "joint")
     yield f"[[Log {found.name}]]  {joints}, {len(found.channels)} columns by map {found.log_map.name}"
+    yield from (f"    {note}" for note in found.robot.notes)
     yield "[[Stamps]]"
     yield (
         f"    {t.samples} samples, {t.duration_s:.3f} s, {'-' if t.rate_hz is None else f'{t.rate_hz:.6g}'} Hz; jitter "

@@ -81,7 +81,7 @@ def joint_replay(model: SerialModel, log: JointLog, name: str) -> JointReplay:
     shapes = _shapes(model.model)
     step = max(1, round(log.rate_hz / POSE_HZ))
     names = {b: model.model.body(b).name or f"body{b}" for b in shapes}
-    position, quaternion, reach = _poses(model.model, log.q[::step])
+    position, quaternion, reach = _poses(model.model, model.coupling.all(log.q[::step])[0])
     every = max(1, round(log.rate_hz / SERIES_HZ))
     q = low_pass(log.q, log.rate_hz, min(SMOOTH_HZ, SMOOTH_SHARE * log.rate_hz))
     dq = differentiate(q, log.rate_hz)

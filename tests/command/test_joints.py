@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import tomllib
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -245,3 +247,97 @@ def test_a_map_of_joints_where_a_team_is_meant(tmp_path, capsys, command):
     said = refused(capsys, command[0], log, "--map", tmp_path / "log.toml", *command[1:])
     assert "log.toml: is of one robot's joints, not of a team" in said
     assert "read its log with --model" in said
+
+
+WITH_FINGERS = MODEL.replace(
+    '<geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.03" mass="0"/>',
+    '<body name="left" pos="0 0 0.3"><inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>'
+    '<joint name="left" type="slide" axis="0 1 0" range="0 0.04"/></body>'
+    '<body name="right" pos="0 0 0.3"><inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>'
+    '<joint name="right" type="slide" axis="0 -1 0" range="0 0.04"/></body>',
+)
+"""The arm with a gripper that was not logged."""
+
+
+def test_what_was_not_logged_is_locked_as_the_refusal_says(tmp_path, capsys, log) -> None:
+    (tmp_path / "arm.xml").write_text(WITH_FINGERS, encoding="utf-8")
+    said = refused(capsys, "inspect", log, "--model", tmp_path / "arm.xml")
+    assert "joints lacks 'left', 'right'" in said
+    advice = re.findall(r"--lock (\S+?)[,;]", said)
+    assert advice == ["left=0"]
+    locks = ["--lock", *advice, "--lock", "right=0.04"]
+    code, out, _ = run(capsys, "inspect", log, "--model", tmp_path / "arm.xml", *locks)
+    assert code == 0
+    assert "Joints are locked: left=0, right=0.04." in out
+    assert out.endswith("ready for: a diagnosis from torques of 3 joints\n")
+    assert "its range in the model is 0 to 0.04 m" in refused(
+        capsys,
+        "replay",
+        log,
+        "--model",
+        tmp_path / "arm.xml",
+        "--lock",
+        "left=4",
+        "--out",
+        tmp_path / "a.rrd",
+    )
+    assert "name the model with --model" in refused(capsys, "inspect", log, "--base", "fore")
+    assert files(tmp_path) == {"arm.xml", "log.csv", "log.toml"}
+
+
+def test_a_part_of_a_model_from_python(tmp_path, log) -> None:
+    (tmp_path / "arm.xml").write_text(WITH_FINGERS, encoding="utf-8")
+    arm = serial.read_model(tmp_path / "arm.xml", lock={"left": 0.01, "right": "0.02 m"})
+    assert arm.joints == JOINTS
+    assert serial.inspect(log, tmp_path / "arm.xml", lock={"left": 0.01, "right": 0.02}).is_ready
+    fore = serial.read_model(tmp_path / "arm.xml", lock=["left=0", "right=0"], base="fore")
+    assert fore.joints == ("elbow",)
+    with pytest.raises(InputError, match="already read"):
+        serial.inspect(log, arm, base="fore")
+
+
+def test_an_arm_whose_joints_follow_others_is_diagnosed_and_simulated(tmp_path, capsys) -> None:
+    """A parallelogram: the hand turns against the fore arm; friction of 0.6 N m + 0.3 N m s/rad at the elbow is new."""
+    tied = MODEL.replace(
+        '<geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.03" mass="0"/>',
+        '<body name="hand" pos="0 0 0.3"><inertial pos="0.1 0 0" mass="1" diaginertia="0.004 0.004 0.004"/>'
+        '<joint name="level" axis="0 1 0"/></body>',
+    ).replace(
+        "</mujoco>",
+        '<equality><joint joint1="level" joint2="elbow" polycoef="0 -1 0 0 0"/></equality></mujoco>',
+    )
+    (tmp_path / "arm.xml").write_text(tied, encoding="utf-8")
+    time = np.arange(3000) / 250.0
+    rate = 2 * np.pi * np.array([[0.31, 0.23, 0.41], [0.17, 0.47, 0.13]])
+    angle = time[:, None, None] * rate + np.array([[0.0, 1.0, 2.0], [0.5, 0.1, 3.0]])
+    q, dq, ddq = (
+        x.sum(axis=1) * 0.4 for x in (np.sin(angle), rate * np.cos(angle), -(rate**2) * np.sin(angle))
+    )
+    full = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    full.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    spread = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1.0]])
+    data, torque = mujoco.MjData(full), np.empty_like(q)
+    for k in range(len(time)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = spread @ q[k], spread @ dq[k], spread @ ddq[k]
+        mujoco.mj_inverse(full, data)
+        torque[k] = spread.T @ data.qfrc_inverse
+    torque[:, 2] += 0.6 * np.tanh(dq[:, 2] / 1e-3) + 0.3 * dq[:, 2]
+    torque += 0.01 * np.random.default_rng(0).standard_normal(torque.shape)
+    columns = {"time": time}
+    for j, name in enumerate(JOINTS):
+        columns |= {f"{name} q": q[:, j], f"{name} dq": dq[:, j], f"{name} torque": torque[:, j]}
+    write_map(tmp_path)
+    log, out = write_csv(tmp_path / "log.csv", columns), tmp_path / "out"
+    code, said, err = run(capsys, "diagnose", log, "--model", tmp_path / "arm.xml", "--out", out)
+    assert code == 0, err
+    assert "Joints that follow others are no joints of their own: level." in said
+    values = json.loads((out / "diagnosis.json").read_text())
+    (cause,) = values["causes"]
+    assert (cause["cause"], cause["joint"]) == ("friction", 3)
+    assert abs(cause["parameters"]["coulomb_Nm"]["value"] - 0.6) < 0.02
+    assert abs(cause["parameters"]["viscous_Nms_per_rad"]["value"] - 0.3) < 0.02
+    built = mujoco.MjModel.from_xml_path(str(out / "extended" / "robot.xml"))
+    assert built.neq == 1
+    assert abs(built.joint("elbow").frictionloss[0] - 0.6) < 0.02
+    (first, *_) = values["rollouts"]["horizons"]
+    assert first["before"]["rms"][2] > 10 * first["after"]["rms"][2] > 0

@@ -13,9 +13,9 @@ from source_tree import SRC, module_files
 CEILINGS = {
     "estimator": 6_660,
     "mocobot_logs": 6_770,
-    "mocobot_inspect": 2_960,
-    "mocobot_sim": 5_670,
-    "discrepancy": 11_530,
+    "mocobot_inspect": 2_970,
+    "mocobot_sim": 5_680,
+    "discrepancy": 12_500,
     "mocobot_view": 2_100,
     "mocobot_report": 2_620,
     "mocobot": 4_470,

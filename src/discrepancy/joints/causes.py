@@ -195,6 +195,13 @@ def _scaled(s: JointSignals, h: Shape) -> Array:
     return s.asked * (1.0 + h["bend"] * (np.abs(s.asked) / typical - 1.0))
 
 
+def _as_on(turned_deg: float) -> str:
+    """How a base is turned, in words that a look at the robot confirms."""
+    if turned_deg > 135.0:
+        return " over, as on a ceiling"
+    return " on its side, as on a wall" if turned_deg > 45.0 else f" by {turned_deg:.0f} deg"
+
+
 def _bent(n: Said) -> str:
     if not n.value("bend"):
         return ""
@@ -396,7 +403,10 @@ OTHERS = (
     OtherCause(
         "gravity_direction", "tilt of the base", ("tilt_1_rad", "tilt_2_rad"),
         lambda n: (
-            f"the base is tilted by {n('tilt_1_rad', 'mrad', 1e3, signed=True)} and "
+            f"the base is turned{_as_on(n.value('turned_deg'))}: gravity points along {n.point('m/s^2', 1.0)} of the "
+            "base, not where the model has it"
+            if n.value("turned_deg")
+            else f"the base is tilted by {n('tilt_1_rad', 'mrad', 1e3, signed=True)} and "
             f"{n('tilt_2_rad', 'mrad', 1e3, signed=True)} about the two horizontal axes"
         ),
         "Put a level on the base.",

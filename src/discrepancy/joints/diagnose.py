@@ -17,6 +17,7 @@ from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, Until, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.mount import mount_of
 from discrepancy.joints.problem import Given, JointProblem, joint_problem
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, trials_of
@@ -24,7 +25,7 @@ from estimator.arrays import Array
 from mocobot_logs.joints.joint_log import JointLog
 
 MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
-         " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
+         " gravity turn", " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Labels of columns whose values define the linearisation point."""
 CURVED = ("gravity_direction", "joint_zero", "link_length", "torque_delay")
 """Causes with nonlinear effects: other causes show only after linearisation around their values."""
@@ -69,16 +70,21 @@ def diagnose(
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
     smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
+    if given.changed is None and not given.motors and "gravity_direction" not in given.excluded:
+        given = replace(given, mount=mount_of(smooth, given.joints or range(len(model.joints))))
     problem = joint_problem(model, smooth, None, given)
     search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say, until)
 
     def bent(state: State, new: frozenset[str]) -> bool:
         return given.changed is None and not new.isdisjoint(CURVED)
 
-    first = Outcome(problem, search, until.run(search, search.fixed(()), bent), finished=not until.broken)
+    again, first = partial(_around, smooth=smooth, given=given), Outcome(problem, search, search.fixed(()))
+    if given.mount is not None:  # all loads are others there, so look for further causes from there on
+        turned = [Chosen(g, 1.0) for g in problem.groups if g.cause == "gravity_direction"]
+        first = again(replace(first, state=search.fixed(turned)), floor=None)
+    first = replace(first, state=until.run(first.search, first.state, bent), finished=not until.broken)
     if given.changed is not None or until():
         return first  # with a reference, the common model error has no linearisation point
-    again = partial(_around, smooth=smooth, given=given)
     around = again(first, floor=None)
     for _ in range(settings.rounds):
         found = Outcome(around.problem, around.search, until.run(around.search, around.state))

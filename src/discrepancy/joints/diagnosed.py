@@ -12,8 +12,8 @@ import numpy as np
 
 from discrepancy.evidence.findings import Finding, words_of
 from discrepancy.joints.causes import LINKS, WORDS, Said, joint_in_words, link_in_words, titled
-from discrepancy.joints.effects import all_effects
-from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.effects import all_effects, numbered
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.verdict import JointVerdict, Prediction
 from discrepancy.numbers import three_digits
 from discrepancy.result.folder import Diagnosed
@@ -45,11 +45,15 @@ class JointValues(Told):
     def __init__(self, verdict: JointVerdict) -> None:
         super().__init__(verdict)
         self.model = verdict.model
+        turned = (f.shape["turned_deg"] for f in verdict.findings if "turned_deg" in f.shape)
+        self.turned_deg: float = next(turned, 0.0)
         self.than = "than in the reference" if verdict.reference else "than modelled"
 
     def at(self, cause: str, place: str, joint: int | None, partner: int | None = None) -> Values:
         """Cause and place as JSON values and in words."""
         title = WORDS[cause].title if cause in WORDS else cause.replace("_", " ")
+        if cause == "gravity_direction" and self.turned_deg:
+            title = f"mount turned by {self.turned_deg:.0f} deg"
         if "{pair}" in title and joint is not None and partner is None:
             partner = joint - 1  # a drive is shared with the joint before
         where = self.where(cause, place, joint, partner)
@@ -210,7 +214,8 @@ def write_extended(verdict: JointVerdict, folder: Path) -> None:
     Raises:
         InputError: the folder cannot be written, MuJoCo refuses the model, or it refers to files outside its folder.
     """
-    effects = [effect for _, effect in all_effects(verdict.findings, verdict.model)]
-    spec = load_spec(verdict.model.path)
+    effects = numbered((effect for _, effect in all_effects(verdict.findings, verdict.model)), verdict.model)
+    spec = verdict.model.source.copy()
     check_named(verdict.model.path, assets=False)
-    write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference))
+    notes = verdict.model.notes
+    write_model(spec, effects, folder, verdict.trials, reference=bool(verdict.reference), notes=notes)

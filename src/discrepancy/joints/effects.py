@@ -14,12 +14,15 @@ from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, parameter_name, titled
 from discrepancy.joints.mechanics import Tree, horizontal
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.mount import angle_between, gravity_at, ways
 from discrepancy.joints.problem import JointProblem
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
 ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push")
+GRAVITY = ("x_m_per_s2", "y_m_per_s2", "z_m_per_s2")
+"""Parameters of a base that is mounted another way than in the model: gravity in the base's frame."""
 LEAST_KG = 1e-3
 """Least payload mass with a defined centre of mass [kg]."""
 
@@ -34,7 +37,7 @@ def physical(
         group: a cause at a place, or at the place of one member.
         x, covariance: values of its columns and their covariance, shapes (k,) and (k, k).
     """
-    names = NAMES[group.cause]
+    names = NAMES[group.cause] if group.cause != "gravity_direction" or problem.mount is None else GRAVITY
     if group.cause == "link_mass" and len(x) > 1:
         names = (*names, *NAMES["link_com"], "inertia_share")
     change = _change(problem, group)
@@ -66,7 +69,10 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
         return load_of
     if group.cause == "gravity_direction":
         along = axes_of_tilt(tree.gravity) @ horizontal(tree.gravity).T
-        return lambda x: along @ x
+        if problem.mount is None:
+            return lambda x: along @ x
+        g, mount = tree.gravity, problem.mount
+        return lambda x: gravity_at(g, mount, dict(zip(ways(g, mount), x, strict=True)))
     return None
 
 
@@ -92,6 +98,8 @@ def load_of(moments: Array) -> Array:
 def absolute(problem: JointProblem, group: Group) -> dict[str, Any]:
     """Shape parameters of a cause, with the physical values that a simulation needs."""
     shape: dict[str, Any] = dict(group.shape)
+    if group.cause == "gravity_direction" and problem.mount is not None:
+        shape["turned_deg"] = np.degrees(angle_between(problem.model.model.opt.gravity, problem.mount))
     if group.place not in problem.model.joints:
         return shape
     j = problem.model.joints.index(group.place)
@@ -135,6 +143,12 @@ def all_effects(findings: Iterable[Finding], model: SerialModel) -> list[tuple[F
     return sorted(pairs, key=lambda pair: pair[1].cause in LATE)
 
 
+def numbered(effects: Iterable[RobotEffect], model: SerialModel) -> list[RobotEffect]:
+    """Number the joints of effects among all joints of the MJCF, where some may follow others."""
+    of = {k: int(j) + 1 for k, j in enumerate(model.coupling.own, start=1)}
+    return [replace(e, joint=of.get(e.joint or 0), partner=of.get(e.partner or 0)) for e in effects]
+
+
 def label(finding: Finding) -> str:
     """A cause with its place in words."""
     return titled(WORDS[finding.cause].title, finding.place)
@@ -158,11 +172,11 @@ def _effect(finding: Finding, member: Member, model: SerialModel) -> RobotEffect
         numbers |= {"start_s": finding.event.start_s, "duration_s": finding.event.duration_s}
     if finding.cause == "torque_scale":
         numbers = {"bend": 0.0} | numbers
-    if finding.cause == "gravity_direction":
+    if "tilt_1_rad" in numbers:
         gravity = np.array(model.model.opt.gravity)
         way = np.array([numbers["tilt_1_rad"], numbers["tilt_2_rad"]]) @ axes_of_tilt(gravity)
         turned = Rotation.from_rotvec(-way).apply(gravity)
-        numbers |= dict(zip(("x_m_per_s2", "y_m_per_s2", "z_m_per_s2"), map(float, turned), strict=True))
+        numbers |= dict(zip(GRAVITY, map(float, turned), strict=True))
     joint, body = member.joint, ""
     if finding.cause in LINKS:  # a link may have the name of another link's joint
         moved = member.place in model.bodies

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -15,26 +15,79 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
+from estimator.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """How N joints of a model move with the J joints that move on their own; the others follow them linearly.
+
+    Attributes:
+        own: the J joints, shape (J,).
+        ratio, offset: positions of all joints are ``ratio @ q + offset``, shapes (N, J) and (N,).
+    """
+
+    own: NDArray[np.intp]
+    ratio: Array
+    offset: Array
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> Coupling:
+        """Read the linear equality constraints between joints of a model of hinges and slides.
+
+        Raises:
+            InputError: joints follow each other in a circle.
+        """
+        N = model.njnt
+        ratio, offset, leads = np.eye(N), np.zeros(N), np.ones(N, dtype=bool)
+        for e in range(model.neq):
+            if model.eq_type[e] == mujoco.mjtEq.mjEQ_JOINT and model.eq_active0[e]:
+                f, leader = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+                leads[f], ratio[f] = False, 0.0
+                offset[f] = model.qpos0[f] + model.eq_data[e, 0]
+                if leader >= 0:
+                    ratio[f, leader] = model.eq_data[e, 1]
+                    offset[f] -= model.eq_data[e, 1] * model.qpos0[leader]
+        own, step, shift = np.flatnonzero(leads), ratio, offset
+        for _ in range(N):  # a follower may lead another
+            if not ratio[:, ~leads].any():
+                return cls(own, ratio[:, own], offset)
+            ratio, offset = ratio @ step, ratio @ shift + offset
+        names = ", ".join(model.joint(int(j)).name for j in np.flatnonzero(ratio[:, ~leads].any(axis=1)))
+        raise InputError(f"joints follow each other in a circle ({names}); delete an equality constraint")
+
+    def all(self, q: Array, *rates: Array) -> list[Array]:
+        """Positions of all joints, and their derivatives, from those of the J joints, (..., J) -> (..., N) each."""
+        return [q @ self.ratio.T + self.offset, *(x @ self.ratio.T for x in rates)]
+
+    def driven(self, torque: Array) -> Array:
+        """Torques at the J joints that do the work of those at all joints, shape (Q, N, ...) -> (Q, J, ...)."""
+        if len(self.own) == len(self.ratio):
+            return torque
+        return np.moveaxis(np.tensordot(torque, self.ratio, axes=(1, 0)), -1, 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Kinematic tree of B bodies and J joints; parents come before children, and body 0 is the world.
+    """Kinematic tree of B bodies and N joints; parents come before children, and body 0 is the world.
+
+    The J joints that move on their own come first; the others follow them.
 
     Attributes:
         parent: parent of each body, shape (B,).
         position, rotation: pose of each body frame in its parent frame at joint position ``zero``, shapes (B, 3) and
             (B, 3, 3).
-        joint_body: body that each joint moves, shape (J,).
-        slides: whether a joint is prismatic, shape (J,).
-        anchor, axis: a point on the joint axis and its direction, in the frame of its body, shape (J, 3) each.
-        zero: joint position at which the poses hold, shape (J,).
+        joint_body: body that each joint moves, shape (N,).
+        slides: whether a joint is prismatic, shape (N,).
+        anchor, axis: a point on the joint axis and its direction, in the frame of its body, shape (N, 3) each.
+        zero: joint position at which the poses hold, shape (N,).
         mass: shape (B,) [kg].
         com: centres of mass in body frames, shape (B, 3) [m].
         inertia: about the centres of mass in body axes, shape (B, 3, 3) [kg m^2].
         gravity: in the world frame, shape (3,) [m/s^2].
         armature: reflected rotor inertia, shape (J,).
         coulomb, viscous: Coulomb friction [N m or N] and damping [N m s/rad or N s/m], shape (J,) each.
+        coupling: how the N joints move with the J joints.
     """
 
     parent: NDArray[np.intp]
@@ -52,32 +105,36 @@ class Tree:
     armature: Array
     coulomb: Array
     viscous: Array
+    coupling: Coupling
 
     @classmethod
     def of(cls, model: Any) -> Tree:
         """Build from a compiled ``mujoco.MjModel`` of hinge and slide joints."""
-        own = _rotations(model.body_iquat)
+        own, c = _rotations(model.body_iquat), Coupling.of(model)
+        order = np.append(c.own, np.setdiff1d(np.arange(model.njnt), c.own))
+        size = np.abs(c.ratio)
         return cls(
             parent=np.asarray(model.body_parentid, dtype=np.intp),
             position=np.array(model.body_pos),
             rotation=_rotations(model.body_quat),
-            joint_body=np.asarray(model.jnt_bodyid, dtype=np.intp),
-            slides=np.asarray(model.jnt_type) == 2,  # mjJNT_SLIDE
-            anchor=np.array(model.jnt_pos),
-            axis=np.array(model.jnt_axis),
-            zero=np.array(model.qpos0),
+            joint_body=np.asarray(model.jnt_bodyid, dtype=np.intp)[order],
+            slides=np.asarray(model.jnt_type)[order] == 2,  # mjJNT_SLIDE
+            anchor=np.array(model.jnt_pos)[order],
+            axis=np.array(model.jnt_axis)[order],
+            zero=np.array(model.qpos0)[order],
             mass=np.array(model.body_mass),
             com=np.array(model.body_ipos),
             inertia=own @ (model.body_inertia[:, :, None] * own.swapaxes(1, 2)),
             gravity=np.array(model.opt.gravity),
-            armature=np.array(model.dof_armature),
-            coulomb=np.array(model.dof_frictionloss),
-            viscous=np.array(model.dof_damping),
+            armature=model.dof_armature @ size**2,
+            coulomb=model.dof_frictionloss @ size,
+            viscous=model.dof_damping @ size**2,
+            coupling=replace(c, own=np.arange(len(c.own)), ratio=c.ratio[order], offset=c.offset[order]),
         )
 
     @property
     def moved(self) -> NDArray[np.bool_]:
-        """Whether a joint moves a body, shape (J, B)."""
+        """Whether a joint moves a body, shape (N, B)."""
         out = np.zeros((len(self.joint_body), len(self.parent)), dtype=bool)
         for b in range(1, len(self.parent)):
             out[:, b] = out[:, self.parent[b]] | (self.joint_body == b)
@@ -110,7 +167,7 @@ class Motion:
         origin: shape (B, Q, 3) [m].
         omega, alpha: angular velocity and acceleration, shape (B, Q, 3).
         acceleration: acceleration of the origins minus gravity, shape (B, Q, 3) [m/s^2].
-        axis, anchor: of each joint, shape (J, Q, 3).
+        axis, anchor: of each joint, shape (N, Q, 3).
         known: cache of ``body_regressor`` by body, and of ``rigid_torque`` under None.
     """
 
@@ -128,6 +185,7 @@ class Motion:
     def of(cls, tree: Tree, q: Array, dq: Array, ddq: Array) -> Motion:
         """Forward kinematics from joint positions, velocities and accelerations, shape (Q, J) each."""
         Q, B, J = len(q), len(tree.parent), len(tree.joint_body)
+        q, dq, ddq = tree.coupling.all(q, dq, ddq)
         R = np.moveaxis(np.zeros((B, 3, 3, Q)), -1, 1)
         p, w, al, a = (vectors(B, Q) for _ in range(4))
         axis, anchor = vectors(J, Q), vectors(J, Q)
@@ -220,21 +278,22 @@ def inverse_torque(model: mujoco.MjModel, q: Array, dq: Array, ddq: Array) -> Ar
     Contacts, joint limits and Coulomb friction are constraints in MuJoCo and are disabled.
 
     Args:
-        model: compiled model whose joints all have one degree of freedom.
-        q, dq, ddq: joint positions and their derivatives, shape (Q, J).
+        model: compiled model whose joints all have one degree of freedom; some may follow the J others.
+        q, dq, ddq: positions of the J joints and their derivatives, shape (Q, J).
     """
     bare = copy.copy(model)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     bare.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)  # ddq is continuous
     bare.dof_damping[:] = 0.0
-    data = mujoco.MjData(bare)
+    data, coupling = mujoco.MjData(bare), Coupling.of(model)
+    q, dq, ddq = coupling.all(q, dq, ddq)
     out = np.empty_like(q)
     for k in range(len(q)):
         data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]
         mujoco.mj_inverse(bare, data)
         out[k] = data.qfrc_inverse
-    return out
+    return coupling.driven(out)
 
 
 PARAMETERS = ("m", "hx", "hy", "hz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -276,7 +335,7 @@ def _body_regressor(motion: Motion, body: int) -> Array:
                 out[:, j, 1 + k] += dot(s, by_acceleration[k])
         for k in range(0 if tree.slides[j] else 6):
             out[:, j, 4 + k] = dot(s, inner[k])
-    return out
+    return tree.coupling.driven(out)
 
 
 def rigid_torque(motion: Motion) -> Array:
@@ -308,7 +367,7 @@ def _rigid_torque(motion: Motion) -> Array:
         up = tree.parent[b]
         force[up] += force[b]
         moment[up] += moment[b] + cross(motion.origin[b] - motion.origin[up], force[b])
-    return out
+    return tree.coupling.driven(out)
 
 
 def torque_of(tree: Tree, q: Array, dq: Array, ddq: Array) -> Array:
@@ -330,7 +389,7 @@ def force_torque(motion: Motion, body: int, point: Array) -> Array:
     for j in np.flatnonzero(tree.moved[:, body]):
         s = motion.axis[j]
         out[:, j] = s if tree.slides[j] else cross(s, at - motion.anchor[j])
-    return out
+    return tree.coupling.driven(out)
 
 
 @cache
@@ -360,7 +419,7 @@ def by_acceleration(motion: Motion) -> Array:
         s = motion.axis[j]
         arm = moment[b] - mass[b] * motion.anchor[j]
         out[:, j] = s * mass[b] if tree.slides[j] else cross(s, arm)
-    return out
+    return tree.coupling.driven(out)
 
 
 def by_displacement(motion: Motion, body: int) -> Array:
@@ -386,7 +445,7 @@ def by_displacement(motion: Motion, body: int) -> Array:
             else:
                 continue
             out[:, j, k] = np.sum(s * (push if tree.slides[j] else turn), axis=1)
-    return out
+    return tree.coupling.driven(out)
 
 
 def _masses(motion: Motion) -> tuple[Array, Array]:

@@ -22,13 +22,13 @@ from discrepancy.joints.mechanics import (
     by_acceleration,
     by_displacement,
     force_torque,
-    horizontal,
     inertial_parameters,
     rigid_torque,
     torque_of,
     with_load,
 )
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.mount import gravity_at, ways
 from discrepancy.joints.signals import Signals, along
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
@@ -49,6 +49,7 @@ class Given:
         noise: one sample of the sensor noise in the residual for each log, shape (W, J) each; None: unknown.
         kept: weight of each sample, shape (W, J) for each log; empty: all samples count.
         inertias: whether every link has a column for each of its ten inertial parameters.
+        mount: gravity of another mount of the base than the model's [m/s^2], shape (3,); None: the model's.
     """
 
     changed: int | None = None
@@ -60,6 +61,7 @@ class Given:
     noise: Sequence[Array] | None = None
     kept: Sequence[Array] = ()
     inertias: bool = False
+    mount: Array | None = None
 
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
@@ -105,6 +107,7 @@ class JointProblem:
         parts: smoothed logs at the linearisation point.
         cells, groups, families, laws: see ``evidence.search.Linear``.
         withheld: groups of excluded causes; their tolerances stay in the prior.
+        mount: see ``Given``.
         labels: names of the columns.
         tolerance: prior standard deviations of a healthy robot, shape (K,); 0 if it lacks the column.
         series: the columns as time series by joint.
@@ -139,6 +142,7 @@ class JointProblem:
     channel: Mapping[int, int] = field(default_factory=dict)
     changed: int | None = None
     dry_in_all: dict[int, int] = field(default_factory=dict)
+    mount: Array | None = None
 
     def rows(self, series: Sequence[Series]) -> list[Series]:
         """Convert columns from joints to channels. Joints without torques have no channel."""
@@ -377,10 +381,8 @@ class _Builder:
                 mass[b], com[b], inertia[b] = with_load(float(mass[b]), com[b], inertia[b], np.array(load))
         for j, n in enumerate(self.names):
             position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
-        gravity = t.gravity.copy()
-        for i, w in enumerate(horizontal(t.gravity)):
-            gravity = gravity - v.get(f"tilt {i}", 0.0) * np.cross(w, t.gravity)
-        return replace(t, mass=mass, com=com, inertia=inertia, position=position, gravity=gravity)
+        g = gravity_at(t.gravity, self.more.mount, v)
+        return replace(t, mass=mass, com=com, inertia=inertia, position=position, gravity=g)
 
     def _spans(self) -> list[Span]:
         def every(of: Callable[[Signals], Array]) -> Array:
@@ -460,7 +462,7 @@ class _Builder:
         for j in range(self.J):
             self._rests(j)
         out = self.out
-        out.changed = self.more.changed
+        out.changed, out.mount = self.more.changed, self.more.mount
         body = int(self.tree.joint_body[self.tree.last_link])
         none = self.more.motors or "push" in self.more.excluded  # a sticking gear looks like a push
         for s in () if none else self.parts:
@@ -624,15 +626,14 @@ class _Builder:
         if not g.any():
             return
         by = {id(s): by_acceleration(s.motion) for s in self.parts}
-        tilts = [
-            self.add(
-                f"tilt {i}",
-                self.sd("gravity_direction", f"tilt_{i + 1}_rad", TILT_RAD),
-                self.wide(lambda s, w=w: by[id(s)] @ np.cross(w, g)),
+        sizes = [*(self.sd("gravity_direction", f"tilt_{i}_rad", TILT_RAD) for i in (1, 2)), 0.0]
+        columns = [
+            self.add(label, size, self.wide(lambda s, way=way: by[id(s)] @ way))
+            for size, (label, way) in zip(
+                sizes, ways(self.given.gravity, self.more.mount).items(), strict=False
             )
-            for i, w in enumerate(horizontal(self.given.gravity))
         ]
-        self.group("gravity_direction", "base", tilts, [0.1] * 2)
+        self.group("gravity_direction", "base", columns, [0.1, 0.1, 1.0][: len(columns)])
         share = self.add("gravity share", 0.0, self.wide(lambda s: by[id(s)] @ g))
         self.group("gravity_compensation", "robot", [share], [0.5])
 

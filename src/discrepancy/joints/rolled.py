@@ -37,8 +37,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.evidence.findings import Event, Finding
-from discrepancy.joints.effects import all_effects, label
-from discrepancy.joints.model import SerialModel, load_spec
+from discrepancy.joints.effects import all_effects, label, numbered
+from discrepancy.joints.mechanics import Coupling
+from discrepancy.joints.model import SerialModel
 from discrepancy.joints.servo import Commanded, LoopLaw, Motor, Servo, loop_laws, servo_of
 from discrepancy.joints.signals import Signals, smoothing_hz
 from discrepancy.joints.verdict import JointVerdict
@@ -154,12 +155,14 @@ class Robot:
         readings: relation between logged torques and torques at the joints.
         every: integration steps between two samples.
         left_out: names of findings that neither the robot nor the readings contain.
+        coupling: how joints of the robot follow the J joints of the log.
     """
 
     built: Built
     readings: Readings
     every: int
     left_out: tuple[str, ...]
+    coupling: Coupling
 
     @classmethod
     def of(cls, model: SerialModel, findings: Sequence[Finding], rate_hz: float) -> Robot:
@@ -171,10 +174,11 @@ class Robot:
         pairs = all_effects(findings, model)
         acting = [pair for pair in pairs if pair[1].cause not in KNOWN]
         every = max(1, math.ceil((1.0 - 1e-9) / rate_hz / LONGEST_STEP_S))
-        built = build(load_spec(model.path), [effect for _, effect in acting], 1.0 / rate_hz / every)
+        effects = numbered((effect for _, effect in acting), model)
+        built = build(model.source.copy(), effects, 1.0 / rate_hz / every)
         left = dict.fromkeys(label(acting[k][0]) for k in built.left_out)
         readings = Readings.of([e for _, e in pairs if e.cause in KNOWN], len(model.joints))
-        return cls(built, readings, every, tuple(left))
+        return cls(built, readings, every, tuple(left), model.coupling)
 
     def errors(
         self, s: Signals, piece: slice, drive: Drive, limit: Array, tick: Callable[[float], object] = lambda _: None
@@ -189,13 +193,17 @@ class Robot:
             tick: receives the log time at every step.
         """
 
+        own = self.coupling.own
+
         def watched(time: float, q: Array, dq: Array) -> Array:
             tick(time)
-            return drive(time, q, dq)
+            torque = np.zeros(len(q))
+            torque[own] = drive(time, q[own], dq[own])
+            return torque
 
         first, measured = piece.start, s.q[piece]
-        start = Start(float(s.time[first]), s.q[first], s.dq[first], s.ddq[first])
-        there = rollout(self.built, start, watched, len(measured) - 1, self.every)
+        start = Start(float(s.time[first]), *self.coupling.all(s.q[first], s.dq[first], s.ddq[first]))
+        there = rollout(self.built, start, watched, len(measured) - 1, self.every)[:, own]
         error = np.full(measured.shape, np.nan)
         error[: len(there)] = there - measured[: len(there)]
         error[np.maximum.accumulate(~(np.abs(error) <= limit), axis=0)] = np.nan

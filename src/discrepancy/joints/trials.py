@@ -113,7 +113,7 @@ def off_limits(model: SerialModel, runs: Sequence[Signals]) -> tuple[tuple[Array
     A joint that spends most of the time beyond its limits has other limits than the model, so these are ignored. All
     joints fade where an encoder holds its last value.
     """
-    slack = model.model.jnt_margin + np.where(model.slides, LIMIT_M, LIMIT_RAD)
+    slack = model.model.jnt_margin[model.coupling.own] + np.where(model.slides, LIMIT_M, LIMIT_RAD)
     at = [(s.q < model.lower + slack) | (s.q > model.upper - slack) for s in runs]
     time = np.sum([x.sum(axis=0) / s.rate_hz for x, s in zip(at, runs, strict=True)], axis=0)
     time[time > 0.5 * sum(len(s.time) / s.rate_hz for s in runs)] = 0.0

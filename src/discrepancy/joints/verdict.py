@@ -117,7 +117,7 @@ def judged(
     outcome = diagnose(model, trials, SETTINGS, say, given, until)
     say("weighing what else each cause may be")
     outcome = replace(outcome, state=without_unfounded(outcome.search, outcome.state))
-    return _JointJudge(model, trials, outcome).verdict([*notes_of([*logs, *reference])])
+    return _JointJudge(model, trials, outcome).verdict([*model.notes, *notes_of([*logs, *reference])])
 
 
 class _JointJudge(Judge):
@@ -215,6 +215,8 @@ class _JointJudge(Judge):
 
     def tolerances(self, group: Group) -> Mapping[str, float]:
         sizes = np.array([self.problem.tolerance[k] for k in group.columns])
+        if group.cause == "gravity_direction" and self.problem.mount is not None:
+            return physical(self.problem, group, np.array([0.0, 0.0, 1.0]), np.diag(sizes**2))[1]
         return physical(self.problem, group, sizes, np.diag(sizes**2))[0]
 
     def sizes(self, group: Group, sizes: Array, seen: Array) -> Mapping[str, float | None] | None:

@@ -188,6 +188,7 @@ def map(
         InputError: the log or the model cannot be read.
     """
     chosen = made(MapOptions, options, fields)
+    chosen.check_part(model)
     if model is None:
         from mocobot_logs.draft import draft_of
 
@@ -196,7 +197,7 @@ def map(
     from mocobot.api.joints import read_model
     from mocobot_logs.draft_joints import draft_joint_map
 
-    robot = read_model(model)
+    robot = read_model(model, lock=chosen.lock, base=chosen.base)
     made_of = draft_joint_map(Path(log), robot.joints, [bool(s) for s in robot.slides], chosen.episode)
     return MapDraft(made_of.text, _count(len(robot.joints), "joint"), made_of.doubtful, made_of.missing)
 

@@ -173,7 +173,7 @@ def diagnose(
         truth: true payload, for the errors of the estimates; not used before the verdict.
         say: called with the name of each stage that begins.
         simulated: called with 1 after every simulated trial.
-        note: called with a text on how each log was read.
+        note: called with a text on how each log, or the model, was read.
 
     Raises:
         InputError: logs, model, tolerances, causes or other options cannot be used.
@@ -181,7 +181,7 @@ def diagnose(
     chosen = made(DiagnoseOptions, options, fields)
     chosen.check_for(model, reference)
     if model is not None:
-        return Diagnosis(_diagnosed_joints(model, logs, reference or (), chosen, say))
+        return Diagnosis(_diagnosed_joints(model, logs, reference or (), chosen, say, note))
     known = read_tolerances(None if chosen.tolerances is None else Path(chosen.tolerances))
     given: Any = logs
     robots, episode = Robots(chosen.calibration), chosen.episode
@@ -196,14 +196,17 @@ def diagnose(
 
 
 def _diagnosed_joints(
-    model: GivenModel, logs: Any, reference: Any, chosen: DiagnoseOptions, say: Say
+    model: GivenModel, logs: Any, reference: Any, chosen: DiagnoseOptions, say: Say, note: Say
 ) -> JointDiagnosed:
     """Diagnose a single robot; with the option ``closed_loop``, also roll out its simulation."""
     from discrepancy.joints.rolled import rolled_out
     from discrepancy.joints.verdict import judged
     from mocobot.api.joints import read_logs, read_model
 
-    robot, tolerances = read_model(model), _joint_tolerances(chosen.tolerances)
+    robot = read_model(model, lock=chosen.lock, base=chosen.base)
+    tolerances = _joint_tolerances(chosen.tolerances)
+    for text in robot.notes:
+        note(f"{robot.path.name}: {text}")
     say("reading")
     read = [read_logs(given, robot, map=chosen.map, episode=chosen.episode) for given in (logs, reference)]
     verdict = judged(

@@ -142,7 +142,7 @@ def _inspect_joints(
     from mocobot.api.joints import map_of, read_model
     from mocobot_logs.joints.read import open_joint_log
 
-    robot = read_model(model)
+    robot = read_model(model, lock=chosen.lock, base=chosen.base)
     log_map = map_of(robot, log, chosen.map)
     source = open_joint_log(log, log_map, chosen.episode)
     tree = Tree.of(robot.model)
@@ -150,6 +150,6 @@ def _inspect_joints(
         robot.joints, robot.slides, robot.lower, robot.upper, robot.torque_limit,
         partial(inverse_torque, robot.model),
         lambda *motion: body_regressor(Motion.of(tree, *motion), int(tree.joint_body[tree.last_link])),
-        float(tree.mass[tree.links].sum()),
+        float(tree.mass[tree.links].sum()), robot.notes,
     )  # fmt: skip
     return public(JointInspection, joints.inspect_joints(source, log_map, known, advance, tried))

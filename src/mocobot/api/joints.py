@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from discrepancy.joints.locking import Lock
 from discrepancy.joints.model import SerialModel, load_model
 from estimator.errors import InputError
 from mocobot.api.recordings import quiet
@@ -22,13 +23,22 @@ GivenModel = SerialModel | Path | str
 GivenLogs = Path | str | JointLog | Iterable[Path | str | JointLog]
 
 
-def read_model(given: GivenModel) -> SerialModel:
+def read_model(given: GivenModel, *, lock: Lock = (), base: str | None = None) -> SerialModel:
     """Read a fixed-base tree of hinges and slides from MJCF or URDF; a model that is already read is returned.
 
+    Args:
+        given: the file, or a model.
+        lock: joints that do not move: ``{"wrist": 0.5}`` [rad or m], or texts such as ``["wrist=30deg"]``.
+        base: name of the body whose subtree is the arm; its parent is fixed to the world.
+
     Raises:
-        InputError: MuJoCo cannot read the file, or the model is no such tree.
+        InputError: MuJoCo cannot read the file; the model or its part is no such tree; or it is already read.
     """
-    return given if isinstance(given, SerialModel) else load_model(given)
+    if not isinstance(given, SerialModel):
+        return load_model(given, lock, base)
+    if lock or base is not None:
+        raise InputError(f"{given.path} is already read; name lock and base when you read it")
+    return given
 
 
 def read_logs(

@@ -117,7 +117,7 @@ def _joint_replays(
     from mocobot.api.joints import read_logs, read_model
     from mocobot_view.joint_replay import joint_replay
 
-    robot, replays = read_model(model), []
+    robot, replays = read_model(model, lock=chosen.lock, base=chosen.base), []
     for log, name in zip(logs, names, strict=True):
         parts = read_logs(log, robot, map=chosen.map, episode=chosen.episode)
         for number, part in enumerate(parts, 1):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -251,8 +252,9 @@ def _joint_names(top: Fields, model: Sequence[str]) -> tuple[str, ...]:
     missing = [joint for joint in model if joint not in names]
     if missing:
         raise InputError(
-            f"{top.where}: joints lacks {', '.join(map(repr, missing[:8]))}; a map names every joint of the model "
-            "(lock the others in the model by removing their joints)"
+            f"{top.where}: joints lacks {', '.join(map(repr, missing[:8]))}; a map names every joint of the model; "
+            f"lock those that do not move, such as --lock {shlex.quote(f'{missing[0]}=0')}, or name the arm's first "
+            "body by --base"
         )
     return tuple(names)
 

@@ -89,6 +89,7 @@ def write_extended(
     recordings: Sequence[str],
     *,
     reference: bool = False,
+    notes: Sequence[str] = (),
 ) -> None:
     """Write ``robot.xml`` with its assets, ``effects.json`` and a README into a new folder.
 
@@ -98,6 +99,7 @@ def write_extended(
         folder: folder to create.
         recordings: names of the recordings from which the effects were identified.
         reference: whether the effects are changes since reference logs; errors common to both are then not modelled.
+        notes: sentences on what the nominal model has otherwise than its file.
 
     Raises:
         InputError: the folder cannot be written, MuJoCo rejects the effects, or a file is outside the model's folder.
@@ -116,7 +118,7 @@ def write_extended(
     causes = [_entry(e) | {"in": place} for e, place in zip(effects, places, strict=True)]
     numbers = {"format": FORMAT, "version": VERSION, "causes": causes, "recordings": list(recordings)}
     write_json(folder / NUMBERS, numbers)
-    write_text(folder / README, _readme(effects, places, CHANGED if reference else ""))
+    write_text(folder / README, _readme(effects, places, CHANGED if reference else "", notes))
 
 
 def _entry(effect: Effect) -> dict[str, Any]:
@@ -202,19 +204,21 @@ def _rub(data: mujoco.MjData, dry: Array) -> None:
             data.iefc_frictionloss[:] = data.efc_frictionloss[data.map_iefc2efc]
 
 
-def _readme(effects: Sequence[Effect], places: Sequence[str], more: str) -> str:
+def _readme(effects: Sequence[Effect], places: Sequence[str], more: str, notes: Sequence[str]) -> str:
     rows = [
         f"| {_row(e)} | {'not simulated' if place == 'none' else f'`{place}`'} |"
         for e, place in zip(effects, places, strict=True)
     ]
     head = ["| cause | joint or body | parameters | in |", "|---|---|---|---|"]
     table = "\n".join([*head, *rows]) if rows else "None."
+    read = "".join(f"\n- {note}" for note in notes)
+    read = f"\nThe robot is what was read from its file, not the file:\n{read}\n" if notes else ""
     return f"""# Extended robot
 
 The robot with these causes built in{more}:
 
 {table}
-
+{read}
 - `{SCENE}`: loads in plain MuJoCo. A payload's inertia is the nearest to the fitted one that a body can have.
 - `{NUMBERS}`: all numbers, those included that MJCF cannot say. What is said to be simulated nowhere is an error of the
   log, such as the scale of a torque, or passed.

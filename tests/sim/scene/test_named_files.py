@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from discrepancy.joints.model import load_spec
+from discrepancy.joints.reading import read_spec
 from estimator.errors import InputError
 from mocobot_sim.extended.extended import load_extended, write_extended
 from mocobot_sim.model_check import check_named
@@ -83,17 +83,17 @@ def test_a_robot_takes_nothing_else_along(model: Path, asset: str, said: str) ->
     model.write_text(ARM.format(head="", asset=asset.format(above=model.parents[1])))
     out = model.parents[1] / "out"
     with pytest.raises(InputError, match=said):
-        serial.write_extended(load_spec(model), [], out, ["log"])
+        serial.write_extended(read_spec(model).spec, [], out, ["log"])
     assert not out.exists()
 
 
 @pytest.mark.parametrize("asset", ['<mesh name="m" file="parts/own.obj"/>', cube_texture("own.png")])
 def test_a_robot_takes_its_own_files_along(model: Path, asset: str) -> None:
     model.write_text(ARM.format(head="", asset=asset))
-    serial.write_extended(load_spec(model), [], out := model.parents[1] / "out", ["log"])
+    serial.write_extended(read_spec(model).spec, [], out := model.parents[1] / "out", ["log"])
     assert [path.name[:4] for path in (out / "assets").iterdir()] == ["own."]
     shutil.rmtree(model.parent)
-    load_spec(out / "robot.xml")
+    read_spec(out / "robot.xml")
 
 
 def test_a_urdf(model: Path) -> None:
@@ -105,7 +105,7 @@ def test_a_urdf(model: Path) -> None:
         'type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint></robot>'
     )
     with pytest.raises(InputError, match=OUTSIDE):
-        serial.write_extended(load_spec(urdf), [], model.parents[1] / "out", ["log"])
+        serial.write_extended(read_spec(urdf).spec, [], model.parents[1] / "out", ["log"])
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from discrepancy.joints.mechanics import Motion, Tree, body_regressor, inertial_parameters, inverse_torque
-from discrepancy.joints.model import load_spec
+from discrepancy.joints.reading import read_spec
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended
 from mocobot_sim.serial.mjcf import into_mjcf, real_inertia
@@ -144,7 +144,7 @@ def test_meshes_are_taken_along(tmp_path, monkeypatch) -> None:
         '<mesh name="two" file="../others/cube.obj" scale="2 2 2"/></asset><worldbody><body><joint name="j1"/>'
         '<geom type="mesh" mesh="one"/><geom type="mesh" mesh="two"/></body></worldbody></mujoco>'
     )
-    spec = load_spec(tmp_path / "robot.xml")
+    spec = read_spec(tmp_path / "robot.xml").spec
     write_extended(
         spec, [RobotEffect("armature", 1, None, {"armature_kgm2": 0.1})], tmp_path / "out", ["log"]
     )
