@@ -221,7 +221,7 @@ class Estimate(Files, EstimateOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CalibrateOptions(Options):
+class CalibrateOptions(PartOptions):
     """Options of the calibration of a team's robots, or of a single robot."""
 
     map: LogMap = None

@@ -27,7 +27,7 @@ import mujoco
 
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
 from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
-from discrepancy.joints.model import load_spec
+from discrepancy.joints.effects import numbered
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.statistics import measured, rms
@@ -269,12 +269,12 @@ def as_found(found: ArmCalibration) -> mujoco.MjSpec:
     Raises:
         InputError: MuJoCo refuses it.
     """
-    spec = load_spec(found.model.path)
+    spec = found.model.source.copy()
     keep_inertials(spec, spec.compile())
     for b in found.links:
         body = spec.body(found.model.model.body(b).name)
         set_inertial(body, float(found.tree.mass[b]), found.tree.com[b], found.tree.inertia[b])
-    with_effects(spec, effects_of(found))
+    with_effects(spec, numbered(effects_of(found), found.model))
     return spec
 
 

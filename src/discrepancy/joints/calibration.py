@@ -20,6 +20,7 @@ from discrepancy.joints.diagnose import in_parts
 from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links
 from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.mount import mount_of
 from discrepancy.joints.problem import LENGTH_M, MOMENTS, Given, JointProblem, joint_problem
 from discrepancy.joints.servo import driven_by_voltage
 from discrepancy.joints.signals import Signals
@@ -36,6 +37,8 @@ as the masses."""
 DETERMINED = 0.2
 """Largest ratio of standard error and prior standard deviation of a parameter that counts as determined. Chosen: the
 logs reduce its variance 25-fold."""
+POSES = 20
+"""Poses in which inertias that joints feel are computed. Chosen."""
 PLAIN = 3.0
 """Factor on prior standard deviations of inertial parameters for standard errors. Chosen: where two parameters have one
 effect, the narrower prior would otherwise make the other's error."""
@@ -170,7 +173,7 @@ def calibrate_arm(
     say("predicting each part from the others")
     held = fit.held_out()
     names = tuple(dict.fromkeys(log.name for log in logs))
-    notes = [*notes_of(logs), *at_limits(model, trials.limited), *resting(logs), *fit.notes()]
+    notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs), *fit.notes()]
     return ArmCalibration(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
@@ -196,12 +199,14 @@ class _Fit:
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
         self.model, self.trials = model, trials
-        self.given = trials.runs[0].tree
-        self.tree, self.values = self.given, dict[str, float]()
         self.known = tuple(map(int, trials.joints))
         volts = np.flatnonzero(driven_by_voltage(trials.motors, len(model.joints))).tolist()
         switched = any(s.enabled is not None and not s.enabled.all() for s in trials.runs)
         self.free = frozenset(motor.joint for motor in trials.motors)
+        self.given, self.mount = trials.runs[0].tree, None if self.free else mount_of(trials.runs, self.known)
+        if self.mount is not None:
+            self.given = replace(self.given, gravity=self.mount)
+        self.tree, self.values = self.given, dict[str, float]()
         self.options = Given(
             joints=self.known, motors=self.free, back_emf=frozenset(volts if switched else ()), noise=trials.noise,
             kept=trials.kept, inertias=True,
@@ -244,9 +249,7 @@ class _Fit:
                 span.torque / span.speed,
                 0.0,
             )
-            yield _Scalar(
-                f"{n} armature_kgm2", n, "armature_kgm2", t.armature[j], span.torque / span.acceleration, 0.0
-            )
+            yield _Scalar(f"{n} armature_kgm2", n, "armature_kgm2", t.armature[j], self._rotor(j), 0.0)
             if ("back_emf", n) in slabs:
                 yield _Scalar(
                     f"{n} braking", n, "braking_Nms_per_rad", 0.0, span.torque / span.speed, 0.0, False
@@ -264,7 +267,7 @@ class _Fit:
             ratio = self._coupling(j)
             if ratio:
                 span = problem.joints[j][0].span
-                sizes = span.torque, span.torque / span.speed, span.torque / span.acceleration
+                sizes = span.torque, span.torque / span.speed, self._rotor(j)
                 for k, name in enumerate(
                     ("coupled_coulomb_Nm", "coupled_viscous_Nms_per_rad", "coupled_armature_kgm2")
                 ):
@@ -272,6 +275,18 @@ class _Fit:
         if t.gravity.any():
             for i in range(2):
                 yield _Scalar(f"tilt {i}", "base", f"tilt_{i + 1}_rad", 0.0, TILT_RAD)
+
+    def _rotor(self, j: int) -> float:
+        """Prior standard deviation of a rotor: the largest inertia that a joint of this kind feels."""
+        t, q = self.given, self.trials.runs[0].q
+        q = q[:: max(1, len(q) // POSES)]
+        still, found = np.zeros_like(q), []
+        for k in np.flatnonzero(t.slides[: q.shape[1]] == t.slides[j]):
+            unit = np.zeros_like(q)
+            unit[:, k] = 1.0
+            felt = torque_of(t, q, still, unit) - torque_of(t, q, still, still)
+            found.append(float(np.max(felt[:, k]) + t.armature[k]))
+        return max(found)
 
     def _coupling(self, j: int) -> float:
         """Ratio 1 or -1 if the motor of a joint turns with the joint before it, too; else 0."""
@@ -331,10 +346,11 @@ class _Fit:
     def step(self) -> float:
         """Fit around the current values, and move there; return the largest step in standard errors."""
         self.prepare()
-        before = self.x
-        self.x, self.covariance = self.solved(range(len(self.normals)))
+        found, self.covariance = self.solved(range(len(self.normals)))
+        way = (found - self.x) / np.sqrt(np.diag(self.covariance))
+        self.x = found
         self.jump(self.x)
-        return float(np.max(np.abs(self.x - before) / np.sqrt(np.diag(self.covariance))))
+        return float(np.max(np.abs(way)))
 
     def prepare(self) -> None:
         """Build the normal equations of all parts around the current values."""
@@ -376,8 +392,10 @@ class _Fit:
         the law nearest to it: the fit without deviations. Its difference from that with them counts as an error.
         """
         H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
-        information = self.basis.T @ H @ self.basis
-        x = self.basis @ self._mode(information, self.basis.T @ g)
+        information, start = self.basis.T @ H @ self.basis, np.linalg.pinv(self.basis) @ self.x
+        x = self.basis @ self._mode(
+            information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start
+        )
         # For errors, the prior counts with its curvature at the given model, and less, so that it does not make them.
         weak = self.curvature.copy()
         weak[: self.first, : self.first] /= PLAIN**2
@@ -389,8 +407,9 @@ class _Fit:
         while free.any():
             k = at[free]
             rest = np.setdiff1d(np.arange(len(x)), k)
-            nearest[free] = np.linalg.solve(H[np.ix_(k, k)] + np.diag(1.0 / np.diag(self.prior)[k]),
-                                            g[k] - H[np.ix_(k, rest)] @ x[rest])  # fmt: skip
+            inner, now = H[np.ix_(k, k)], self.x
+            score = g[k] - H[np.ix_(k, rest)] @ (x - now)[rest] + inner @ now[k]
+            nearest[free] = np.linalg.solve(inner + np.diag(1.0 / np.diag(self.prior)[k]), score)
             beyond = free & (nearest < least)
             if not beyond.any():
                 break
@@ -403,17 +422,17 @@ class _Fit:
     def _reduced(
         self, normals: Sequence[tuple[Array, Array]], parts: Sequence[int], nuisance: NDArray[np.intp]
     ) -> tuple[Array, Array]:
-        """Information matrix and score of ``x`` from some parts, with nuisance columns integrated out."""
+        """Information matrix and score at the current ``x`` from some parts, with nuisance columns integrated out."""
         G = sum((normals[k][0] for k in parts), np.zeros((len(self.active),) * 2))
         b = sum((normals[k][1] for k in parts), np.zeros(len(self.active)))
         f, n = self.fit, nuisance
         inner = G[np.ix_(n, n)] + np.diag(1.0 / self.spread[n])
         gain = np.linalg.solve(inner, np.column_stack([G[np.ix_(n, f)], b[n]]))
         H = G[np.ix_(f, f)] - G[np.ix_(f, n)] @ gain[:, :-1]
-        return H, b[f] - G[np.ix_(f, n)] @ gain[:, -1] + H @ self.at
+        return H, b[f] - G[np.ix_(f, n)] @ gain[:, -1] + H @ (self.at - self.x)
 
-    def _mode(self, H: Array, g: Array) -> Array:
-        """Minimum of y' H y / 2 - g' y plus the negative log prior.
+    def _mode(self, H: Array, g: Array, start: Array) -> Array:
+        """Minimum of d' H d / 2 - g' d, with d = y - start, plus the negative log prior.
 
         Newton's method with an active set of bounds (D. P. Bertsekas, "Projected Newton methods for optimization
         problems with simple constraints", 1982). The function is convex.
@@ -425,8 +444,9 @@ class _Fit:
             least[column] = self.least[i] / self.basis[i, column]
 
         def slopes(y: Array) -> tuple[float, Array, Array]:
-            value = 0.5 * float(y @ H @ y) - float(g @ y) + 0.5 * float(y[n:] @ y[n:])
-            slope, bend = H @ y - g, H.copy()
+            d = y - start
+            value = 0.5 * float(d @ H @ d) - float(g @ d) + 0.5 * float(y[n:] @ y[n:])
+            slope, bend = H @ d - g, H.copy()
             slope[n:] += y[n:]
             bend[range(n, len(y)), range(n, len(y))] += 1.0
             for k, body in enumerate(self.bodies):
@@ -437,7 +457,7 @@ class _Fit:
                 bend[at, at] += more[2]
             return value, slope, bend
 
-        y = np.concatenate([*(body.given for body in self.bodies), np.maximum(0.0, least[n:])])
+        y = np.maximum(start, least)
         value, slope, bend = slopes(y)
         for _ in range(MOST_STEPS):
             held = (y <= least) & (slope > 0.0)
@@ -469,7 +489,6 @@ class _Fit:
             xx, yy, zz, xy, xz, yz = own[4:]
             inertia[b] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
         tables = {name: getattr(self.given, name).copy() for name in ("coulomb", "viscous", "armature")}
-        self.values = {}
         for s, value in zip(self.scalars, x[n:], strict=True):
             table = s.name.split("_", 1)[0]
             if s.label.endswith((" coulomb_Nm", " viscous_Nms_per_rad", " armature_kgm2")):
@@ -609,6 +628,8 @@ class _Fit:
                 "The mean torque gain is held at 1: without a known weight, torques determine masses, inertias and "
                 "friction only up to a common factor."
             )
+        if self.mount is not None:
+            yield "The base is mounted another way than in the model: gravity is turned, even for the given one."
         for motor in self.trials.motors:
             yield motor.sentence(self.model.joints[motor.joint])
         for b in dict.fromkeys(map(int, self.given.joint_body)):

@@ -201,9 +201,11 @@ def calibrate(
     if model is not None:
         from mocobot.api.joints import read_logs, read_model
 
-        robot = read_model(model)
+        robot = read_model(model, lock=chosen.lock, base=chosen.base)
         say("reading")
-        return JointCalibration(calibrate_arm(robot, read_logs(logs, robot, map=chosen.map), say))
+        return JointCalibration(
+            calibrate_arm(robot, read_logs(logs, robot, map=chosen.map, episode=chosen.episode), say)
+        )
     prior = chosen.prior
     assumed = prior if isinstance(prior, Prior) else Prior() if prior is None else read_prior(prior)
     if chosen.tilt and assumed.tilt_rad == 0:
