@@ -24,6 +24,7 @@ from estimator.strict import read_json
 from mocobot import options as opt
 from mocobot.checks import TRUTH, check_target_of, inputs_of, targets
 from mocobot.cli import NotGood
+from mocobot.next_step import next_step
 from mocobot.progress import bar, share_bar, stages
 from mocobot.results import Folder, file_facts, provenance
 from mocobot_sim.scene.models import truth_path
@@ -168,6 +169,7 @@ def diagnose(options: opt.Diagnose) -> None:
     print("\n".join([*notes, found.verbose_text() if options.verbose else str(found)]))
     if options.out:
         print(f"\nWritten to {options.out}.")
+    print(next_step(options, found.to_dict()), end="")
     if options.strict and found.verdict not in ("consistent", "explained"):
         raise NotGood(f"the verdict is {found.verdict.replace('_', ' ')}")
 
