@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterable, Mapping
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +32,7 @@ def next_step(options: Diagnose | Watch, values: Mapping[str, Any]) -> str:
 def _next(options: Diagnose | Watch, values: Mapping[str, Any]) -> tuple[str, str]:
     verdict, causes, logs = values["verdict"], values["causes"], options.rec
     arm, reference = options.model is not None, getattr(options, "reference", ())
-    new = Path(options.rec[0]).with_name(f"{NEW}{options.rec[0].suffix}")
+    new = _free(options.rec[0].with_name(f"{NEW}{options.rec[0].suffix}"))
     if not values["finished"]:
         return "let the search come to its end", _diagnose(options, logs)
     if any(len(cause["told"]) > 1 and cause["separate"] for cause in causes):
@@ -69,7 +71,9 @@ def _of_a_clean_arm(options: Diagnose | Watch, new: Path) -> tuple[str, str]:
 
 
 def _calibrate(options: Diagnose | Watch) -> str:
-    return _line(["calibrate", *options.rec, *_options(options, ("model", "map")), "--out", _free(CALIBRATED)])
+    return _line(
+        ["calibrate", *options.rec, *_options(options, ("model", "map")), "--out", _free(CALIBRATED)]
+    )
 
 
 def _diagnose(options: Diagnose | Watch, logs: Iterable[Path], reference: Iterable[Path] = ()) -> str:
@@ -89,11 +93,9 @@ def _options(options: Diagnose | Watch, names: Iterable[str]) -> list[Any]:
 
 def _free(path: Path) -> Path:
     """Return the path, or the first of ``NAME-2``, ``NAME-3``, ... that does not exist."""
-    found, number = path, 1
-    while found.exists():
-        number += 1
-        found = path.with_name(f"{path.stem}-{number}{path.suffix}")
-    return found
+    stem = re.sub("-[0-9]+$", "", path.stem)
+    numbered = (path.with_name(f"{stem}-{k}{path.suffix}") for k in count(2))
+    return next(each for each in chain([path], numbered) if not each.exists())
 
 
 def _line(words: Iterable[Any]) -> str:
