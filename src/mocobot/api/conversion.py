@@ -181,7 +181,8 @@ def map(
 
     Args:
         log: log in any format that ``convert`` reads.
-        model: model of a single robot whose joints were logged, or path of its file; None for a team.
+        model: model of a single robot whose joints were logged, or path of its file. Without it, the log tells whether
+            it is of a team or of one robot's joints.
         options: options of the draft; ``fields`` replace its fields.
 
     Raises:
@@ -189,10 +190,11 @@ def map(
     """
     chosen = made(MapOptions, options, fields)
     if model is None:
-        from mocobot_logs.draft import draft_of
+        from mocobot_logs.draft_kind import draft_any
 
-        draft = draft_of(Path(log), chosen.episode)
-        return MapDraft(draft.text, _count(draft.robots, "robot"), draft.doubtful, draft.missing)
+        draft, joints = draft_any(Path(log), chosen.episode)
+        of = _count(draft.robots, "robot") if joints is None else _count(joints, "joint")
+        return MapDraft(draft.text, of, draft.doubtful, draft.missing)
     from mocobot.api.joints import read_model
     from mocobot_logs.draft import draft_joint_map
 
