@@ -56,6 +56,8 @@ Model = Annotated[
         help="MJCF or URDF of one fixed-base robot whose joints were logged (docs/serial/guide.md), not a team.",
     ),
 ]
+BEFORE = "With --model: logs of the robot from before, such as last week's; only what has changed since is reported."
+Reference = Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...", help=BEFORE)]
 Calibrated = Annotated[
     AnyPath | None,
     tyro.conf.arg(
@@ -287,8 +289,7 @@ class Diagnose(Files, DiagnoseOptions):
     rec: Logs
     """Recordings, or logs that ``convert`` reads, all of one payload; with --model, joint logs of one robot."""
     model: Model = None
-    reference: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...")] = ()
-    """With --model: logs of the same robot when it was healthy; what deviates there, too, is not counted as a fault."""
+    reference: Reference = ()
     jobs: Jobs = 2
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for diagnosis.json, report.txt, the residuals and the extended model."""
@@ -315,10 +316,15 @@ class WatchOptions(Options):
 @dataclass(frozen=True, kw_only=True)
 class Watch(Files, WatchOptions):
     """Analyse recordings or logs in one run: inspect, convert, estimate, calibrate if the robots contradict each
-    other, diagnose, and make a page."""
+    other, diagnose, and make a page. With --model: inspect and diagnose the logs of one robot."""
 
     rec: Logs
-    """Recordings (Parquet), or logs in any format that ``convert`` reads, all of one payload."""
+    """Recordings (Parquet), or logs in any format that ``convert`` reads, all of one payload; with --model, joint logs
+    of one robot, or folders of them."""
+    model: Model = None
+    reference: Reference = ()
+    follow: Flag = False
+    """With --model: wait for further logs in the folders, and for logs to grow, and diagnose each; Ctrl-C ends it."""
     jobs: Jobs = 2
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for the page and the results that it shows."""

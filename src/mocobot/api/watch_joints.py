@@ -1,0 +1,105 @@
+"""Look at joint logs of a single robot as they come: inspect each, and diagnose what is ready."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from estimator.errors import InputError
+from estimator.files import system_errors
+from mocobot.api.diagnosis import diagnose
+from mocobot.api.inspection import inspect
+from mocobot.api.joints import MAP
+from mocobot.api.recordings import Say
+from mocobot_logs.formats import FORMATS, log_kind
+
+if TYPE_CHECKING:
+    from mocobot.api.joints import GivenModel
+    from mocobot.api.watch import Watched
+    from mocobot.options import WatchOptions
+
+POLL_S = 2.0
+"""Time between two looks at the files [s]. Chosen: a log that does not change for so long is finished."""
+
+
+def logs_in(paths: Iterable[Path], but: Iterable[Path] = (), *, waiting: bool = False) -> list[Path]:
+    """List the logs among the paths and in the folders among them; a folder may itself be a log, such as a bag.
+
+    Args:
+        paths: files and folders.
+        but: files to leave out of the folders, such as the reference.
+        waiting: whether a folder may be empty.
+
+    Raises:
+        InputError: a folder cannot be read, or holds no log.
+    """
+    found, known = [], {path.resolve() for path in but}
+    for path in paths:
+        is_folder = path.is_dir() and not _is_log(path)
+        with system_errors(path, "read"):
+            inside = sorted(path.iterdir()) if is_folder else [path]
+        if is_folder:
+            inside = [each for each in inside if _is_log(each) and each.resolve() not in known]
+        if not inside and not waiting:
+            raise InputError(f"{path}: holds no log; a log is {FORMATS}")
+        found += inside
+    return found
+
+
+def _is_log(path: Path) -> bool:
+    with suppress(InputError):
+        return path.name != MAP and bool(log_kind(path))
+    return False
+
+
+def look_at_joints(
+    seen: Watched, logs: Sequence[Path], model: GivenModel, reference: Sequence[Path], chosen: WatchOptions, say: Say
+) -> None:  # fmt: skip
+    """Inspect logs of a robot, and diagnose those that are ready, all together; add lines and diagnosis to ``seen``.
+
+    Raises:
+        InputError: the model, a log or its map cannot be read.
+    """
+    ready = []
+    for path in logs:
+        say(f"inspecting {path.name}")
+        found = inspect(path, model, map=chosen.map)
+        why = "; ".join(finding.sentence for finding in found.findings)
+        seen.lines.append(f"{path}: {found.ready_for}{f': {why}' if why else ''}.")
+        ready += [path] if found.is_ready else []
+    if not ready:
+        seen.lines.append("Nothing can be diagnosed: no log is ready.")
+        return
+    try:
+        seen.diagnosis = diagnose(ready, model, reference, map=chosen.map, say=say)
+    except InputError as error:
+        seen.lines.append(f"No diagnosis: {error}.")
+        return
+    seen.add_verdict("the reference" if reference else "the model")
+
+
+def new_logs(paths: Sequence[Path], but: Sequence[Path] = ()) -> Iterator[Path]:
+    """Yield every log among the paths and in their folders once it stops growing, and again if it has grown; no end."""
+    before: dict[Path, tuple[int, int]] = {}
+    done: dict[Path, tuple[int, int]] = {}
+    while True:
+        now = {path: _size(path) for path in logs_in(paths, but, waiting=True)}
+        for path, size in now.items():
+            if before.get(path) == size and done.get(path) != size:
+                done[path] = size
+                yield path
+        before = now
+        time.sleep(POLL_S)
+
+
+def _size(path: Path) -> tuple[int, int]:
+    """Return the bytes and the time of the last change of a file, or of all files in a folder [ns]."""
+    files = [path, *path.rglob("*")] if path.is_dir() else [path]
+    each = []
+    for file in files:
+        with suppress(FileNotFoundError):  # the writer renamed it
+            each.append(file.stat())
+    return sum(stat.st_size for stat in each), max((stat.st_mtime_ns for stat in each), default=0)
