@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from time import sleep
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
@@ -92,7 +92,7 @@ def new_logs(paths: Sequence[Path], but: Sequence[Path] = ()) -> Iterator[Path]:
                 done[path] = size
                 yield path
         before = now
-        time.sleep(POLL_S)
+        sleep(POLL_S)
 
 
 def _size(path: Path) -> tuple[int, int]:
