@@ -194,8 +194,8 @@ class JointDiagnosed(Diagnosed[JointVerdict]):
     @property
     def channels(self) -> Sequence[Channel]:
         model = self.verdict.model
-        names = enumerate(model.joints)
-        return [Channel(f"{name} torque", "torque", None, unit_of(model, j)) for j, name in names]
+        known = [(j, model.joints[j]) for j in self.verdict.measured]
+        return [Channel(f"{name} torque", "torque", None, unit_of(model, j)) for j, name in known]
 
     def unit(self, name: str) -> str:
         of_position = name.removeprefix("position of joint ")

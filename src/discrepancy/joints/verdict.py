@@ -16,7 +16,7 @@ from discrepancy.evidence.findings import Event, Finding, Member, Verdict, with_
 from discrepancy.evidence.judge import Judge
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
-from discrepancy.evidence.probability import odds_of, without_unfounded
+from discrepancy.evidence.probability import Odds, odds_of, without_unfounded
 from discrepancy.evidence.search import Chosen, Until
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.formulas.law import Law
@@ -62,6 +62,7 @@ class JointVerdict(Verdict):
     Attributes:
         model: the robot as described.
         parts: signals of the trials, which are whole logs or parts of one.
+        measured: joints whose torques are known in all logs, from 0.
         motors: torque per unit of input of drives without torque readings.
         predictions: one for each trial, predicted from the others. A single trial is predicted from itself.
         by_the_others: returns, for the index of a trial, the findings fitted to the other trials, without events.
@@ -69,6 +70,7 @@ class JointVerdict(Verdict):
 
     model: SerialModel
     parts: Sequence[Signals]
+    measured: tuple[int, ...]
     motors: tuple[Motor, ...]
     predictions: tuple[Prediction, ...]
     by_the_others: Callable[[int], tuple[Finding, ...]]
@@ -150,6 +152,7 @@ class _JointJudge(Judge):
             traces=self.traces,
             model=self.model,
             parts=self.trials.signals,
+            measured=tuple(map(int, self.trials.joints)),
             motors=self.trials.motors,
             predictions=tuple(self._predicted([o.chosen for o in self.named])),
             by_the_others=self.by_the_others,
@@ -278,6 +281,7 @@ class _JointJudge(Judge):
     def traces(self) -> list[Trace]:
         """Residuals of each part, as modelled and with everything that was found."""
         x = self.state.posterior.mean[self.parts.active]
+        each = [self.parts.columns_of(columns) for o in self.named for columns in self._columns(o)]
         out = []
         for t, name in enumerate(self.trials.names[: self._changed]):
             own, s, sigma = self.series[t], self.trials.signals[t], self._noise(t)
@@ -287,6 +291,7 @@ class _JointJudge(Judge):
             for j in range(s.q.shape[1]):
                 quantities[f"position of joint {j + 1}"] = np.interp(time, s.time, s.q[:, j])
             wide = np.broadcast_to(sigma, before.shape)
+            causes = tuple(own.columns[:, :, at] @ x[at] * own.unit for at in each)
             out.append(
                 Trace(
                     name,
@@ -299,6 +304,16 @@ class _JointJudge(Judge):
                     before / sigma,
                     after / sigma,
                     quantities,
+                    own.measured * own.unit,
+                    causes,
                 )
             )
         return out
+
+    def _columns(self, o: Odds) -> Iterator[list[int]]:
+        """Columns of each finding of a cause; of a cause of all joints at one joint, those of that joint."""
+        c, found = o.chosen.group, self.findings(o)
+        known = [self.model.joints[j] for j in self.trials.joints]
+        of = {} if found[0].place == c.place or not c.members else dict(zip(known, c.members, strict=True))
+        for f in found:
+            yield [*of[f.place]] if f.place in of else [*c.columns, *o.chosen.forms]
