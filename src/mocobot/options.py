@@ -653,7 +653,7 @@ class ReplayOptions(Options):
     truth: AnyFlag = False
     """Also show the truth that is stored beside each recording (REC.truth.json)."""
     diagnosis: Annotated[AnyPath | None, tyro.conf.arg(metavar="DIR")] = None
-    """Mark the causes of a diagnosis, written by `mocobot diagnose --out`."""
+    """Mark the causes of a diagnosis, written by `mocobot diagnose --out`; with --model, show its torques."""
     payload: Annotated[AnyName | None, tyro.conf.arg(metavar="NAME|FILE.xml")] = None
     """Geometry of the payload; if omitted, that of the recording's label, or bars between the grasps."""
     web: bool = False
@@ -664,7 +664,7 @@ class ReplayOptions(Options):
         if path is not None and self.web:
             raise InputError("out and web are both given; choose a file or a browser")
         if model is not None:
-            refuse_teams(self, ("estimate", "calibration", "diagnosis", "payload", "truth"))
+            refuse_teams(self, ("estimate", "calibration", "payload", "truth"))
         elif self.map is not None:
             raise InputError(
                 "map goes with a model; a team's log must be converted to a recording first (mocobot convert)"

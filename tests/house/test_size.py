@@ -12,13 +12,13 @@ from source_tree import SRC, module_files
 
 CEILINGS = {
     "estimator": 6_660,
-    "mocobot_logs": 6_310,
+    "mocobot_logs": 6_390,
     "mocobot_inspect": 2_950,
     "mocobot_sim": 5_670,
-    "discrepancy": 11_530,
-    "mocobot_view": 2_100,
-    "mocobot_report": 2_620,
-    "mocobot": 4_450,
+    "discrepancy": 11_560,
+    "mocobot_view": 2_155,
+    "mocobot_report": 2_727,
+    "mocobot": 4_675,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700

@@ -21,7 +21,7 @@ from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
 from mocobot.api.recordings import Say, quiet, read
-from mocobot.api.watch_joints import logs_in, look_at_joints
+from mocobot.api.watch_joints import logs_in, look_at_joints, verdict_line
 from mocobot.checks import CALIBRATION
 from mocobot.options import WatchOptions, made
 from mocobot.results import Folder
@@ -68,13 +68,6 @@ class Watched(Folder):
         """Whether the verdict is ``"consistent"`` or ``"explained"``, and a team has an estimate."""
         verdict = self.diagnosis and self.diagnosis.verdict
         return (self.of_joints or self.estimate is not None) and verdict in ("consistent", "explained")
-
-    def add_verdict(self, against: str) -> None:
-        """Add the line of the diagnosis; ``against`` is what the logs were held against."""
-        assert self.diagnosis is not None
-        named = [cause.sentence for cause in self.diagnosis.causes]
-        verdict, rest = self.diagnosis.verdict.replace("_", " ").upper(), self.diagnosis.to_dict()["remains"]
-        self.lines.append(" ".join([f"Against {against}: {verdict}.", *named, *rest]))
 
     def __str__(self) -> str:
         """Return the overall verdict."""
@@ -157,7 +150,8 @@ def watch(
     paths = [Path(path) for path in _each(logs)]
     if model is not None:
         healthy = [Path(path) for path in _each(reference)]
-        look_at_joints(seen, logs_in(paths, healthy), model, healthy, chosen, say)
+        found = logs_in(paths, healthy)
+        seen.lines, seen.diagnosis = look_at_joints(found, model, healthy, chosen.map, say)
         return seen
     for path in paths:
         _look(seen, path, chosen.map, say)
@@ -240,7 +234,7 @@ def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], obj
     except InputError as error:
         seen.lines.append(f"No diagnosis: {error}.")
         return
-    seen.add_verdict("the simulation")
+    seen.lines.append(verdict_line(seen.diagnosis, "the simulation"))
 
 
 def payload_line(found: Estimate) -> str:

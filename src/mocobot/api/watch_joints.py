@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
 from estimator.files import system_errors
-from mocobot.api.diagnosis import diagnose
+from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.inspection import inspect
 from mocobot.api.joints import MAP
 from mocobot.api.recordings import Say
@@ -18,8 +18,6 @@ from mocobot_logs.formats import FORMATS, log_kind
 
 if TYPE_CHECKING:
     from mocobot.api.joints import GivenModel
-    from mocobot.api.watch import Watched
-    from mocobot.options import WatchOptions
 
 POLL_S = 2.0
 """Time between two looks at the files [s]. Chosen: a log that does not change for so long is finished."""
@@ -56,29 +54,36 @@ def _is_log(path: Path) -> bool:
 
 
 def look_at_joints(
-    seen: Watched, logs: Sequence[Path], model: GivenModel, reference: Sequence[Path], chosen: WatchOptions, say: Say
-) -> None:  # fmt: skip
-    """Inspect logs of a robot, and diagnose those that are ready, all together; add lines and diagnosis to ``seen``.
+    logs: Sequence[Path], model: GivenModel, reference: Sequence[Path], log_map: Path | str | None, say: Say
+) -> tuple[list[str], Diagnosis | None]:
+    """Inspect logs of a robot, and diagnose those that are ready, all together.
+
+    Returns:
+        One line per log and one on the verdict, and the diagnosis, if there is one.
 
     Raises:
         InputError: the model, a log or its map cannot be read.
     """
-    ready = []
+    lines, ready = [], []
     for path in logs:
         say(f"inspecting {path.name}")
-        found = inspect(path, model, map=chosen.map)
+        found = inspect(path, model, map=log_map)
         why = "; ".join(finding.sentence for finding in found.findings)
-        seen.lines.append(f"{path}: {found.ready_for}{f': {why}' if why else ''}.")
+        lines.append(f"{path}: {found.ready_for}{f': {why}' if why else ''}.")
         ready += [path] if found.is_ready else []
     if not ready:
-        seen.lines.append("Nothing can be diagnosed: no log is ready.")
-        return
+        return [*lines, "Nothing can be diagnosed: no log is ready."], None
     try:
-        seen.diagnosis = diagnose(ready, model, reference, map=chosen.map, say=say)
+        diagnosis = diagnose(ready, model, reference, map=log_map, say=say)
     except InputError as error:
-        seen.lines.append(f"No diagnosis: {error}.")
-        return
-    seen.add_verdict("the reference" if reference else "the model")
+        return [*lines, f"No diagnosis: {error}."], None
+    return [*lines, verdict_line(diagnosis, "the reference" if reference else "the model")], diagnosis
+
+
+def verdict_line(diagnosis: Diagnosis, against: str) -> str:
+    """State the verdict, its causes and what remains; ``against`` is what the logs were held against."""
+    verdict, named = diagnosis.verdict.replace("_", " ").upper(), [c.sentence for c in diagnosis.causes]
+    return " ".join([f"Against {against}: {verdict}.", *named, *diagnosis.to_dict()["remains"]])
 
 
 def new_logs(paths: Sequence[Path], but: Sequence[Path] = ()) -> Iterator[Path]:
