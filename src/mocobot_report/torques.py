@@ -27,10 +27,7 @@ from mocobot_report.tables import Entry, Num, value
 MEASURED, GIVEN = Key("measured", "measured", "text"), Key("before", "model as given", "before")
 COLOURS = ("r1", "r2", "r3", "r4", "r5")
 """Colours of the causes, which repeat."""
-WITHIN, LEFT = (
-    Key("within", "within the tolerances", "r6", "band"),
-    Key("left", "left", "line", "band"),
-)
+LEFT = Key("left", "left", "line", "band")
 MARGIN = 1.08
 """Vertical range of a panel over the largest value. Chosen."""
 FADED = "below the frequency of the rows; all fade at the ends of a log and where nothing is to be learnt"
@@ -50,7 +47,12 @@ def torques(found: Diagnosed, names: Sequence[str]) -> dict[str, Any] | None:
         (name, _over_time(trace, name, grouped, most, named))
         for trace, name in zip(traces, names, strict=True)
     ]
-    return {"trials": trials, **_shares(traces, grouped, named)}
+    within = (
+        "in the reference, too, or within the tolerances"
+        if found.values["reference"]
+        else "within the tolerances"
+    )
+    return {"trials": trials, **_shares(traces, grouped, named, Key("within", within, "r6", "band"))}
 
 
 def _over_time(trace: Trace, name: str, grouped: Sequence[Group], most: int, named: Sequence[str]) -> Chart:
@@ -77,7 +79,9 @@ def _over_time(trace: Trace, name: str, grouped: Sequence[Group], most: int, nam
     )
 
 
-def _shares(traces: Sequence[Trace], grouped: Sequence[Group], named: Sequence[str]) -> dict[str, Any]:
+def _shares(
+    traces: Sequence[Trace], grouped: Sequence[Group], named: Sequence[str], within: Key
+) -> dict[str, Any]:
     """Make chart and table of the share of each joint's squared residual that a cause removes beyond those above it."""
     units = group_units(traces, grouped)
     shares = {group.name: _in_turn(traces, group.columns[0]) for group in grouped}
@@ -87,7 +91,7 @@ def _shares(traces: Sequence[Trace], grouped: Sequence[Group], named: Sequence[s
         for k, (name, colour) in enumerate(zip(named, colours, strict=True))
     ]
     data = []
-    for k, key in enumerate([*keys, WITHIN, LEFT]):
+    for k, key in enumerate([*keys, within, LEFT]):
         each = [max(float(found[k]), 0.0) for found in shares.values()]
         text = [f"{joint}, {key.label}: {percent(share)}" for joint, share in zip(shares, each, strict=True)]
         data.append(bars(each, key, text, 0.62, textposition="none"))
@@ -95,7 +99,7 @@ def _shares(traces: Sequence[Trace], grouped: Sequence[Group], named: Sequence[s
     across = axis("share of the squared residual [%]", range=[0.0, 100.0 * max(most, 1.0)], nticks=5)
     said = "Share of every joint's squared residual torque that each cause removes; the numbers are in the table below."
     chart = Chart(
-        "What each cause explains of every joint", said, data, keys=[*keys, WITHIN, LEFT],
+        "What each cause explains of every joint", said, data, keys=[*keys, within, LEFT],
         **row_layout(list(shares), across, row_px=30),
     )  # fmt: skip
     rows: list[list[Entry]] = []
@@ -112,7 +116,7 @@ def _shares(traces: Sequence[Trace], grouped: Sequence[Group], named: Sequence[s
         "before",
         "after",
         *(f"{name} [%]" for name in named),
-        "tolerances [%]",
+        f"{within.label} [%]",
         "left [%]",
     ]
     return {"shares": chart, "head": head, "rows": rows}

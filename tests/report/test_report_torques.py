@@ -101,3 +101,42 @@ def test_residuals_of_earlier_versions_make_a_page_without_torques(arm, tmp_path
     page = write_report(old, old / "report.html").read_text(encoding="utf-8")
     assert TITLE not in page
     assert "Residuals over time" in page
+
+
+def test_a_diagnosis_against_a_reference_makes_a_page_and_claims_no_test_of_one_trial(arm, tmp_path, capsys):
+    folder, _ = arm
+    today = write_csv(tmp_path / "today.csv", made(seconds=5.0, seed=7, payload_kg=0.5))
+    out, reference = tmp_path / "v", ("--reference", folder / "log.csv")
+    model = ("--model", folder / "arm.xml", "--map", folder / "log.toml")
+    code, said, _ = run(capsys, "diagnose", today, *model, *reference, "--out", out)
+    assert code == 0
+    text = " ".join(said.split())
+    assert (
+        "one finding accounts for what has changed in the trial. The robot differs from the reference by payload"
+        in text
+    )
+    assert "so the findings are not tested on data left out of the fit" in text
+    values = json.loads((out / "diagnosis.json").read_text())
+    assert (values["recordings"], values["reference"]) == (["today"], ["log"])
+    assert values["gain"]["held_out"]["after"]["chi2_per_n"] < 2.0
+    assert run(capsys, "report", out)[0] == 0
+    (result,) = read_folder(out)
+    found = torques(result.found, ["today"])
+    assert found is not None
+    assert "in the reference, too" in " ".join(found["head"])
+    assert all(row[4].text != "" for row in found["rows"])
+
+
+def test_two_trials_are_tested_on_each_other_for_what_has_changed_alone(arm, tmp_path, capsys):
+    folder, _ = arm
+    logs = [
+        write_csv(tmp_path / f"today{k}.csv", made(seconds=5.0, seed=7 + k, payload_kg=0.5)) for k in (1, 2)
+    ]
+    model = ("--model", folder / "arm.xml", "--map", folder / "log.toml", "--json", tmp_path / "v.json")
+    assert run(capsys, "diagnose", *logs, *model, "--reference", folder / "log.csv")[0] == 0
+    gain = json.loads((tmp_path / "v.json").read_text())["gain"]
+    weight, largest = 9.81 * 0.5 * 0.7, 0.0
+    for trial in gain["trials"]:  # friction and masses, which the reference has, too, are no change
+        largest = max(largest, trial["before"]["shoulder torque_rms"])
+    assert largest < weight
+    assert gain["removed"]["share"] > 0.9

@@ -95,7 +95,7 @@ class JointValues(Told):
             text = f"{titled(cause.title, ALL)}: {text}"
         if f.of:
             text = f"{text} and goes with its {f.of}"
-        trials = self.verdict.trials
+        trials = (*self.verdict.trials, *self.verdict.reference)
         trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."
 

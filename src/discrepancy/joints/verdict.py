@@ -145,7 +145,7 @@ class _JointJudge(Judge):
         more = (*at_limits(self.model, self.trials.limited), *resting(logs), *self._notes())
         verdict = JointVerdict(
             **self.told(),
-            trials=self.trials.names,
+            trials=self.trials.names[: self._changed],
             reference=self.trials.names[self._changed :],
             notes=(*notes, *more),
             finished=self.finished,
@@ -163,6 +163,10 @@ class _JointJudge(Judge):
     def _changed(self) -> int:
         runs = [k for k, _ in self.trials.parts]
         return sum(k < self.trials.changed for k in runs)
+
+    @property
+    def validated(self) -> bool:
+        return self._changed > 1  # the reference says nothing of what has changed
 
     # --- groups
 
@@ -241,11 +245,13 @@ class _JointJudge(Judge):
         return tuple(f for o in named for f in self.findings(o, values))
 
     def _predicted(self, kept: Sequence[Chosen]) -> Iterator[Prediction]:
-        both, parts = (self.prior((), tolerated=False), self.prior(kept)), self.parts
+        """Torques of each trial without and with the findings; what the reference has, too, is in both."""
+        parts, alone = self.parts, self.parts.count > self._changed == 1
+        both = self.prior((), tolerated=parts.count > self._changed), self.prior(kept)
         for t, name in enumerate(self.trials.names[: self._changed]):
             sides, chi2 = [], []
             for prior in both:
-                x = parts.predicted(prior, t)
+                x = parts.mean(prior) if alone else parts.predicted(prior, t)
                 sides.append(self._wide(np.sqrt(np.mean(self.series[t].left(x) ** 2, axis=0))))
                 chi2.append(float(parts.left(x, t) / parts.rows[t].sum()))
             own = self.trials.signals[t].torque
