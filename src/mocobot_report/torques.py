@@ -47,11 +47,7 @@ def torques(found: Diagnosed, names: Sequence[str]) -> dict[str, Any] | None:
         (name, _over_time(trace, name, grouped, most, named))
         for trace, name in zip(traces, names, strict=True)
     ]
-    within = (
-        "in the reference, too, or within the tolerances"
-        if found.values["reference"]
-        else "within the tolerances"
-    )
+    within = "in the reference, too, or tolerated" if found.values["reference"] else "within the tolerances"
     return {"trials": trials, **_shares(traces, grouped, named, Key("within", within, "r6", "band"))}
 
 
@@ -60,9 +56,9 @@ def _over_time(trace: Trace, name: str, grouped: Sequence[Group], most: int, nam
     after = Key("after", "model with causes and tolerances" if named else "model with tolerances", "after")
     assert trace.measured is not None
     sides = (
+        (MEASURED, trace.measured),
         (GIVEN, trace.measured - trace.before),
         (after, trace.measured - trace.after),
-        (MEASURED, trace.measured),
     )
     panels = []
     for group in grouped:
