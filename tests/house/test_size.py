@@ -15,7 +15,7 @@ CEILINGS = {
     "mocobot_logs": 6_390,
     "mocobot_inspect": 2_950,
     "mocobot_sim": 5_670,
-    "discrepancy": 11_560,
+    "discrepancy": 11_568,
     "mocobot_view": 2_155,
     "mocobot_report": 2_727,
     "mocobot": 4_675,
