@@ -298,22 +298,10 @@ class _JointJudge(Judge):
                 quantities[f"position of joint {j + 1}"] = np.interp(time, s.time, s.q[:, j])
             wide = np.broadcast_to(sigma, before.shape)
             causes = tuple(own.columns[:, :, at] @ x[at] * own.unit for at in each)
-            out.append(
-                Trace(
-                    name,
-                    time,
-                    len(time),
-                    own.rate_hz,
-                    before,
-                    after,
-                    wide,
-                    before / sigma,
-                    after / sigma,
-                    quantities,
-                    own.measured * own.unit,
-                    causes,
-                )
-            )
+            white = before / sigma, after / sigma
+            measured = own.measured * own.unit
+            each_row = name, time, len(time), own.rate_hz, before, after, wide, *white, quantities
+            out.append(Trace(*each_row, measured, causes))
         return out
 
     def _columns(self, o: Odds) -> Iterator[list[int]]:
