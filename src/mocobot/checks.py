@@ -37,7 +37,7 @@ INPUTS = {
     opt.Convert: ("log", "design", "map"),
     opt.Estimate: ("rec", "map", "calibration"),
     opt.Calibrate: ("rec", "free", "prior", "model", "map"),
-    opt.Watch: ("rec", "map"),
+    opt.Watch: ("rec", "reference", "model", "map"),
     opt.Diagnose: ("rec", "reference", "tolerances", "model", "map", "calibration"),
     opt.Compare: ("a", "b"),
     opt.Simulate: ("payload", "units"),
@@ -139,13 +139,21 @@ def check_calibrate(options: opt.Calibrate) -> None:
 def check_watch(options: opt.Watch) -> None:
     """Check the options and files of ``watch`` before a log is read."""
     options.check()
+    if options.model is None and (options.reference or options.follow):
+        raise InputError(
+            f"{'reference' if options.reference else 'follow'} goes with a model: a single robot's"
+        )
+    if options.follow and (options.out is not None or options.open):
+        both = f"follow and {'out' if options.out is not None else 'open'} are both given"
+        raise InputError(f"{both}; follow prints verdicts, and diagnose --out keeps that of a log")
     _check_recordings(options.rec)
-    stems = [path.stem for path in options.rec]
+    _check_recordings([*options.rec, *options.reference])
+    stems = [path.stem for path in options.rec] if options.model is None else []
     for stem in stems:
         if stems.count(stem) > 1:
             raise InputError(f"{stem} is the name of two recordings; give each a name of its own")
     _check_folder(options, "watch", "an earlier result of watch")
-    _check_logs(options.rec)
+    _check_logs([*options.rec, *options.reference], options.model)
 
 
 def check_diagnose(options: opt.Diagnose) -> None:

@@ -13,6 +13,7 @@ import textwrap
 import time
 import webbrowser
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from estimator.strict import read_json
 from mocobot import options as opt
 from mocobot.checks import TRUTH, check_target_of, inputs_of, targets
 from mocobot.cli import NotGood
+from mocobot.next_step import next_step
 from mocobot.progress import bar, share_bar, stages
 from mocobot.results import Folder, file_facts, provenance
 from mocobot_sim.scene.models import truth_path
@@ -170,6 +172,7 @@ def diagnose(options: opt.Diagnose) -> None:
     print("\n".join([*notes, found.verbose_text() if options.verbose else str(found)]))
     if options.out:
         print(f"\nWritten to {options.out}.")
+    print(next_step(options, found.to_dict()), end="")
     if options.strict and found.verdict not in ("consistent", "explained"):
         raise NotGood(f"the verdict is {found.verdict.replace('_', ' ')}")
 
@@ -205,14 +208,38 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
 
 
 def watch(options: opt.Watch) -> None:
-    """Turn logs into a first verdict and a page that shows it."""
+    """Turn logs into a first verdict and a page that shows it; with ``follow``, tell of each new log until Ctrl-C."""
+    if options.model is None:
+        return _watch(options)
+    from mocobot.api.watch_joints import logs_in, new_logs
+
+    if not options.follow:
+        return _watch(replace(options, rec=tuple(logs_in(options.rec, options.reference))))
+    print(f"Waiting for logs: {', '.join(str(path) for path in options.rec)}; Ctrl-C ends it.", flush=True)
+    with suppress(KeyboardInterrupt):
+        for log in new_logs(options.rec, options.reference):
+            try:
+                _watch(replace(options, rec=(log,), strict=False))
+            except InputError as error:
+                print(f"{log}: left out, {error}.", flush=True)
+
+
+def _watch(options: opt.Watch) -> None:
+    """Look once; write and print what was found."""
     out = options.out
     made_with = provenance("watch", options, inputs_of(options))
     if out is None and options.open:
         out = Path(tempfile.mkdtemp(prefix="mocobot-watch-")) / "watch"
     page = None
     with stages() as (say, simulated):
-        seen = mocobot.watch(options.rec, options, say=say, simulated=simulated)
+        seen = mocobot.watch(
+            options.rec,
+            options,
+            model=options.model,
+            reference=options.reference,
+            say=say,
+            simulated=simulated,
+        )
         if out is not None:
             say("write")
             with whole_folder(out, seen.result) as folder:
@@ -221,7 +248,9 @@ def watch(options: opt.Watch) -> None:
                 page = mocobot.report(out, say=say)
                 seen.lines.append(f"The page with all of it: {page}.")
     lines = (textwrap.wrap(line, WIDTH, subsequent_indent="  ") for line in seen.lines)
-    print("\n".join(part for wrapped in lines for part in wrapped))
+    print("\n".join(part for wrapped in lines for part in wrapped), flush=True)
+    if seen.of_joints and seen.diagnosis is not None:
+        print(next_step(options, seen.diagnosis.to_dict()), end="", flush=True)
     if options.open and page is not None:
         webbrowser.open(page.resolve().as_uri())
     if options.strict and not seen.good:

@@ -422,7 +422,8 @@ def parse_map(values: Values, name: str) -> LogMap:
     check_version(values, where)
     if "joints" in values and "level" not in values:
         raise InputError(
-            f"{where}: is of one robot's joints, not of a team; inspect, diagnose and replay read its log with --model"
+            f"{where}: is of one robot's joints, not of a team; inspect, watch, diagnose and replay read its log with "
+            "--model"
         )
     top = Fields(values, _REQUIRED, where, _OPTIONAL)
     level: Level = top.one_of("level", get_args(Level))

@@ -185,6 +185,7 @@ class Line:
     time: Array  # shape (n,); NaN interrupts the line
     values: Array  # shape (n,)
     points: bool = False  # draw markers instead of a line
+    width: float = 1.2  # [px]
 
 
 @dataclass(frozen=True)
@@ -232,7 +233,7 @@ def _vertical(panel: Panel) -> Axis:
 def _trace(panel: Panel, one: Line, name: str) -> Trace:
     hover = f"{literal(panel.title)}, {literal(one.key.label)}<br>%{{x:.2f}}: %{{y:.3g}} {panel.unit}"
     points = {"mode": "markers", "marker": {"size": 6}} if one.points else {}
-    return line(one.time, one.values, one.key, hover, yaxis=name, **points)
+    return line(one.time, one.values, one.key, hover, width=one.width, yaxis=name, **points)
 
 
 def around_zero(time: Array, half: Array) -> str:

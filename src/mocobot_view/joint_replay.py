@@ -12,6 +12,8 @@ import rerun.blueprint as rrb
 
 from discrepancy.joints.mechanics import inverse_torque
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import FADE_S
+from discrepancy.result.traces import Trace
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from mocobot_logs.joints.joint_log import JointLog
@@ -19,7 +21,7 @@ from mocobot_view import colours
 from mocobot_view.blueprint import playing, plot_view, world_view
 from mocobot_view.colours import Colour
 from mocobot_view.shapes import Shape, Triangles, body_shape, capsule, join
-from mocobot_view.stream import begin, log_lines, log_shape, send_poses
+from mocobot_view.stream import begin, log_lines, log_shape, send, send_poses
 
 POSE_HZ, SERIES_HZ = 60.0, 500.0
 """Largest rates of drawn poses and of samples in the series [Hz]. Chosen."""
@@ -49,6 +51,9 @@ class JointReplay:
         series_time: times of the series [s], shape (S,).
         asked: inverse-dynamics torques of the model without friction [N m or N], shape (S, J).
         every: number of log samples per sample of the series.
+        anchor, axis: place and direction of every joint in the world, shape (P, J, 3) each [m] and [1].
+        found: torques of the model with the causes of a diagnosis at the times of the series, shape (S, J), NaN where
+            they are not known; None without a diagnosis.
     """
 
     name: str
@@ -63,25 +68,50 @@ class JointReplay:
     series_time: Array
     asked: Array
     every: int
+    anchor: Array
+    axis: Array
+    found: Array | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences for the viewer."""
-        return self.log.notes
+        if self.log.torque is None:
+            return self.log.notes
+        said = "Arrows are torques, by the right-hand rule, in shares of the joint's largest: blue measured"
+        return (
+            *self.log.notes,
+            f"{said}{'' if self.found is None else ', green the model with the causes'}.",
+        )
+
+    @property
+    def torques(self) -> dict[str, tuple[Array, Colour]]:
+        """Torques to draw as arrows at the times of the poses, shape (P, J) each, with their colours, by name."""
+        if self.log.torque is None:
+            return {}
+        at = np.clip(np.searchsorted(self.log.time, self.time), 0, len(self.log.time) - 1)
+        out = {"measured": (self.log.torque[at], MEASURED)}
+        if self.found is not None:
+            each = [np.interp(self.time, self.series_time, values) for values in self.found.T]
+            out["corrected"] = np.column_stack(each), FOUND
+        return out
 
 
-def joint_replay(model: SerialModel, log: JointLog, name: str) -> JointReplay:
+def joint_replay(
+    model: SerialModel, log: JointLog, name: str, traces: Sequence[Trace] = (), columns: Sequence[int] = ()
+) -> JointReplay:
     """Compute the data of the replay of a log.
 
     Args:
         model: model of the robot.
         log: log of its joints.
         name: name of the replay.
+        traces: residuals of a diagnosis of this log, with measured torques; empty without one.
+        columns: joint of each of their channels, from 0.
     """
     shapes = _shapes(model.model)
     step = max(1, round(log.rate_hz / POSE_HZ))
     names = {b: model.model.body(b).name or f"body{b}" for b in shapes}
-    position, quaternion, reach = _poses(model.model, model.coupling.all(log.q[::step])[0])
+    position, quaternion, reach, joints = _poses(model.model, model.coupling.all(log.q[::step])[0])
     every = max(1, round(log.rate_hz / SERIES_HZ))
     q = low_pass(log.q, log.rate_hz, min(SMOOTH_HZ, SMOOTH_SHARE * log.rate_hz))
     dq = differentiate(q, log.rate_hz)
@@ -99,11 +129,31 @@ def joint_replay(model: SerialModel, log: JointLog, name: str) -> JointReplay:
         series_time=log.time[::every],
         asked=inverse_torque(model.model, q[::every], dq[::every], ddq[::every]),
         every=every,
+        anchor=joints[0][:, model.coupling.own],
+        axis=joints[1][:, model.coupling.own],
+        found=_found(log.time[::every], traces, columns, len(model.joints)) if traces else None,
     )
 
 
-def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, float]]:
-    """Compute positions and quaternions (x, y, z, w) of all bodies, (P, B, 3) and (P, B, 4), and a ball around them."""
+def _found(time: Array, traces: Sequence[Trace], columns: Sequence[int], joints: int) -> Array:
+    """Interpolate the torques with the causes, and leave out the ends of the log, where the rows fade."""
+    out = np.full((len(time), joints), np.nan)
+    rows = np.concatenate([trace.time for trace in traces])
+    order, inside = np.argsort(rows), (time > time[0] + FADE_S) & (time < time[-1] - FADE_S)
+    modelled = np.concatenate([t.measured - t.after for t in traces if t.measured is not None])
+    for channel, j in enumerate(columns):
+        out[inside, j] = np.interp(time[inside], rows[order], modelled[order, channel])
+    return out
+
+
+def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, float], Array]:
+    """Compute the poses of bodies and joints.
+
+    Returns:
+        Positions and quaternions (x, y, z, w) of all bodies, (P, B, 3) and (P, B, 4); a ball around them; anchors and
+        axes of the joints, (2, P, J, 3).
+    """
+    joints = np.empty((2, len(q), model.njnt, 3))
     data = mujoco.MjData(model)
     position = np.empty((len(q), model.nbody, 3))
     quaternion = np.empty((len(q), model.nbody, 4))
@@ -111,9 +161,10 @@ def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, 
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         position[k], quaternion[k] = data.xpos, data.xquat
+        joints[0, k], joints[1, k] = data.xanchor, data.xaxis
     low, high = position[:, 1:].min(axis=(0, 1)), position[:, 1:].max(axis=(0, 1))
     reach = (low + high) / 2.0, float(max(np.linalg.norm(high - low) / 2.0, 0.1))
-    return position, quaternion[..., _TURN], reach
+    return position, quaternion[..., _TURN], reach, joints
 
 
 def _shapes(model: mujoco.MjModel) -> dict[int, Shape]:
@@ -143,7 +194,9 @@ def _rod(end: Array) -> Triangles:
     return capsule(min(BONE_M, 0.2 * length), length / 2.0).moved(end / 2.0, R)
 
 
-MEASURED, ASKED, COMMANDED = colours.of_robot(1), colours.of_robot(2), colours.COMMAND
+MEASURED, ASKED, FOUND, COMMANDED = *map(colours.of_robot, (1, 2, 3)), colours.COMMAND
+ARROW_SHARE, THICK_SHARE = 0.45, 0.012
+"""Length of the arrow of a joint's largest torque, and radius of an arrow, over the robot's radius. Chosen."""
 SHOWN = 4
 """Number of joints in one tab of plots. Chosen."""
 
@@ -168,9 +221,29 @@ def log_joint_replay(
             path = f"{replay.name}/robot/{rr.escape_entity_path_part(body)}"
             send_poses(stream, path, replay.time, replay.position[body], replay.quaternion[body])
             log_shape(stream, f"{path}/shape", shape)
+        _log_arrows(stream, replay)
         _log_series(stream, replay)
         if progress:
             progress(1)
+
+
+def _log_arrows(stream: rr.RecordingStream, replay: JointReplay) -> None:
+    """Log the torques as arrows along the axes; those of the model lie beside the measured ones."""
+    radius = THICK_SHARE * replay.reach[1]
+    sideways = np.cross(replay.axis, (0.0, 0.0, 1.0)) + np.cross(replay.axis, (0.0, 1e-3, 0.0))
+    sideways /= np.linalg.norm(sideways, axis=-1, keepdims=True)
+    for number, (what, (torque, colour)) in enumerate(replay.torques.items()):
+        largest = np.nanmax(np.abs(np.nan_to_num(replay.torques["measured"][0])), axis=0)
+        share = np.nan_to_num(torque) / np.where(largest > 0.0, largest, 1.0)
+        vectors = ARROW_SHARE * replay.reach[1] * share[..., None] * replay.axis
+        origins = replay.anchor + 3.0 * number * radius * sideways
+        for j in np.flatnonzero(largest):
+            path = f"{replay.name}/torque/{rr.escape_entity_path_part(replay.joints[j])}/{what}"
+            stream.log(path, rr.Arrows3D.from_fields(colors=colour, radii=radius), static=True)
+            columns = rr.Arrows3D.columns(
+                origins=origins[:, j].astype(np.float32), vectors=vectors[:, j].astype(np.float32)
+            )
+            send(stream, path, replay.time, columns)
 
 
 def _log_series(stream: rr.RecordingStream, replay: JointReplay) -> None:
@@ -181,6 +254,12 @@ def _log_series(stream: rr.RecordingStream, replay: JointReplay) -> None:
             ("position", "measured", log.q[every, j], MEASURED),
             ("torque", "measured", None if log.torque is None else log.torque[every, j], MEASURED),
             ("torque", "model, without friction", replay.asked[:, j], ASKED),
+            (
+                "torque",
+                "corrected, with the causes",
+                None if replay.found is None else replay.found[:, j],
+                FOUND,
+            ),
         ]
         if log.command is not None and log.drive.command == "position":
             lines.append(("position", "commanded", log.command[every, j], COMMANDED))
@@ -211,7 +290,7 @@ def _plots(replay: JointReplay, j: int) -> rrb.Horizontal:
     log, (length, force) = replay.log, replay.units[j]
     quantities = {
         "position": f"position [{length}]" + ("" if log.command is None else " (white: command)"),
-        "torque": f"torque [{force}] (orange: model)",
+        "torque": f"torque [{force}] (orange: model{'' if replay.found is None else '; green: with the causes'})",
     }
     if log.drive.duty is not None:
         quantities["duty"] = "duty"
@@ -224,4 +303,4 @@ def _scene(replay: JointReplay) -> rrb.Spatial3DView:
     centre, radius = replay.reach
     eye = centre + 2.6 * radius * np.array([0.75, -0.85, 0.45]) / np.linalg.norm([0.75, -0.85, 0.45])
     controls = rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, 1.0))
-    return world_view(replay.name, ["$origin/robot/**"], controls)
+    return world_view(replay.name, ["$origin/robot/**", "$origin/torque/**"], controls)

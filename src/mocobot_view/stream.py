@@ -524,7 +524,7 @@ def show_content(content: Content) -> None:
         stream.flush(timeout_sec=FLUSH_S)
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(
-            f"the Rerun viewer does not open ({_line(error)}); write a file with --save, or use --web"
+            f"the Rerun viewer does not open ({_line(error)}); write a file with --out replay.rrd, or use --web"
         ) from error
     stream.disconnect()
 

@@ -380,11 +380,12 @@ def test_a_verdict(brief, capsys, monkeypatch, verdict, strict):
         def __str__(self) -> str:
             return "what was found"
 
-    found = Found(to_dict=lambda: {"verdict": verdict})
+    found = Found(to_dict=lambda: {"verdict": verdict, "causes": [], "finished": True})
     monkeypatch.setattr("mocobot.api.diagnosis.diagnose_team", lambda *_, **__: found)
-    assert run(capsys, "diagnose", brief) == (0, "what was found\n", "")
+    code, out, err = run(capsys, "diagnose", brief)
+    assert (code, out.partition("\n")[0], err) == (0, "what was found", "")
     said = f"mocobot: the verdict is {verdict.replace('_', ' ')}" if strict else ""
-    assert run(capsys, "diagnose", brief, "--strict") == (strict, "what was found\n", said)
+    assert run(capsys, "diagnose", brief, "--strict") == (strict, out, said)
 
 
 def test_an_estimate_that_says_nothing(brief, capsys, monkeypatch):

@@ -12,7 +12,7 @@ import pytest
 
 from command import refused, run
 from mocobot.cli import COMMANDS
-from mocobot.options import TrialKind as Kind
+from mocobot.option_types import TrialKind as Kind
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = {"numpy", "scipy", "pyarrow", "mujoco", "dm_control", "numba", "matplotlib", "plotly", "joblib"}

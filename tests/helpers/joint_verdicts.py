@@ -110,7 +110,7 @@ def joint_verdict(folder: Path, findings: Sequence[Finding] = (), **more: Any) -
     found = tuple(findings)
     offers = tuple(Offer(f.cause, f.place, f.joint, f.over_nothing) for f in found)
     verdict = JointVerdict(
-        model=small_robot(folder), parts=(), trials=TRIALS, motors=(), reference=(),
+        model=small_robot(folder), parts=(), measured=(0, 1, 2), trials=TRIALS, motors=(), reference=(),
         verdict="explained" if found else "consistent", findings=found, suspected=(), scatter=(),
         predictions=tuple(prediction(trial, bool(found)) for trial in TRIALS), validated=True,
         chi2_per_n=(900.0, 700.0, 1.05) if found else (1.2, 1.0, 1.0),

@@ -12,13 +12,13 @@ from source_tree import SRC, module_files
 
 CEILINGS = {
     "estimator": 6_660,
-    "mocobot_logs": 6_770,
+    "mocobot_logs": 6_850,
     "mocobot_inspect": 2_970,
     "mocobot_sim": 5_680,
-    "discrepancy": 12_500,
-    "mocobot_view": 2_100,
-    "mocobot_report": 2_620,
-    "mocobot": 4_470,
+    "discrepancy": 12_600,
+    "mocobot_view": 2_155,
+    "mocobot_report": 2_730,
+    "mocobot": 4_850,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700

@@ -57,6 +57,11 @@ class Judge(ABC):
 
     # --- machine-specific methods
 
+    @property
+    def validated(self) -> bool:
+        """Whether findings can be tested on trials that were left out of the fit."""
+        return self.parts.count > 1
+
     @abstractmethod
     def joint(self, cause: str, place: str) -> int | None:
         """Number of the joint of a cause at a place, from 1; None if it has no joint."""
@@ -101,7 +106,7 @@ class Judge(ABC):
         scatter, chi2 = self._scatter(), self._chi2()
         return {
             "verdict": self._word(findings, doubtful, scatter, chi2), "findings": tuple(findings),
-            "suspected": tuple(doubtful), "scatter": tuple(scatter), "validated": self.parts.count > 1,
+            "suspected": tuple(doubtful), "scatter": tuple(scatter), "validated": self.validated,
             "chi2_per_n": chi2, "before": tuple(self._offers(*self.before())),
             "after": tuple(self._offers(self.search, self.state)), "limits": tuple(self._limits()),
         }  # fmt: skip
@@ -193,7 +198,7 @@ class Judge(ABC):
         parts, kept = self.parts, self.named
         sets = [[o.chosen for o in kept[:k]] for k in range(len(kept) + 1)]
         left = [parts.left(parts.mean(self.prior(own, tolerated=False, events=False))) for own in sets]
-        several, rows = parts.count > 1, float(parts.rows.sum())
+        several, rows = self.validated, float(parts.rows.sum())
         kinds = sorted({False, self.tolerated}) if several else []
         sides = [self._predicted_each(sets, tolerated=kind) for kind in kinds]
         held, each = [sum(one) for one in sides[0]] if several else [], sides[-1] if several else []

@@ -149,6 +149,7 @@ class Series:
 
     Attributes:
         residual, columns: shapes (n, C) and (n, C, K).
+        measured: measured torque, faded like the residual, shape (n, C).
         time: log time [s], shape (n,).
         rate_hz: sampling rate of the rows.
         unit: factor from rows to physical units.
@@ -156,6 +157,7 @@ class Series:
 
     residual: Array
     columns: Array
+    measured: Array
     time: Array
     rate_hz: float
     unit: float
@@ -200,7 +202,8 @@ def in_parts(
         residual, columns = residual[here], columns[here]
         rate = own.rate_hz * share
         time = own.time[0] + (np.arange(len(residual)) + here.start + 0.5) / rate
-        out.append(Series(residual, columns, time, rate, float(np.sqrt(share))))
+        measured = _measured(whole.bands, own.torque[:, trials.joints], k)[here]
+        out.append(Series(residual, columns, measured, time, rate, float(np.sqrt(share))))
         each.append(_cells(residual, columns, seen, Bands([rate], [len(residual)], whole.bands.edges_hz)))
     return tuple(out), each
 
@@ -223,6 +226,13 @@ def _in_time(cells: Cells, active: NDArray[np.intp]) -> list[tuple[Array, Array]
             columns[:, c, at] = np.asarray(idct(X[first : first + n], axis=0, norm="ortho"))
             first += n
     return out
+
+
+def _measured(bands: Bands, torque: Array, run: int) -> Array:
+    """Turn the torques of a run, shape (W, C), into rows (n, C)."""
+    kept = bands.kept[run] if bands.kept else 1.0
+    rows = np.asarray(dct(bands.faded(torque * kept, run), axis=0, norm="ortho"))[: len(bands.of_trial(run))]
+    return np.asarray(idct(rows, axis=0, norm="ortho"))
 
 
 def _cells(residual: Array, columns: Array, seen: Sequence[NDArray[np.intp]], bands: Bands) -> Cells:

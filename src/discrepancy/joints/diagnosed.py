@@ -99,7 +99,7 @@ class JointValues(Told):
             text = f"{titled(cause.title, ALL)}: {text}"
         if f.of:
             text = f"{text} and goes with its {f.of}"
-        trials = self.verdict.trials
+        trials = (*self.verdict.trials, *self.verdict.reference)
         trial = f" in {trials[f.event.trial]}" if f.event and len(trials) > 1 else ""
         return f"{text[:1].upper()}{text[1:]}{trial}."
 
@@ -198,8 +198,8 @@ class JointDiagnosed(Diagnosed[JointVerdict]):
     @property
     def channels(self) -> Sequence[Channel]:
         model = self.verdict.model
-        names = enumerate(model.joints)
-        return [Channel(f"{name} torque", "torque", None, unit_of(model, j)) for j, name in names]
+        known = [(j, model.joints[j]) for j in self.verdict.measured]
+        return [Channel(f"{name} torque", "torque", None, unit_of(model, j)) for j, name in known]
 
     def unit(self, name: str) -> str:
         of_position = name.removeprefix("position of joint ")

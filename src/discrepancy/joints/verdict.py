@@ -16,7 +16,7 @@ from discrepancy.evidence.findings import Event, Finding, Member, Verdict, with_
 from discrepancy.evidence.judge import Judge
 from discrepancy.evidence.parts import Values
 from discrepancy.evidence.posterior import Group
-from discrepancy.evidence.probability import odds_of, without_unfounded
+from discrepancy.evidence.probability import Odds, odds_of, without_unfounded
 from discrepancy.evidence.search import Chosen, Until
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.formulas.law import Law
@@ -62,6 +62,7 @@ class JointVerdict(Verdict):
     Attributes:
         model: the robot as described.
         parts: signals of the trials, which are whole logs or parts of one.
+        measured: joints whose torques are known in all logs, from 0.
         motors: torque per unit of input of drives without torque readings.
         predictions: one for each trial, predicted from the others. A single trial is predicted from itself.
         by_the_others: returns, for the index of a trial, the findings fitted to the other trials, without events.
@@ -69,6 +70,7 @@ class JointVerdict(Verdict):
 
     model: SerialModel
     parts: Sequence[Signals]
+    measured: tuple[int, ...]
     motors: tuple[Motor, ...]
     predictions: tuple[Prediction, ...]
     by_the_others: Callable[[int], tuple[Finding, ...]]
@@ -143,13 +145,14 @@ class _JointJudge(Judge):
         more = (*at_limits(self.model, self.trials.limited), *resting(logs), *self._notes())
         verdict = JointVerdict(
             **self.told(),
-            trials=self.trials.names,
+            trials=self.trials.names[: self._changed],
             reference=self.trials.names[self._changed :],
             notes=(*notes, *more),
             finished=self.finished,
             traces=self.traces,
             model=self.model,
             parts=self.trials.signals,
+            measured=tuple(map(int, self.trials.joints)),
             motors=self.trials.motors,
             predictions=tuple(self._predicted([o.chosen for o in self.named])),
             by_the_others=self.by_the_others,
@@ -160,6 +163,10 @@ class _JointJudge(Judge):
     def _changed(self) -> int:
         runs = [k for k, _ in self.trials.parts]
         return sum(k < self.trials.changed for k in runs)
+
+    @property
+    def validated(self) -> bool:
+        return self._changed > 1  # the reference says nothing of what has changed
 
     # --- groups
 
@@ -240,11 +247,13 @@ class _JointJudge(Judge):
         return tuple(f for o in named for f in self.findings(o, values))
 
     def _predicted(self, kept: Sequence[Chosen]) -> Iterator[Prediction]:
-        both, parts = (self.prior((), tolerated=False), self.prior(kept)), self.parts
+        """Torques of each trial without and with the findings; what the reference has, too, is in both."""
+        parts, alone = self.parts, self.parts.count > self._changed == 1
+        both = self.prior((), tolerated=parts.count > self._changed), self.prior(kept)
         for t, name in enumerate(self.trials.names[: self._changed]):
             sides, chi2 = [], []
             for prior in both:
-                x = parts.predicted(prior, t)
+                x = parts.mean(prior) if alone else parts.predicted(prior, t)
                 sides.append(self._wide(np.sqrt(np.mean(self.series[t].left(x) ** 2, axis=0))))
                 chi2.append(float(parts.left(x, t) / parts.rows[t].sum()))
             own = self.trials.signals[t].torque
@@ -280,6 +289,7 @@ class _JointJudge(Judge):
     def traces(self) -> list[Trace]:
         """Residuals of each part, as modelled and with everything that was found."""
         x = self.state.posterior.mean[self.parts.active]
+        each = [self.parts.columns_of(columns) for o in self.named for columns in self._columns(o)]
         out = []
         for t, name in enumerate(self.trials.names[: self._changed]):
             own, s, sigma = self.series[t], self.trials.signals[t], self._noise(t)
@@ -289,18 +299,17 @@ class _JointJudge(Judge):
             for j in range(s.q.shape[1]):
                 quantities[f"position of joint {j + 1}"] = np.interp(time, s.time, s.q[:, j])
             wide = np.broadcast_to(sigma, before.shape)
-            out.append(
-                Trace(
-                    name,
-                    time,
-                    len(time),
-                    own.rate_hz,
-                    before,
-                    after,
-                    wide,
-                    before / sigma,
-                    after / sigma,
-                    quantities,
-                )
-            )
+            causes = tuple(own.columns[:, :, at] @ x[at] * own.unit for at in each)
+            white = before / sigma, after / sigma
+            measured = own.measured * own.unit
+            each_row = name, time, len(time), own.rate_hz, before, after, wide, *white, quantities
+            out.append(Trace(*each_row, measured, causes))
         return out
+
+    def _columns(self, o: Odds) -> Iterator[list[int]]:
+        """Columns of each finding of a cause; of a cause of all joints at one joint, those of that joint."""
+        c, found = o.chosen.group, self.findings(o)
+        known = [self.model.joints[j] for j in self.trials.joints]
+        of = {} if found[0].place == c.place or not c.members else dict(zip(known, c.members, strict=True))
+        for f in found:
+            yield [*of[f.place]] if f.place in of else [*c.columns, *o.chosen.forms]

@@ -267,7 +267,7 @@ def _advice(values: Values, *, verbose: bool) -> Iterable[str]:
         what = (
             "position and load the torques part" if is_of_joints(values) else "place and load the rows part"
         )
-        yield f"The pictures that --out writes show at which speed, {what}."
+        yield f"The page that `mocobot report` makes of the folder of --out shows at which speed, {what}."
 
 
 def _lower(text: str) -> str:

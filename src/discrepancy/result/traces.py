@@ -7,12 +7,15 @@ before<k>, after<k>    physical residuals without and with the named causes, sha
 sigma<k>               standard deviations of clean data, shape (n, C)
 white_before<k>, white_after<k>   whitened residuals, shape (n, C)
 quantity<k>_<j>        quantity j of trial k, shape (n,)
+measured<k>            measured values, shape (n, C), and
+cause<k>_<i>           contribution of named cause i (from 0), shape (n, C): of a robot of joints only, where the key
+                       ``causes`` of the trial is the number of contributions
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +60,9 @@ class Trace:
         sigma: standard deviations of clean data, shape (n, C).
         white_before, white_after: whitened residuals, shape (n, C), with unit variance for clean data.
         quantities: quantities on which a misfit may depend, shape (n,) each.
+        measured: measured values of which the residuals are a part, shape (n, C); None: not known.
+        causes: what each named cause contributes to them, shape (n, C) each; the remainder of before - after is within
+            the tolerances.
     """
 
     name: str
@@ -69,6 +75,8 @@ class Trace:
     white_before: Array
     white_after: Array
     quantities: dict[str, Array]
+    measured: Array | None = None
+    causes: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -182,6 +190,7 @@ def save_traces(traces: Sequence[Trace], channels: Sequence[Channel], path: Path
         "channels": [asdict(channel) for channel in channels],
         "trials": [
             {"name": t.name, "moving": t.moving, "rate_hz": t.rate_hz, "quantities": list(t.quantities)}
+            | ({} if t.measured is None else {"causes": len(t.causes)})
             for t in traces
         ],
     }
@@ -190,6 +199,9 @@ def save_traces(traces: Sequence[Trace], channels: Sequence[Channel], path: Path
         arrays[f"time{k}"] = np.asarray(trace.time, dtype=float)
         tables = {f"{name}{k}": getattr(trace, name) for name in TABLES}
         tables |= {f"quantity{k}_{j}": values for j, values in enumerate(trace.quantities.values())}
+        if trace.measured is not None:
+            tables |= {f"measured{k}": trace.measured}
+            tables |= {f"cause{k}_{i}": values for i, values in enumerate(trace.causes)}
         arrays |= {name: np.asarray(values, dtype=np.float32) for name, values in tables.items()}
     with system_errors(path):
         write_archive(path, facts, arrays, compress=True)
@@ -228,11 +240,21 @@ def _trace(entry: Mapping[str, Any], k: int, channels: int, arrays: Mapping[str,
         raise ValueError(f"moving is {moving!r:.40} in trial {k + 1}; it must be a number of its {n} rows")
     if not isinstance(rate_hz, int | float) or not 0 < rate_hz < np.inf:
         raise ValueError(f"rate_hz is {rate_hz!r:.40} in trial {k + 1}; it must be positive")
-    tables = {name: _numbers(arrays, f"{name}{k}", (n, channels)) for name in TABLES}
+    tables: dict[str, Any] = {name: _numbers(arrays, f"{name}{k}", (n, channels)) for name in TABLES}
     quantities = {
         str(name): _numbers(arrays, f"quantity{k}_{j}", (n,)) for j, name in enumerate(entry["quantities"])
     }
-    return Trace(str(entry["name"]), time, moving, float(rate_hz), quantities=quantities, **tables)
+    found = Trace(str(entry["name"]), time, moving, float(rate_hz), quantities=quantities, **tables)
+    count = entry.get("causes")
+    if count is None:
+        return found
+    if type(count) is not int or count < 0:
+        raise ValueError(f"causes is {count!r:.40} in trial {k + 1}; it must be a number of causes")
+    measured, *causes = (
+        _numbers(arrays, name, (n, channels))
+        for name in (f"measured{k}", *(f"cause{k}_{i}" for i in range(count)))
+    )
+    return replace(found, measured=measured, causes=tuple(causes))
 
 
 def _numbers(arrays: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...]) -> Array:

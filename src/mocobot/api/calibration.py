@@ -34,7 +34,8 @@ from estimator.files import write_json, write_text
 from estimator.recording.model import Recording
 from mocobot.api.recordings import Given, Say, calibration_of, quiet, recordings_of
 from mocobot.checks import CALIBRATION
-from mocobot.options import CalibrateOptions, made
+from mocobot.option_types import made
+from mocobot.options import CalibrateOptions
 from mocobot.results import Folder, public
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from estimator.arm.design import load_design
 from estimator.files import write_text
 from mocobot.api.recordings import quiet
-from mocobot.options import ConvertOptions, MapOptions, made
+from mocobot.option_types import made
+from mocobot.options import ConvertOptions, MapOptions
 from mocobot.results import public
 from mocobot_logs import convert as below
 from mocobot_logs.convert_report import conversion_dict, format_conversion, format_omissions
@@ -181,7 +182,8 @@ def map(
 
     Args:
         log: log in any format that ``convert`` reads.
-        model: model of a single robot whose joints were logged, or path of its file; None for a team.
+        model: model of a single robot whose joints were logged, or path of its file. Without it, the log tells whether
+            it is of a team or of one robot's joints.
         options: options of the draft; ``fields`` replace its fields.
 
     Raises:
@@ -190,10 +192,11 @@ def map(
     chosen = made(MapOptions, options, fields)
     chosen.check_part(model)
     if model is None:
-        from mocobot_logs.draft import draft_of
+        from mocobot_logs.draft_kind import draft_any
 
-        draft = draft_of(Path(log), chosen.episode)
-        return MapDraft(draft.text, _count(draft.robots, "robot"), draft.doubtful, draft.missing)
+        draft, joints = draft_any(Path(log), chosen.episode)
+        of = _count(draft.robots, "robot") if joints is None else _count(joints, "joint")
+        return MapDraft(draft.text, of, draft.doubtful, draft.missing)
     from mocobot.api.joints import read_model
     from mocobot_logs.draft_joints import draft_joint_map
 

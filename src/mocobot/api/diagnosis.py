@@ -16,7 +16,8 @@ from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.told import TeamDiagnosed
 from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
 from mocobot.cluster import workers_of
-from mocobot.options import DiagnoseOptions, made
+from mocobot.option_types import made
+from mocobot.options import DiagnoseOptions
 from mocobot.results import Folder
 from mocobot_sim.trial.truth import GroundTruth
 

@@ -13,7 +13,8 @@ from estimator.files import write_json
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
-from mocobot.options import EstimateOptions, made
+from mocobot.option_types import made
+from mocobot.options import EstimateOptions
 from mocobot.results import public
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from estimator.arm.design import load_design
 from estimator.files import write_json
 from mocobot.api.recordings import Robots, quiet
-from mocobot.options import InspectOptions, made
+from mocobot.option_types import made
+from mocobot.options import InspectOptions
 from mocobot.results import public
 from mocobot_inspect import joints, team
 from mocobot_inspect.findings import Finding, findings

@@ -94,8 +94,8 @@ def map_path(model: SerialModel, log: Path, given: Path | str | None) -> Path:
         if beside.is_file():
             return beside
     raise InputError(
-        f"{log}: no map was given (--map), and there is no {MAP} beside it or beside {model.path}; `mocobot map "
-        f"{shlex.quote(str(log))} --model {shlex.quote(str(model.path))}` drafts one"
+        f"{log}: no map was given (--map), and there is no {MAP} beside it or beside {model.path}; draft one with "
+        + shlex.join(["mocobot", "map", *map(str, (log, "--model", model.path, "--out", log.parent / MAP))])
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discrepancy.result.read import read_diagnosis
+from discrepancy.result.traces import NAME as RESIDUALS
+from discrepancy.result.traces import Trace, load_traces
 from estimator.arm.unit import seen_by_encoders
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
@@ -17,7 +20,8 @@ from estimator.files import check_target
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from mocobot.api.recordings import Given, Robots, Say, quiet, read
-from mocobot.options import ReplayOptions, made
+from mocobot.option_types import made
+from mocobot.options import ReplayOptions
 from mocobot_sim.scene.as_built import theta_x_zeros
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.payload import BodyFacts, Grasps, read_estimate, read_truth
@@ -118,11 +122,39 @@ def _joint_replays(
     from mocobot_view.joint_replay import joint_replay
 
     robot, replays = read_model(model, lock=chosen.lock, base=chosen.base), []
+    traces, columns = [], []
+    if chosen.diagnosis is not None:
+        traces, columns = _torques(Path(chosen.diagnosis), robot.joints)
     for log, name in zip(logs, names, strict=True):
         parts = read_logs(log, robot, map=chosen.map, episode=chosen.episode)
+        stem = re.escape(Path(parts[0].name).stem)
+        own = [trace for trace in traces if re.fullmatch(rf"{stem}( [\d.]+-[\d.]+ s)?", trace.name)]
+        if chosen.diagnosis is not None and (not own or len(own) < len(parts)):
+            known = ", ".join(dict.fromkeys(trace.name for trace in traces))
+            raise InputError(
+                f"{chosen.diagnosis}: is a diagnosis of {known}, not of {log}; leave --diagnosis out"
+            )
         for number, part in enumerate(parts, 1):
-            replays.append(joint_replay(robot, part, f"{name}-part{number}" if len(parts) > 1 else name))
+            found = own if len(parts) == 1 else own[number - 1 : number]
+            shown = f"{name}-part{number}" if len(parts) > 1 else name
+            replays.append(joint_replay(robot, part, shown, found, columns))
     return replays
+
+
+def _torques(path: Path, joints: tuple[str, ...]) -> tuple[list[Trace], list[int]]:
+    """Read the residuals of a diagnosis with measured torques, and the joint of each of their channels, from 0."""
+    folder = path.parent if path.suffix == ".json" else path
+    if not read_diagnosis(path).of_joints:
+        raise InputError(f"{path}: is a diagnosis of a team; with a model it must be of a robot of joints")
+    traces, channels = load_traces(folder / RESIDUALS)
+    names = [channel.name.removesuffix(" torque") for channel in channels]
+    if not set(names) <= set(joints):
+        raise InputError(
+            f"{path}: is of a robot with the joints {', '.join(names)}; the model's are {', '.join(joints)}"
+        )
+    if any(trace.measured is None for trace in traces):
+        raise InputError(f"{path}: is of an earlier version, without torques over time; diagnose again")
+    return traces, [joints.index(name) for name in names]
 
 
 def _log(

@@ -10,7 +10,8 @@ from estimator.errors import InputError
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot.options import SimulateOptions, made
+from mocobot.option_types import made
+from mocobot.options import SimulateOptions
 from mocobot.results import public
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects.base import Effect

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from estimator.arm.unit import AT, frames_said
 from estimator.calibrate.text import SHOWN, shown_groups
@@ -21,12 +21,17 @@ from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
 from mocobot.api.recordings import Say, quiet, read
+from mocobot.api.watch_joints import logs_in, look_at_joints, verdict_line
 from mocobot.checks import CALIBRATION
-from mocobot.options import WatchOptions, made
+from mocobot.option_types import made
+from mocobot.options import WatchOptions
 from mocobot.results import Folder
 from mocobot_logs.formats import is_recording, log_kind
 from mocobot_report import NAME
 from mocobot_report.page import write_report
+
+if TYPE_CHECKING:
+    from mocobot.api.joints import GivenModel
 
 BEYOND, MOST = 3.0, 3
 """Threshold [prior standard deviations] above which the summary names a deviation, and largest number of names.
@@ -43,6 +48,7 @@ class Watched(Folder):
         recordings: usable recordings by the name of their file.
         converted: names of recordings that were converted from logs, or whose clocks were corrected.
         estimate, calibration, diagnosis: results of each stage, or None; ``lines`` state why a stage failed.
+        of_joints: whether the logs are of a single robot's joints, of which only a diagnosis is made.
     """
 
     lines: list[str] = field(default_factory=list)
@@ -51,6 +57,7 @@ class Watched(Folder):
     estimate: Estimate | None = None
     calibration: Calibration | None = None
     diagnosis: Diagnosis | None = None
+    of_joints: bool = False
     result = "watch"
 
     def of(self, *, free: bool) -> list[Recording]:
@@ -59,9 +66,9 @@ class Watched(Folder):
 
     @property
     def good(self) -> bool:
-        """Whether there is an estimate, and the verdict is ``"consistent"`` or ``"explained"``."""
+        """Whether the verdict is ``"consistent"`` or ``"explained"``, and a team has an estimate."""
         verdict = self.diagnosis and self.diagnosis.verdict
-        return self.estimate is not None and verdict in ("consistent", "explained")
+        return (self.of_joints or self.estimate is not None) and verdict in ("consistent", "explained")
 
     def __str__(self) -> str:
         """Return the overall verdict."""
@@ -120,6 +127,8 @@ def watch(
     logs: Path | str | Iterable[Path | str],
     options: WatchOptions | None = None,
     *,
+    model: GivenModel | None = None,
+    reference: Path | str | Iterable[Path | str] = (),
     say: Say = quiet,
     simulated: Callable[[int], object] | None = None,
     **fields: Any,
@@ -127,19 +136,32 @@ def watch(
     """Analyse recordings or logs in one run: inspect, convert, estimate, calibrate if needed, and diagnose.
 
     Args:
-        logs: files of recordings, or logs in any format that ``convert`` reads, all of one payload.
+        logs: files of recordings, or logs in any format that ``convert`` reads, all of one payload; with a model, logs
+            of its joints or folders of them, which are inspected and diagnosed.
         options: options of the run; ``fields`` replace its fields.
+        model: single robot whose joints were logged, or path of its file; None for a team.
+        reference: with a model, logs of the same robot when it was healthy, as for ``diagnose``.
         say: called with the name of each stage that begins.
         simulated: called with 1 after every simulated trial.
 
     Raises:
-        InputError: a log cannot be read.
+        InputError: a log cannot be read, or a folder holds none.
     """
-    chosen, seen = made(WatchOptions, options, fields), Watched()
-    for path in [logs] if isinstance(logs, Path | str) else logs:
-        _look(seen, Path(path), chosen, say)
+    chosen, seen = made(WatchOptions, options, fields), Watched(of_joints=model is not None)
+    paths = [Path(path) for path in _each(logs)]
+    if model is not None:
+        healthy = [Path(path) for path in _each(reference)]
+        found = logs_in(paths, healthy)
+        seen.lines, seen.diagnosis = look_at_joints(found, model, healthy, chosen, say)
+        return seen
+    for path in paths:
+        _look(seen, path, chosen, say)
     _conclude(seen, chosen.jobs, say, simulated)
     return seen
+
+
+def _each(paths: Path | str | Iterable[Path | str]) -> Iterable[Path | str]:
+    return [paths] if isinstance(paths, Path | str) else paths
 
 
 def _look(seen: Watched, path: Path, chosen: WatchOptions, say: Say) -> None:
@@ -212,10 +234,7 @@ def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], obj
     except InputError as error:
         seen.lines.append(f"No diagnosis: {error}.")
         return
-    named = [cause.sentence for cause in seen.diagnosis.causes]
-    verdict = seen.diagnosis.verdict.replace("_", " ").upper()
-    rest = seen.diagnosis.to_dict()["remains"]
-    seen.lines.append(" ".join([f"Against the simulation: {verdict}.", *named, *rest]))
+    seen.lines.append(verdict_line(seen.diagnosis, "the simulation"))
 
 
 def payload_line(found: Estimate) -> str:

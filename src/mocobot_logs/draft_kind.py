@@ -1,0 +1,128 @@
+"""Draft the map of a log of unknown kind: of a team if the log has a team's channels, else of one robot's joints."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from mocobot_logs.draft import (
+    _MOTOR,
+    _WORDS,
+    DOUBTFUL,
+    Draft,
+    _joint_columns,
+    _opened,
+    _quantity,
+    draft_joint_map,
+    draft_of,
+)
+from mocobot_logs.draft_names import TOKEN, UNITS
+from mocobot_logs.formats import log_kind
+from mocobot_logs.table.table import Table
+
+_MEASURED = {"act", "actual", "feedback", "meas", "measured", "present"}
+_NO_NAMES = set.union(*_WORDS.values()) | _MOTOR | _MEASURED | set(UNITS)
+"""Words of a column's name that are not part of the joint's name."""
+_JOINT = {"joint", "axis"}
+"""Words that belong to a joint's name if they stand beside it, as in ``joint_1`` and ``elbow_joint``."""
+_WITHIN = _JOINT | _MOTOR
+"""Words that may stand inside a joint's name, as in ``arm_joint_1``."""
+
+
+def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None]:
+    """Draft the map of a log, of a team or of one robot's joints.
+
+    Args:
+        path: a log of any format, with any names.
+        episode: episode of a LeRobot dataset; may be None if it holds only one.
+
+    Returns:
+        The draft, and the number of joints; None for a team.
+
+    Raises:
+        InputError: there is no such log, or it is damaged.
+    """
+    team = draft_of(path, episode)
+    if not team.missing:
+        return team, None
+    kind = log_kind(path)
+    joints = _joints_of_bag(path) if kind == "bag" else _joints_of_table(_opened(path, kind, episode)[0])
+    if not joints:
+        return team, None
+    drafted = draft_joint_map(path, joints, [False] * len(joints), episode)
+    if kind != "bag":  # a joint state has the model's names
+        said = f"# {DOUBTFUL}named after the log; the model's names must stand here, and --model ROBOT fills them in"
+        text = drafted.text.replace("\njoints = ", f"\n{said}\njoints = ", 1)
+        drafted = replace(drafted, text=text, doubtful=drafted.doubtful + 1)
+    return drafted, len(joints)
+
+
+def _joints_of_bag(path: Path) -> list[str]:
+    """Return the joints of the joint state with most of them."""
+    from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
+    from mocobot_logs.bag.files import BagFiles
+    from mocobot_logs.bag.read import Look
+
+    files = BagFiles(path)
+    look = Look(str(path), files)
+    topics = [topic for topic, told in files.topics.items() if type_name(told) == JOINT_STATE]
+    return max((list(look.joints(topic)) for topic in topics), key=len, default=[])
+
+
+def _joints_of_table(table: Table) -> list[str]:
+    """Return the joints that have a position and a torque, current, command or duty; empty if there are none."""
+    scalar = [n for n in [*table.aliases, *table.shapes] if table.shapes.get(n, ()) in ((), (1,))]
+    names = [name for name in dict.fromkeys(scalar) if _quantity(name)]
+    telling = [{token[0].lower() for _, token in _left(name)} for name in names]
+    shared = set.intersection(*telling) if names[1:] else set()
+    quantities: dict[str, set[str]] = {}
+    for name in names:
+        if (joint := _joint_in(name, shared)) is not None:
+            quantities.setdefault(joint, set()).add(_quantity(name) or "")
+    named = [joint for joint, known in quantities.items() if _is_driven(known)]
+    if all(map(str.isdigit, named)):
+        named = [f"joint_{k + 1}" for k in range(len(named))]
+    for each in (named, *_joints_of_arrays(table), ["joint_1"]):
+        if each and _is_driven(set(_joint_columns(table, each, table.time_column)[0])):
+            return each
+    return []
+
+
+def _joints_of_arrays(table: Table) -> Iterator[list[str]]:
+    for name, shape in table.shapes.items():
+        if len(shape) == 1 and shape[0] > 1 and _quantity(name) in ("q", "motor_position"):
+            yield [f"joint_{k + 1}" for k in range(shape[0])]
+
+
+def _is_driven(quantities: set[str]) -> bool:
+    efforts = {"torque", "motor_torque", "current", "command", "motor_command", "duty"}
+    return bool(quantities & {"q", "motor_position"} and quantities & efforts)
+
+
+def _left(name: str) -> list[tuple[int, re.Match[str]]]:
+    """Return those tokens of a column's name, with their numbers, that may be of the joint's name."""
+    plain = re.sub(r"\[.*?\]|\(.*?\)", lambda found: " " * len(found[0]), name)
+    return [(k, t) for k, t in enumerate(TOKEN.finditer(plain)) if t[0].lower() not in _NO_NAMES]
+
+
+def _joint_in(name: str, shared: Collection[str]) -> str | None:
+    """Return the part of a column's name that names a joint or its number; None if there is none.
+
+    Args:
+        name: name of the column.
+        shared: words that all columns have.
+    """
+    tokens = list(TOKEN.finditer(name))
+    left = [k for k, token in _left(name) if token[0].lower() not in shared]
+    if not left:
+        return None
+    first, last = left[0], left[-1]
+    if {tokens[k][0].lower() for k in range(first, last) if k not in left} - _WITHIN:
+        return None
+    while first and tokens[first - 1][0].lower() in _JOINT:
+        first -= 1
+    while last + 1 < len(tokens) and tokens[last + 1][0].lower() in _JOINT:
+        last += 1
+    return name[tokens[first].start() : tokens[last].end()]
