@@ -199,6 +199,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.pictures
 def test_paper_json(folder: Path) -> None:
     scores = json.loads((folder / "paper.json").read_text())
     assert list(scores) == ["nominal", "nominal, one fit"]
