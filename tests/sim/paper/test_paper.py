@@ -59,8 +59,8 @@ PAIRS = ("12", "23", "31")
 MOMENTS = ("Ixx", "Iyy", "Izz")
 
 
-LESS = {"vias": 15, "duration_s": 10.0}
-"""A sixth of the paper's motion; errors grow by its root, and the bars below do not move."""
+LESS = {"vias": 8, "duration_s": 6.0}
+"""A tenth of the paper's motion; errors grow by its root, and the bars below do not move."""
 
 
 @pytest.fixture(scope="module")
