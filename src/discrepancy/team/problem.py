@@ -317,7 +317,7 @@ class TeamProblem:
         Q, scales = b - U.T @ z, 0.5 ** np.arange(octaves)
         value, widths = np.empty((len(spans), octaves)), np.array([len(g.slab) for g in listed.groups])
         for width in np.unique(widths):  # all groups of one width at once: thousands of small matrices
-            alike = np.flatnonzero(widths == width)
+            alike = np.flatnonzero(widths == width).tolist()
             B = np.array([listed.groups[i].slab for i in alike])[:, None] * scales[:, None]
             each = [squares[i] - U[:, k].T @ U[:, k] for i in alike for k in [spans[i]]]
             w, V = np.linalg.eigh(B[..., None] * np.array(each)[:, None] * B[..., None, :])
