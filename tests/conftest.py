@@ -13,6 +13,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from diagnose_run import BIAS_NM, Edit
 from estimator.recording.parquet import write_recording
@@ -35,6 +37,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_configure() -> None:
     """Looks for garbage are rare: they took a twentieth of all time and found next to nothing."""
     gc.set_threshold(20_000, 20, 20)
+
+
+BLANK = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108000000003a7e9b55"
+    "0000000a49444154789c636000000002000148afa4710000000049454e44ae426082"
+)
+"""A picture of one pixel."""
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Plots are rendered where a test is about them: four seconds a diagnosis. Elsewhere their files are blank."""
+    rendered = item.get_closest_marker("pictures") is not None
+    FigureCanvasAgg.print_png = RENDER[0] if rendered else _blank
+    Figure.savefig = RENDER[1] if rendered else _blank
+
+
+RENDER = FigureCanvasAgg.print_png, Figure.savefig
+
+
+def _blank(self: object, path: str | Path, **options: object) -> None:
+    Path(path).write_bytes(BLANK)
 
 
 def pytest_collection_finish() -> None:

@@ -45,7 +45,7 @@ from mocobot_logs.units import COUNTS, FACTORS
 if TYPE_CHECKING:
     from mocobot_logs.bag.read import Look
 
-_WORDS: dict[str, set[str]] = {
+WORDS: dict[str, set[str]] = {
     "enabled": {"enable", "enabled"},
     "command": {
         "cmd", "command", "commanded", "goal", "target", "ref", "reference", "desired", "des", "action", "setpoint"
@@ -58,7 +58,7 @@ _WORDS: dict[str, set[str]] = {
     "q": {"q", "pos", "position", "angle", "joint", "state", "ang"},
 }  # fmt: skip
 """Words that identify a quantity, most specific first."""
-_MOTOR = {"motor", "drive", "actuator", "rotor"}
+MOTOR = {"motor", "drive", "actuator", "rotor"}
 _AT_MOTOR = {
     "q": "motor_position",
     "dq": "motor_velocity",
@@ -124,7 +124,7 @@ def draft_joint_map(
         table, candidates, csv = opened_table(path, kind, episode)
         time, doubts, lost = [*time_lines(table, candidates, Robots((), "")), *csv], [], []
         clock = tomllib.loads("\n".join(time)).get("time", {})
-        places, unused = _in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
+        places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
     found = _sections(places, slides, [*doubts, *(f"{joint} is in no message" for joint in lost)])
     lines, missing = found
     text = "\n".join([*head, *time, "[channels]", *lines, *unused_lines(unused)]) + "\n"
@@ -192,7 +192,7 @@ def _own_lines(places: Mapping[str, _Place]) -> list[str]:
     return lines
 
 
-def _in_table(
+def in_table(
     table: Table, joints: Sequence[str], time: set[str | None]
 ) -> tuple[dict[str, _Place], list[str]]:
     """Return places by quantity, and the unused columns; ``time`` are the columns of time."""
@@ -210,8 +210,7 @@ def _in_table(
         shared = "{" not in template and len(joints) > 1
         if not shared and len(of) < len(joints):
             continue
-        meaning = column_meaning(template)
-        quantity, rank = _quantity(template) if meaning is None else (meaning.quantity, 0)
+        quantity, rank, meaning = quantity_in(template)
         if quantity is not None and QUANTITIES[quantity].shared == (
             shared or quantity in ("supply", "enabled")
         ):
@@ -252,14 +251,20 @@ def _joint_templates(name: str, joints: Sequence[str]) -> Iterator[tuple[str, in
     yield name, 0
 
 
-def _quantity(name: str) -> tuple[str | None, int]:
-    """Return the quantity that a name states, or None, and a rank: 1, or 2 if the words are weak."""
+def quantity_in(name: str) -> tuple[str | None, int, Meaning | None]:
+    """Return the quantity that a name states, or None, a rank, and the meaning if the name is well known.
+
+    The rank is 0 for well-known names, and 2 if the words are weak.
+    """
+    meaning = column_meaning(name)
+    if meaning is not None:
+        return meaning.quantity, 0, meaning
     words = {token.lower() for token in TOKEN.findall(re.sub(r"\{\w+\}|\[.*?\]", " ", name))}
-    for quantity, telling in _WORDS.items():
+    for quantity, telling in WORDS.items():
         if words & telling:
             rank = 1 + (words & telling <= _WEAK)
-            return (_AT_MOTOR.get(quantity, quantity) if words & _MOTOR else quantity), rank
-    return None, 0
+            return _AT_MOTOR.get(quantity, quantity) if words & MOTOR else quantity, rank, None
+    return None, 0, None
 
 
 def _line(name: str, place: _Place, slides: Sequence[bool]) -> str:

@@ -7,27 +7,18 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from mocobot_logs.draft import (
-    _MOTOR,
-    _WORDS,
-    DOUBTFUL,
-    Draft,
-    _joint_columns,
-    _opened,
-    _quantity,
-    draft_joint_map,
-    draft_of,
-)
+from mocobot_logs.draft import DOUBTFUL, Draft, draft_of, opened_table
+from mocobot_logs.draft_joints import MOTOR, WORDS, draft_joint_map, in_table, quantity_in
 from mocobot_logs.draft_names import TOKEN, UNITS
 from mocobot_logs.formats import log_kind
 from mocobot_logs.table.table import Table
 
 _MEASURED = {"act", "actual", "feedback", "meas", "measured", "present"}
-_NO_NAMES = set.union(*_WORDS.values()) | _MOTOR | _MEASURED | set(UNITS)
+_NO_NAMES = set.union(*WORDS.values()) | MOTOR | _MEASURED | set(UNITS)
 """Words of a column's name that are not part of the joint's name."""
 _JOINT = {"joint", "axis"}
 """Words that belong to a joint's name if they stand beside it, as in ``joint_1`` and ``elbow_joint``."""
-_WITHIN = _JOINT | _MOTOR
+_WITHIN = _JOINT | MOTOR
 """Words that may stand inside a joint's name, as in ``arm_joint_1``."""
 
 
@@ -48,7 +39,7 @@ def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None
     if not team.missing:
         return team, None
     kind = log_kind(path)
-    joints = _joints_of_bag(path) if kind == "bag" else _joints_of_table(_opened(path, kind, episode)[0])
+    joints = _joints_of_bag(path) if kind == "bag" else _joints_of_table(opened_table(path, kind, episode)[0])
     if not joints:
         return team, None
     drafted = draft_joint_map(path, joints, [False] * len(joints), episode)
@@ -74,25 +65,25 @@ def _joints_of_bag(path: Path) -> list[str]:
 def _joints_of_table(table: Table) -> list[str]:
     """Return the joints that have a position and a torque, current, command or duty; empty if there are none."""
     scalar = [n for n in [*table.aliases, *table.shapes] if table.shapes.get(n, ()) in ((), (1,))]
-    names = [name for name in dict.fromkeys(scalar) if _quantity(name)]
+    names = [name for name in dict.fromkeys(scalar) if quantity_in(name)[0]]
     telling = [{token[0].lower() for _, token in _left(name)} for name in names]
     shared = set.intersection(*telling) if names[1:] else set()
     quantities: dict[str, set[str]] = {}
     for name in names:
         if (joint := _joint_in(name, shared)) is not None:
-            quantities.setdefault(joint, set()).add(_quantity(name) or "")
+            quantities.setdefault(joint, set()).add(quantity_in(name)[0] or "")
     named = [joint for joint, known in quantities.items() if _is_driven(known)]
     if all(map(str.isdigit, named)):
         named = [f"joint_{k + 1}" for k in range(len(named))]
     for each in (named, *_joints_of_arrays(table), ["joint_1"]):
-        if each and _is_driven(set(_joint_columns(table, each, table.time_column)[0])):
+        if each and _is_driven(set(in_table(table, each, {table.time_column})[0])):
             return each
     return []
 
 
 def _joints_of_arrays(table: Table) -> Iterator[list[str]]:
     for name, shape in table.shapes.items():
-        if len(shape) == 1 and shape[0] > 1 and _quantity(name) in ("q", "motor_position"):
+        if len(shape) == 1 and shape[0] > 1 and quantity_in(name)[0] in ("q", "motor_position"):
             yield [f"joint_{k + 1}" for k in range(shape[0])]
 
 

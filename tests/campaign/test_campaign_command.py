@@ -411,6 +411,7 @@ def test_summary_is_plain_and_text_fits(summary):
     assert "2 of 3 (9 to 99 %)" in text
 
 
+@pytest.mark.pictures
 def test_pictures(summary, tmp_path):
     names = [path.name for path in save_campaign(summary, tmp_path)]
     assert names == ["limits.png", "found.png", "confusion.png", "reliability.png"]

@@ -53,6 +53,7 @@ def calibrated(trials, tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.pictures
 def test_a_team_out_of_the_box_is_found(calibrated, trials):
     found = mocobot.read_calibration(calibrated)
     truth = json.loads(trials[0].with_suffix(".truth.json").read_text(encoding="utf-8"))

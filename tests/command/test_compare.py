@@ -110,6 +110,7 @@ def estimates(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.pictures
 def test_two_estimates_of_one_payload(estimates, tmp_path, capsys):
     out = tmp_path / "ab"
     code, said, _ = run(

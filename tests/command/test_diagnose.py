@@ -27,6 +27,7 @@ from mocobot_sim.extended.extended import load_extended
 
 
 @pytest.mark.slow
+@pytest.mark.pictures
 def test_hidden_bias_is_named_extended_and_written(biased_trials, tmp_path, capsys):
     out = tmp_path / "verdict"
     out.mkdir()  # an empty folder may be used

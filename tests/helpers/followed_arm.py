@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -36,6 +37,7 @@ def arm_model(folder: Path, given: Change = lambda spec: None) -> SerialModel:
     return load_model(path)
 
 
+@cache
 def arm_log(true: Change, seed: int, besides: Torque | None = None, dry: Torque | None = None) -> JointLog:
     """A log of the arm with some changes, torques besides those of the drives, and dry friction besides MuJoCo's."""
     rng = np.random.default_rng(seed)

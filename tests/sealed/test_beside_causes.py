@@ -1,17 +1,21 @@
 """A strong cause and robots that nobody calibrated are told apart: against what was simulated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from discrepancy.team.diagnosis import diagnose_team
 from estimator.arm.unit import AT
+from hidden import Schedule
 from sealed.sets import generate, plan
 
 
 @pytest.mark.slow
 def test_a_tether_of_the_payload_of_an_uncalibrated_team_is_as_near_as_its_errors_say():
     """Linear where the team is found without it, its pull down is 7 errors off, and all links are 1 % short."""
-    recordings, truth = generate(plan("single", 176007))
+    one = Schedule(randoms=1, periodic_s=None, hold_s=None)
+    recordings, truth = generate(replace(plan("single", 176007), schedule=one))
     (hidden,) = truth["effects"]
     assert hidden["cause"] == "payload_tether"
     found = diagnose_team(recordings, closed_loop=False)

@@ -282,7 +282,7 @@ def test_gimbal_friction_is_found_with_coarse_encoders(seed, size, tmp_path):
     """Of 14 and 16 bits whose readings scatter; the parallel axis of another robot moves alike."""
     import mocobot
 
-    recordings, _ = generate(seed, "x1", [("gimbal_friction", size)], "b", noise="white")
+    recordings, _ = generate(seed, "x1", [("gimbal_friction", size)], "b", noise="white", kinds=PAIR[::-1])
     files = [tmp_path / f"trial{k}.parquet" for k in range(len(recordings))]
     for recording, file in zip(recordings, files, strict=True):
         write_recording(recording, file)
@@ -298,7 +298,7 @@ def test_a_strong_tether_is_found_beside_robots_that_nobody_calibrated(tmp_path)
     """What it pulls is taken for scales of springs as long as it is unknown, the more so with every linearisation."""
     import mocobot
 
-    recordings, truth = generate(3009, "uncalibrated", [("tether", 3.0)], "b", noise="white")
+    recordings, truth = generate(3009, "uncalibrated", [("tether", 3.0)], "b", noise="white", kinds=PAIR[1:])
     files = [tmp_path / f"trial{k}.parquet" for k in range(len(recordings))]
     for recording, file in zip(recordings, files, strict=True):
         write_recording(recording, file)

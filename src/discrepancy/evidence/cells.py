@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -41,9 +42,7 @@ class Bands:
 
     def faded(self, x: Array, trial: int) -> Array:
         """Fade a series of a trial in from zero and out to zero."""
-        place = np.arange(len(x)) + 0.5
-        near = np.minimum(place, place[::-1]) / max(self.fade_s * self.rates_hz[trial], 0.5)
-        return (x.T * np.sin(0.5 * np.pi * np.minimum(near, 1.0)) ** 2).T
+        return (x.T * _fade(len(x), max(self.fade_s * self.rates_hz[trial], 0.5))).T
 
     def of_trial(self, trial: int) -> NDArray[np.intp]:
         """Band of each coefficient that is a row, shape (n,)."""
@@ -58,6 +57,13 @@ class Bands:
             own = x * self.kept[t][:, channel] if self.kept else x
             out.append(dct(self.faded(own, t), norm="ortho")[: len(self.of_trial(t))])
         return np.concatenate(out)
+
+
+@lru_cache(maxsize=64)  # thousands of series are as long as one another
+def _fade(count: int, samples: float) -> Array:
+    """Weights that rise from zero within a number of samples and fall to zero at the end, shape (count,)."""
+    place = np.arange(count) + 0.5
+    return np.asarray(np.sin(0.5 * np.pi * np.minimum(np.minimum(place, place[::-1]) / samples, 1.0)) ** 2)
 
 
 @dataclass(eq=False)
@@ -214,7 +220,8 @@ class Cells:
         for channel, own in zip(self.channels, variance, strict=True):
             weight = 1.0 / own
             at = channel.columns
-            G[np.ix_(at, at)] += np.tensordot(weight, channel.grams, 1)
+            flat = channel.grams.reshape(len(weight), -1)
+            G[at[:, None], at] += np.dot(weight[None], flat).reshape(channel.grams.shape[1:])
             b[at] += weight @ channel.products
             yy += float(weight @ channel.squares)
         return G, b, yy

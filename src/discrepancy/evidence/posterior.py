@@ -89,7 +89,7 @@ class Arrow:
         """Factor I + s G s with column scales s."""
 
         def block(i: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
-            return s[i][:, None] * G[np.ix_(i, k)] * s[k]
+            return s[i][:, None] * G[i[:, None], k] * s[k]
 
         rest = block(last, last)
         own, beside = [], []
@@ -223,7 +223,7 @@ class Posterior:
         for (k, inverse), channel in zip(L.inverses(), self._own.channels, strict=True):
             where[k] = np.arange(len(k))
             pick, scale = where[channel.columns], s[channel.columns]
-            out.append(scale[:, None] * inverse[np.ix_(pick, pick)] * scale)
+            out.append(scale[:, None] * inverse[pick[:, None], pick] * scale)
         return out
 
     @cached_property
@@ -289,9 +289,9 @@ class Posterior:
         With V the added covariance: (1/2) Q' (V^-1 + R)^-1 Q - (1/2) log |1 + V R|.
         """
         R, Q = self._conditional
-        k = list(group.columns)
+        k = np.array(group.columns)
         root, scales = prior_root(group), np.array([0.5**k for k in range(octaves)])
-        size, turn = np.linalg.eigh(root.T @ R[np.ix_(k, k)] @ root)
+        size, turn = np.linalg.eigh(root.T @ R[k[:, None], k] @ root)
         turn = root @ turn
         u, more = turn.T @ Q[k], scales[:, None] ** 2
         gained = more / (1.0 + more * np.maximum(size, 0.0))

@@ -314,18 +314,18 @@ class TeamProblem:
             for square, k in zip(squares, spans, strict=True):
                 square += (X[:, k] * weight).T @ X[:, k]
         U = L.forward(s[:, None] * G)
-        Q, out = b - U.T @ z, np.empty(len(spans))
-        for i, (group, k) in enumerate(zip(listed.groups, spans, strict=True)):
-            R, each = squares[i] - U[:, k].T @ U[:, k], []
-            for scale in 0.5 ** np.arange(octaves):
-                B = np.array(group.slab) * scale
-                w, V = np.linalg.eigh(B[:, None] * R * B)
-                lam = 1.0 + np.maximum(w, 0.0)
-                u = V.T @ (B * Q[k])
-                value = 0.5 * float(np.sum(u**2 / lam - np.log(lam)))
-                each.append(value)
-            out[i] = logsumexp(each) - np.log(octaves) + group.log_prior
-        return out
+        Q, scales = b - U.T @ z, 0.5 ** np.arange(octaves)
+        value, widths = np.empty((len(spans), octaves)), np.array([len(g.slab) for g in listed.groups])
+        for width in np.unique(widths):  # all groups of one width at once: thousands of small matrices
+            alike = np.flatnonzero(widths == width).tolist()
+            B = np.array([listed.groups[i].slab for i in alike])[:, None] * scales[:, None]
+            each = [squares[i] - U[:, k].T @ U[:, k] for i in alike for k in [spans[i]]]
+            w, V = np.linalg.eigh(B[..., None] * np.array(each)[:, None] * B[..., None, :])
+            lam = 1.0 + np.maximum(w, 0.0)
+            u = np.swapaxes(V, -1, -2) @ (B * np.array([Q[spans[i]] for i in alike])[:, None])[..., None]
+            value[alike] = 0.5 * np.sum(u[..., 0] ** 2 / lam - np.log(lam), axis=-1)
+        priors = np.array([g.log_prior for g in listed.groups])
+        return np.asarray(logsumexp(value, axis=1) - np.log(octaves) + priors)
 
     def pushes(self, posterior: Posterior) -> list[Group]:
         """Return the most promising pushes: a constant force and moment on the payload for a limited time."""

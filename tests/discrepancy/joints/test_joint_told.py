@@ -373,7 +373,9 @@ def test_what_helps_nothing_is_not_praised(tmp_path: Path) -> None:
 # --- folder, page, comparison, Python
 
 
-@pytest.mark.parametrize("case", ["several", "consistent", "miscalibrated", "partly"])
+@pytest.mark.parametrize(
+    "case", [pytest.param("several", marks=pytest.mark.pictures), "consistent", "miscalibrated", "partly"]
+)
 def test_the_folder_is_whole_and_read_by_all(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], writes_models: list[Path], case: str
 ) -> None:

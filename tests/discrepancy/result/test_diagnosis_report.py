@@ -278,6 +278,7 @@ def test_whitening_can_be_undone(uneven: bool) -> None:
     assert unwhitened(white, white(draws[0])) == pytest.approx(draws[0], abs=1e-10)
 
 
+@pytest.mark.pictures
 def test_no_closed_loop_no_picture(tmp_path: Path) -> None:
     values = small_diagnosis()
     figure = closed_loop_figure(values)

@@ -131,10 +131,8 @@ def test_a_push_like_half_a_sine_is_a_push() -> None:
     assert force @ along / np.linalg.norm(force) / np.linalg.norm(along) > 0.99
 
 
-@pytest.mark.parametrize("kind", ["clean", "tolerance"])
-def test_nothing_is_named_where_nothing_is_hidden(kind: str) -> None:
-    off = cheaper(draw_background(3, np.random.default_rng(5))) if kind == "tolerance" else []
-    values = verdict(trials("b" if off else "a", *off))
+def test_nothing_is_named_where_all_is_within_its_tolerance() -> None:
+    values = verdict(trials("b", *cheaper(draw_background(3, np.random.default_rng(5)))))
     assert (values["verdict"], values["causes"], values["suspected"]) == ("consistent", [], [])
     assert values["residual"]["chi2_per_n"] < 1.2
 
@@ -151,7 +149,7 @@ def test_less_data_tell_it_too(trial: str) -> None:
 
 
 def test_without_the_true_cause_its_family_or_something_unlisted_is_named_there() -> None:
-    (first, *_) = verdict(trials("b", BIAS), excluded=["sea_bias"])["causes"]
+    (first, *_) = verdict(trials("b", BIAS)[:1], excluded=["sea_bias"])["causes"]
     assert first["robot"] == 1
     assert first["family"] in ("sea_torque", "unlisted")
 

@@ -34,11 +34,13 @@ def hidden():
 
 @pytest.fixture(scope="module")
 def recordings(hidden):
-    """Three trials of payload (b), with noise."""
+    """Two trials of payload (b), with noise."""
     rng, nominal = np.random.default_rng(42), sensor_preset("nominal")
     home = build_team("b")
-    motions = [random_vias(home.wrist_home_b, rng, vias=6) for _ in range(2)]
-    motions.append(sphere_motion(home.wrist_home_b, home.X_1i, duration_s=10.0, rng=rng))
+    motions = [
+        random_vias(home.wrist_home_b, rng, vias=6),
+        sphere_motion(home.wrist_home_b, home.X_1i, duration_s=10.0, rng=rng),
+    ]
     logs = [
         run_trial(apply_effects(build_team("b", timestep_s=TIMESTEP_S), hidden), motion) for motion in motions
     ]

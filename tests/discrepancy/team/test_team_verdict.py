@@ -38,7 +38,7 @@ def faulty() -> TeamDiagnosed:
 
 @pytest.fixture(scope="module")
 def healthy() -> TeamDiagnosed:
-    return diagnose_team(recorded("b", seed=6), closed_loop=False)
+    return diagnose_team(recorded("a", seed=11), closed_loop=False)
 
 
 def keys_of(values: Any) -> Any:
@@ -146,6 +146,7 @@ def test_a_healthy_team_has_limits(healthy: TeamDiagnosed) -> None:
     values = healthy.to_dict()
     assert values["verdict"] == "consistent"
     assert values["causes"] == values["suspected"] == values["scatter"] == []
+    assert values["residual"]["chi2_per_n"] < 1.2
     assert first_part(str(healthy)).endswith("What would have been noticed is listed with --verbose.")
     limits = {
         (entry["cause"], entry["robot"], entry["joint"]): entry["parameters"]
