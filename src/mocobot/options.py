@@ -111,7 +111,8 @@ class CalibrateOptions(PartOptions):
     """Estimate the mass error of each arm (standard deviation 10 % unless the prior states one)."""
 
     def check_for(self, model: object, free: object) -> None:
-        """Raise InputError for an option that does not apply to a single robot."""
+        """Raise InputError for an option that does not apply to a team, or to a single robot."""
+        self.check_part(model)
         if model is not None:
             refuse_teams(
                 self, ("prior", "payload_of", "known_mass", "parallel_flanges", "tilt", "arm_masses")
