@@ -116,19 +116,39 @@ def draft_joint_map(
         InputError: there is no such log, or it is damaged.
     """
     head = [*head_lines(path, "docs/serial/guide.md says what may stand here."), "version = 1"]
-    head += [f"joints = {json.dumps(list(joints), ensure_ascii=False)}", ""]
-    kind = log_kind(path)
+    kind, lacking = log_kind(path), []
     if kind == "bag":
         places, time, unused, doubts, lost = _in_bag(path, joints)
     else:
         table, candidates, csv = opened_table(path, kind, episode)
         time, doubts, lost = [*time_lines(table, candidates, Robots((), "")), *csv], [], []
         clock = tomllib.loads("\n".join(time)).get("time", {})
+        lacking = _unlogged(table, joints)
+        if lacking:
+            slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint not in lacking]
+            joints = [joint for joint in joints if joint not in lacking]
+            doubts.append(
+                f"no column names {', '.join(lacking)}; with --lock JOINT=VALUE for each, the model has them where "
+                "they stood"
+            )
         places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
     found = _sections(places, slides, [*doubts, *(f"{joint} is in no message" for joint in lost)])
     lines, missing = found
+    head += [f"joints = {json.dumps(list(joints), ensure_ascii=False)}", ""]
     text = "\n".join([*head, *time, "[channels]", *lines, *unused_lines(unused)]) + "\n"
     return Draft(text, text.count(DOUBTFUL), (*missing, *lost))
+
+
+def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
+    """Return the joints that no column names, if columns name others; empty if columns name none."""
+    names = [*table.aliases, *table.shapes]
+    there = [
+        any(template.count("{joint}") for n in names for template, _ in _joint_templates(n, [j]))
+        for j in joints
+    ]
+    return (
+        [joint for joint, is_there in zip(joints, there, strict=True) if not is_there] if any(there) else []
+    )
 
 
 def _sections(
@@ -163,6 +183,14 @@ def _sections(
     if command := places.get("command") or places.get("motor_command"):
         doubt = "" if command.meaning else f"  # {DOUBTFUL}or velocity, or torque?"
         tail += ["", "[control]", f'command = "position"{doubt}']
+        if not {*EFFORTS, *DUTIES} & set(places):
+            what = "no torque is logged; the loop's gains tell it, where they are known:"
+            tail += [
+                f"# {DOUBTFUL}{what}",
+                '# gain_of = "torque"',
+                "# position_gain = ...",
+                "# velocity_gain = ...",
+            ]
     motors = {"motor_position", "motor_velocity", "motor_torque"} & set(places)
     if motors:
         what = "motors are logged; how often does each turn for one turn of its joint?"

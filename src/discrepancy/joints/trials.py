@@ -80,7 +80,8 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
     for log in every:
         if log.torque is None:
             raise InputError(
-                f"{log.name}: there are no torques, currents or duties, one of which the diagnosis needs"
+                f"{log.name}: there are no torques, currents or duties, nor commands with known gains; one of them is "
+                "needed"
             )
         known &= np.isfinite(log.torque).any(axis=0)
     joints = np.flatnonzero(known)

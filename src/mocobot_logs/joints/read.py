@@ -19,6 +19,7 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import low_pass
 from estimator.quantisation import rounding_step
+from mocobot_logs.joints.asked_torque import with_asked_torques
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_logs.joints.joint_map import (
     COMMANDS,
@@ -467,7 +468,7 @@ def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, note
         duty=_duty(columns, supply_V),
     )
     flags = columns.shared("enabled")
-    return JointLog(
+    log = JointLog(
         name=name,
         time=np.arange(len(part.values)) / part.rate_hz,
         rate_hz=part.rate_hz,
@@ -486,6 +487,7 @@ def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, note
         motor=motor,
         notes=(*notes, *part.notes),
     )
+    return with_asked_torques(log)
 
 
 def _given(values: Array) -> NDArray[np.bool_]:

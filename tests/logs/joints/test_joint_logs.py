@@ -140,7 +140,7 @@ def test_a_joint_without_a_torque_has_none(tmp_path) -> None:
 
 
 def test_lerobot_states_and_actions(tmp_path) -> None:
-    """Positions and commands in degrees at 50 frames a second, no torque."""
+    """Positions and commands in degrees at 50 frames a second; the loop's gains tell the torques."""
     time = np.arange(300) / 50.0
     (q, _), (late, _) = motion(time), motion(time - 0.04)
     text = """
@@ -154,7 +154,8 @@ control = { command = "position", position_gain = [30, 20, 900] }
     folder = write_lerobot(tmp_path / "set", late * scale, q * scale, 50.0)
     (log,) = read(folder, text)
     assert log.rate_hz == 50.0
-    assert log.torque is None
+    assert log.torque is not None
+    np.testing.assert_allclose(log.torque, [30, 20, 900] * (log.command - log.q), atol=1e-9)
     np.testing.assert_allclose(log.q, late, atol=1e-6)
     np.testing.assert_allclose(log.command, q, atol=1e-6)
     assert log.drive.command == "position"

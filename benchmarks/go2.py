@@ -1,0 +1,68 @@
+"""A real quadruped that hangs and tells no torque: both front legs calibrated from commands, positions and gains.
+
+    python benchmarks/go2.py FOLDER
+
+FOLDER holds ``front_legs.csv`` and ``go2.xml``, made from the public dataset of iit-DLSLab/sim2real-robot-identification
+(``datasets/go2/traj_0.pt``, BSD 3-Clause): six joints at 200 Hz under the same chirp, drives with 20 N m/rad and
+1.5 N m s/rad. Left and right legs are mirror images, so their rotors and friction must agree within standard errors.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+import mocobot
+
+JOINTS = ("hip", "thigh", "calf")
+REAR = {"hip": 0.0, "thigh": 1.2, "calf": -2.4}
+NAMES = ("armature_kgm2", "coulomb_Nm", "viscous_Nms_per_rad")
+MAP = """version = 1
+joints = [JOINTS]
+time = { column = "time_s", unit = "s" }
+[channels]
+q = { column = "{joint}_position_rad", unit = "rad" }
+command = { column = "{joint}_command_rad", unit = "rad" }
+[control]
+command = "position"
+gain_of = "torque"
+position_gain = 20
+velocity_gain = 1.5
+limit = [23.7, 23.7, 45.43, 23.7, 23.7, 45.43]
+"""
+
+
+def main(folder: Path) -> None:
+    """Print both legs' values beside each other, and what is left of the torques."""
+    logged = [f"{side}_{joint}_joint" for side in ("FL", "FR") for joint in JOINTS]
+    lock = [f"{leg}_{joint}_joint={x}" for leg in ("RL", "RR") for joint, x in REAR.items()]
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "log.toml"
+        path.write_text(MAP.replace("JOINTS", ", ".join(f'"{n}"' for n in logged)), encoding="utf-8")
+        begun = time.process_time()
+        found = mocobot.calibrate(folder / "front_legs.csv", folder / "go2.xml", map=path, lock=lock).found
+    values = {(p.place, p.name): p for p in found.parameters}
+    print(
+        f"{time.process_time() - begun:.1f} s of CPU\n{'':<32}{'left':>20}{'right':>20}{'apart [s.e.]':>14}"
+    )
+    for quantity in NAMES:
+        for joint in JOINTS:
+            left, right = (values[f"{side}_{joint}_joint", quantity] for side in ("FL", "FR"))
+            apart = (left.value - right.value) / np.hypot(left.se, right.se)
+            cells = "".join(f"{f'{p.value:.4f} +- {p.se:.4f}':>20}" for p in (left, right))
+            print(f"{f'{quantity} of {joint}':<32}{cells}{apart:>14.1f}")
+    for which in ("model", "least_squares", "calibrated"):
+        shares = [getattr(h, which) / h.torque for h in found.held_out]
+        print(
+            f"{which:<16} leaves of the torques: "
+            + " ".join(f"{100 * x:.1f}" for x in np.sqrt(np.mean(np.square(shares), axis=0)))
+            + " %"
+        )
+
+
+if __name__ == "__main__":
+    tyro.cli(main, description=__doc__)
