@@ -2,9 +2,10 @@
 
     python benchmarks/go2.py FOLDER
 
-FOLDER holds ``front_legs.csv`` and ``go2.xml``, made from the public dataset of iit-DLSLab/sim2real-robot-identification
-(``datasets/go2/traj_0.pt``, BSD 3-Clause): six joints at 200 Hz under the same chirp, drives with 20 N m/rad and
-1.5 N m s/rad. Left and right legs are mirror images, so their rotors and friction must agree within standard errors.
+FOLDER holds ``front_legs.csv`` and ``go2.xml``, made from the public dataset of iit-DLSLab's
+sim2real-robot-identification (``datasets/go2/traj_0.pt``, BSD 3-Clause): six joints at 200 Hz under the same chirp,
+drives with 20 N m/rad and 1.5 N m s/rad. Left and right legs are mirror images, so their rotors and friction must agree
+within standard errors.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ limit = [23.7, 23.7, 45.43, 23.7, 23.7, 45.43]
 """
 
 
-def main(folder: Path) -> None:
+def main(folder: tyro.conf.Positional[Path]) -> None:
     """Print both legs' values beside each other, and what is left of the torques."""
     logged = [f"{side}_{joint}_joint" for side in ("FL", "FR") for joint in JOINTS]
     lock = [f"{leg}_{joint}_joint={x}" for leg in ("RL", "RR") for joint, x in REAR.items()]

@@ -17,13 +17,17 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from scipy.interpolate import CubicSpline
 
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.joints import problem
+from discrepancy.joints.calibrated import as_found
+from discrepancy.joints.calibration import ArmCalibration, calibrate_arm
 from discrepancy.joints.causes import Span
 from discrepancy.joints.diagnose import MOVED, Outcome, diagnose
-from discrepancy.joints.mechanics import body_regressor
+from discrepancy.joints.friction import direction
+from discrepancy.joints.mechanics import body_regressor, inverse_torque
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.problem import Given
 from discrepancy.joints.signals import Signals
@@ -159,6 +163,26 @@ def left(outcome: Outcome, model: SerialModel, last: Signals) -> np.ndarray:
     return out
 
 
+def as_found_left(found: ArmCalibration, last: Signals) -> np.ndarray:
+    """What a calibration leaves of the last third, by MuJoCo's inverse dynamics of ``as_found.xml`` and friction."""
+    of = {(p.place, p.name): p.value for p in found.parameters}
+    names, model = found.model.joints, as_found(found).compile()
+    out = inverse_torque(model, last.q, last.dq, last.ddq)  # with the dampers and rotors of tendons
+    side = [direction(last.dq[:, j], 1.0 / last.rate_hz, last.slow[j]) for j in range(len(names))]
+    for j, n in enumerate(names):
+        out[:, j] += of[n, "coulomb_Nm"] * side[j] + of[n, "viscous_Nms_per_rad"] * last.dq[:, j]
+    for j, (coulomb, _, _, ratio) in found.coupled.items():
+        v = last.dq[:, j] + ratio * last.dq[:, j - 1]
+        both = coulomb * direction(v, 1.0 / last.rate_hz, last.slow[j] + last.slow[j - 1])
+        out[:, j], out[:, j - 1] = out[:, j] + both, out[:, j - 1] + ratio * both
+    for j, n in enumerate(names):
+        late = CubicSpline(last.time, last.torque[:, j])(
+            np.clip(last.time + of[n, "delay_s"], last.time[0], last.time[-1])
+        )
+        out[:, j] = late - (1.0 + of[n, "gain"]) * out[:, j] - of[n, "offset_Nm"]
+    return out
+
+
 def main() -> None:
     """Print the tables."""
     model, log = read()
@@ -185,6 +209,10 @@ def main() -> None:
         begun = time.process_time()
         share = shares(plain(first, last, coupled=coupled), last)
         print(f"  {title:<44}{shown(share)}  ({time.process_time() - begun:.2f} s)")
+    begun = time.process_time()
+    share = shares(as_found_left(calibrate_arm(model, [crop(log, 0.0, SPLIT)]), last), last)
+    title = "calibrate: as_found.xml in MuJoCo, and the log's errors"
+    print(f"  {title:<44}{shown(share)}  ({time.process_time() - begun:.1f} s)")
     begun = time.process_time()
     outcome = diagnose(model, [crop(log, 0.0, SPLIT)])
     share = shares(left(outcome, model, last), last)
