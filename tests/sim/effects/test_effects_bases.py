@@ -168,7 +168,8 @@ def test_a_yielding_base_gives_way_by_compliance_times_horizontal_force(robot):
     assert moved[2] == 0
 
 
-@pytest.mark.parametrize(("robot", "timestep_s"), [(1, 1e-3), (2, 1e-3), (2, 0.25e-3)])
+@ROBOT
+@pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
 @pytest.mark.parametrize(
     ("cause", "size", "relaxation_s"),
     [
