@@ -17,6 +17,7 @@ notes               sentences
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,8 @@ UNITS = {
     "N": "N", "s": "s",
 }  # fmt: skip
 SMALL = {"rad": ("mrad", 1e3), "m": ("mm", 1e3), "s": ("ms", 1e3)}
+WIDTH = 100
+"""Width of the text."""
 MISFIT = 2.0
 """Ratio of predicted residual and noise beyond which the model lacks something. Chosen."""
 MOST_TERMS, MOST_COMBINATIONS, ROUND = 6, 12, 1e-3
@@ -92,7 +95,11 @@ def _mean(held: Sequence[HeldOut], name: str, joint: int) -> float:
 
 def to_text(found: ArmCalibration) -> str:
     """Report: the gain on held-out data, what the logs determine, and what they do not."""
-    return "\n".join(_lines(found))
+    lines = (
+        textwrap.wrap(line, WIDTH, subsequent_indent="") or [""] if line[:1] != " " else [line]
+        for line in _lines(found)
+    )
+    return "\n".join(part for wrapped in lines for part in wrapped)
 
 
 def _lines(found: ArmCalibration) -> Iterator[str]:
@@ -113,24 +120,28 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
     yield f"The logs determine {told} of {len(found.parameters)} parameters{both}."
     yield from findings(found)
     yield ""
-    yield f"{'rms torque':<24}{'measured':>10}{'model':>10}{'least sq.':>10}{'calibrated':>12}{'noise':>10}"
+    yield f" {'rms torque':<24}{'measured':>10}{'model':>10}{'least sq.':>10}{'calibrated':>12}{'noise':>10}"
     for j in found.joints:
         unit = "N" if found.model.slides[j] else "N m"
         numbers = [_mean(found.held_out, n, j) for n in ("torque", *HELD_OUT[:4])]
         cells = "".join(f"{x:>{12 if k == 3 else 10}.3g}" for k, x in enumerate(numbers))
-        yield f"{f'{found.model.joints[j]} [{unit}]':<24.24}{cells}"
+        yield f" {f'{found.model.joints[j]} [{unit}]':<24.24}{cells}"
     for title, wanted in (("Determined, in the model", True), ("Determined, of the log", False)):
         own = [p for p in found.parameters if p.determined and p.in_model == wanted]
         if own:
             yield ""
-            yield f"{title:<54}{'given':>10}   found"
+            yield f" {title:<53}{'given':>10}   found"
             yield from (_row(found, p) for p in own)
     if found.combinations:
         yield ""
-        yield f"{'Determined in combination only':<54}{'given':>10}   found"
+        yield f" {'Determined in combination only':<53}{'given':>10}   found"
         for c in found.combinations[:MOST_COMBINATIONS]:
             value, se = measured(c.value, c.se)
-            yield f"  {_formula(c)}: {c.model:.4g}   {value} +- {se}"
+            formula = f"  {_formula(c)}"
+            if len(formula) > 54:
+                yield from textwrap.wrap(formula, WIDTH, initial_indent="  ", subsequent_indent="    ")
+                formula = ""
+            yield f"{formula:<54}{c.model:>10.4g}   {value} +- {se}"
         if len(found.combinations) > MOST_COMBINATIONS:
             yield f"  {len(found.combinations) - MOST_COMBINATIONS} more are in {NAME}."
     unknown = [p for p in found.parameters if not p.determined]

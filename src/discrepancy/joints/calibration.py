@@ -42,6 +42,8 @@ POSES = 20
 PLAIN = 3.0
 """Factor on prior standard deviations of inertial parameters for standard errors. Chosen: where two parameters have one
 effect, the narrower prior would otherwise make the other's error."""
+SMALL = 1e-3
+"""Share of a combination below which a term is left out. Chosen."""
 ROUNDS, SETTLED = 8, 0.1
 """Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
 LAW_STEPS, LEAST_LAW = 12, 1e-12
@@ -567,7 +569,7 @@ class _Fit:
             first, others = seen[order[i]], seen[order[rank:]]
             way = np.zeros(len(value))
             way[first], way[others] = 1.0, beta[i] / size[first] * size[others]
-            way[np.abs(way) * typical < 1e-6 * np.abs(way[first]) * typical[first]] = 0.0
+            way[np.abs(way) * typical < SMALL * typical[first]] = 0.0
             terms = {names[k]: float(way[k]) for k in (first, *others) if way[k]}
             se = float(np.sqrt(way @ covariance @ way))
             if len(terms) > 1 and se < DETERMINED * np.sqrt(way @ prior @ way):
