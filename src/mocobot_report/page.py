@@ -20,7 +20,7 @@ from discrepancy.evidence.settings import SETTINGS
 from estimator.errors import InputError
 from estimator.files import add_written, check_target, file_facts, whole_file
 from estimator.inputs import printable
-from mocobot_report import NAME, SUFFIX, calibration, campaign, diagnosis, estimate, paper
+from mocobot_report import NAME, SUFFIX, calibration, campaign, diagnosis, estimate, joint_calibration, paper
 from mocobot_report.charts import Chart
 from mocobot_report.folder import Result, complete, read_folder
 from mocobot_report.numbers import counted, size
@@ -32,7 +32,7 @@ Say = Callable[[str], object]
 Context = dict[str, Any]
 PARTS: Mapping[str, Callable[[Result, Say], Context]] = {
     "paper": paper.context, "estimate": estimate.context, "calibration": calibration.context,
-    "diagnosis": diagnosis.context, "campaign": campaign.context,
+    "diagnosis": diagnosis.context, "joint-calibration": joint_calibration.context, "campaign": campaign.context,
 }  # fmt: skip
 """Function per kind of result that returns the data of its template: ``title``, ``pictures`` and further names."""
 
@@ -144,7 +144,7 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
 IN_DETAIL = {
     "paper": "The experiment in detail", "estimate": "The estimate in detail",
     "calibration": "The calibration in detail", "diagnosis": "The diagnosis in detail",
-    "campaign": "The campaign in detail",
+    "joint-calibration": "The calibration in detail", "campaign": "The campaign in detail",
 }  # fmt: skip
 LONGEST_TITLE = 160
 
@@ -244,7 +244,7 @@ def _jpeg(pixels: Any) -> str:
 
 
 def _called(result: Result) -> str:
-    if result.kind in ("estimate", "calibration"):
+    if result.kind in ("estimate", "calibration", "joint-calibration"):
         return result.path.name
     return "the experiment" if result.kind == "paper" else f"the {result.kind}"
 

@@ -17,13 +17,15 @@ notes               sentences
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
 import mujoco
+import numpy as np
 
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
 from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
@@ -31,6 +33,7 @@ from discrepancy.joints.effects import numbered
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.statistics import measured, rms
+from estimator.strict import Fields
 from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import put, take_along
@@ -38,6 +41,11 @@ from mocobot_sim.serial.mjcf import keep_inertials, set_inertial, with_effects
 
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
+KEYS = (
+    "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes",
+)  # fmt: skip
+PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
+COMBINATION = ("terms", "model", "value", "se")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
@@ -316,3 +324,118 @@ def _cell(text: str) -> str:
     """A cell of a CSV table."""
     quoted = text.replace('"', '""')
     return f'"{quoted}"' if set(text) & set(',"\n') else text
+
+
+class Described(NamedTuple):
+    """What a file says of the model: path, joints (the first is "" if it has no torque), and which of them slide."""
+
+    path: Path
+    joints: tuple[str, ...]
+    slides: tuple[bool, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A calibration as its JSON has it; attributes are those of ``ArmCalibration`` that its text needs."""
+
+    model: Described
+    joints: tuple[int, ...]
+    parameters: tuple[Parameter, ...]
+    combinations: tuple[Combination, ...]
+    held_out: tuple[HeldOut, ...]
+    validated: bool
+    logs: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def found(self) -> ArmCalibration:
+        """The same for functions of this module that make text or JSON, which need no more."""
+        return cast(ArmCalibration, self)
+
+    @property
+    def gain(self) -> str:
+        """First sentence of the text."""
+        return next(_lines(self.found))
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Sentences on what casts doubt on the numbers."""
+        return findings(self.found)
+
+    @property
+    def unknown(self) -> list[str]:
+        """What is not determined, a line for places with the same quantities."""
+        return list(_unknown(self.found, [p for p in self.parameters if not p.determined]))
+
+    def share(self, name: str) -> str:
+        """Torque left over torque [%], as in the text; the names are those of ``HELD_OUT``."""
+        return _percent(_share(self.found, name))
+
+    def rms(self, name: str) -> list[float]:
+        """Root mean square torque of every joint with torque [N m or N]."""
+        return [_mean(self.held_out, name, j) for j in self.joints]
+
+    def in_words(self, p: Parameter) -> tuple[str, str, float]:
+        """A parameter with its place in words, its unit and the factor to it."""
+        what, unit, scale = described(p.name)
+        return f"{what} of {place_in_words(self.found, p.place)}", unit, scale
+
+
+def combination_in_words(c: Combination) -> tuple[str, str]:
+    """Terms of a combination of masses, first and second moments and rotors, and its unit."""
+    name = next(iter(c.terms))[1]
+    unit = (
+        described(name)[1] if "_" in name else {"m": "kg"}.get(name, "kg m" if name[0] == "m" else "kg m^2")
+    )
+    return _formula(c), unit
+
+
+def from_dict(values: Mapping[str, Any], where: str) -> Told:
+    """Read the values of ``to_dict``, with or without provenance; ``where`` is the file's name in messages.
+
+    Raises:
+        InputError: a value is missing, invalid or unknown.
+    """
+    file = Fields(values, KEYS, where, ("provenance",))
+    file.one_of("format", (FORMAT,))
+    if file.whole("version") != VERSION:
+        file.refuse("version", str(VERSION))
+    parameters = tuple(_parameter(one) for one in file.objects("parameters", PARAMETER))
+    held = {
+        joint: Fields(sizes, HELD_OUT, f"{where}: held_out: {joint}")
+        for joint, sizes in file.object("held_out").items()
+    }
+    zeros = [p.place for p in parameters if p.name.startswith("zero_")]
+    joints = (next((joint for joint in held if joint not in zeros), ""), *zeros)
+    sliding = {p.place for p in parameters if p.name == "coulomb_N"}
+    rubbing = {p.place for p in parameters if p.name == "coulomb_Nm"} | sliding
+    if not held or set(held) - set(joints) or set(held) - rubbing:
+        file.refuse("held_out", "an object with the torques of the joints that have friction in parameters")
+    known = tuple(sorted(joints.index(joint) for joint in held))
+    table = np.zeros((len(HELD_OUT), len(joints)))
+    for j in known:
+        table[:, j] = [held[joints[j]].number(name, 0.0) for name in HELD_OUT]
+    return Told(
+        Described(Path(file.words("model")), joints, tuple(joint in sliding for joint in joints)),
+        known, parameters, tuple(_combination(one) for one in file.objects("combinations", COMBINATION)),
+        (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"),
+    )  # fmt: skip
+
+
+def _parameter(one: Fields) -> Parameter:
+    name = one.text("parameter")
+    try:
+        described(name)
+    except (KeyError, StopIteration):
+        one.refuse("parameter", "a quantity with its unit, such as coulomb_Nm")
+    se, prior = (one.number(key, above=0.0) for key in ("se", "prior_se"))
+    given, value, known = one.number("model"), one.number("value"), one.flag("determined")
+    return Parameter(one.words("place"), name, given, value, se, prior, known, one.flag("in_model"))
+
+
+def _combination(one: Fields) -> Combination:
+    terms = one.objects("terms", ("place", "parameter", "factor"))
+    if not terms:
+        one.refuse("terms", "a list of at least one term")
+    factors = {(term.words("place"), term.text("parameter")): term.number("factor") for term in terms}
+    return Combination(factors, one.number("model"), one.number("value"), one.number("se", above=0.0))
