@@ -30,6 +30,8 @@ import numpy as np
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
 from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
 from discrepancy.joints.effects import numbered
+from discrepancy.joints.problem import MOMENTS
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.statistics import measured, rms
@@ -41,9 +43,7 @@ from mocobot_sim.serial.mjcf import keep_inertials, set_inertial, with_effects
 
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
-KEYS = (
-    "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes",
-)  # fmt: skip
+KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
 PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
 COMBINATION = ("terms", "model", "value", "se")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
@@ -349,45 +349,29 @@ class Told:
 
     @property
     def found(self) -> ArmCalibration:
-        """The same for functions of this module that make text or JSON, which need no more."""
+        """The same for the functions of this module that make text and JSON, which need no more."""
         return cast(ArmCalibration, self)
-
-    @property
-    def gain(self) -> str:
-        """First sentence of the text."""
-        return next(_lines(self.found))
-
-    @property
-    def findings(self) -> tuple[str, ...]:
-        """Sentences on what casts doubt on the numbers."""
-        return findings(self.found)
 
     @property
     def unknown(self) -> list[str]:
         """What is not determined, a line for places with the same quantities."""
         return list(_unknown(self.found, [p for p in self.parameters if not p.determined]))
 
-    def share(self, name: str) -> str:
-        """Torque left over torque [%], as in the text; the names are those of ``HELD_OUT``."""
-        return _percent(_share(self.found, name))
+    @property
+    def names(self) -> list[str]:
+        """Name and unit of every joint with torque."""
+        return [f"{self.model.joints[j]} [{'N' if self.model.slides[j] else 'N m'}]" for j in self.joints]
 
-    def rms(self, name: str) -> list[float]:
-        """Root mean square torque of every joint with torque [N m or N]."""
-        return [_mean(self.held_out, name, j) for j in self.joints]
-
-    def in_words(self, p: Parameter) -> tuple[str, str, float]:
-        """A parameter with its place in words, its unit and the factor to it."""
-        what, unit, scale = described(p.name)
-        return f"{what} of {place_in_words(self.found, p.place)}", unit, scale
+    def rms(self, name: str) -> Array:
+        """Return an attribute of ``HeldOut`` of the joints with torque, shape (K,) [N m or N]."""
+        return getattr(self.held_out[0], name)[list(self.joints)]
 
 
 def combination_in_words(c: Combination) -> tuple[str, str]:
     """Terms of a combination of masses, first and second moments and rotors, and its unit."""
     name = next(iter(c.terms))[1]
-    unit = (
-        described(name)[1] if "_" in name else {"m": "kg"}.get(name, "kg m" if name[0] == "m" else "kg m^2")
-    )
-    return _formula(c), unit
+    units = {"m": "kg"} | dict.fromkeys(("mx", "my", "mz"), "kg m")
+    return _formula(c), described(name)[1] if "_" in name else units.get(name, "kg m^2")
 
 
 def from_dict(values: Mapping[str, Any], where: str) -> Told:
@@ -422,20 +406,27 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
     )  # fmt: skip
 
 
-def _parameter(one: Fields) -> Parameter:
+def _quantity(one: Fields, others: Sequence[str] = ()) -> str:
     name = one.text("parameter")
     try:
-        described(name)
+        if name not in others:
+            described(name)
     except (KeyError, StopIteration):
         one.refuse("parameter", "a quantity with its unit, such as coulomb_Nm")
+    return name
+
+
+def _parameter(one: Fields) -> Parameter:
     se, prior = (one.number(key, above=0.0) for key in ("se", "prior_se"))
-    given, value, known = one.number("model"), one.number("value"), one.flag("determined")
-    return Parameter(one.words("place"), name, given, value, se, prior, known, one.flag("in_model"))
+    place, name, known = one.words("place"), _quantity(one), one.flag("determined")
+    return Parameter(
+        place, name, one.number("model"), one.number("value"), se, prior, known, one.flag("in_model")
+    )
 
 
 def _combination(one: Fields) -> Combination:
     terms = one.objects("terms", ("place", "parameter", "factor"))
     if not terms:
         one.refuse("terms", "a list of at least one term")
-    factors = {(term.words("place"), term.text("parameter")): term.number("factor") for term in terms}
+    factors = {(term.words("place"), _quantity(term, MOMENTS)): term.number("factor") for term in terms}
     return Combination(factors, one.number("model"), one.number("value"), one.number("se", above=0.0))
