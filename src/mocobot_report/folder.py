@@ -157,13 +157,10 @@ def _estimate(path: Path, values: Json) -> Result:
 
 
 def _calibration(path: Path, values: Json) -> Result:
-    found = calibration_from_dict(values, str(path))
-    return Result("calibration", path, found, _provenance_within(values), (path,))
-
-
-def _joint_calibration(path: Path, values: Json) -> Result:
-    found = from_dict(values, str(path))
-    return Result("joint-calibration", path, found, _provenance_within(values), (path,))
+    kind, read = "calibration", calibration_from_dict
+    if values["format"] == JOINT_CALIBRATION:
+        kind, read = "joint-calibration", from_dict
+    return Result(kind, path, read(values, str(path)), _provenance_within(values), (path,))
 
 
 def _diagnosis(path: Path, values: Json) -> Result:
@@ -187,7 +184,7 @@ def _campaign(path: Path, values: Json) -> Result:
 
 READERS: Mapping[str, Callable[[Path, Json], Result]] = {
     "paper": _paper, "estimate": _estimate, "calibration": _calibration, "diagnosis": _diagnosis,
-    "joint-calibration": _joint_calibration, "campaign": _campaign,
+    "joint-calibration": _calibration, "campaign": _campaign,
 }  # fmt: skip
 
 

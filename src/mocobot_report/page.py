@@ -117,7 +117,11 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
     page, answers = _Page(), Markup("")
     for result, context in zip(results, contexts, strict=True):
         several = sum(one.kind == result.kind for one in results) > 1
-        name = f"{result.kind.capitalize()} {result.path.name}" if several else IN_DETAIL[result.kind]
+        name = (
+            f"{result.kind.capitalize()} {result.path.name}"
+            if several
+            else f"The {_word(result.kind)} in detail"
+        )
         page.parts.append(_Part(page.identity(result.kind), name))
         with complete(result.path):
             part = templates().get_template(f"{result.kind}.html")
@@ -141,11 +145,6 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
     return _whole(page, title_of(titles), answer)
 
 
-IN_DETAIL = {
-    "paper": "The experiment in detail", "estimate": "The estimate in detail",
-    "calibration": "The calibration in detail", "diagnosis": "The diagnosis in detail",
-    "joint-calibration": "The calibration in detail", "campaign": "The campaign in detail",
-}  # fmt: skip
 LONGEST_TITLE = 160
 
 
@@ -243,10 +242,13 @@ def _jpeg(pixels: Any) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode("ascii")
 
 
+def _word(kind: str) -> str:
+    return "experiment" if kind == "paper" else kind.rpartition("-")[2]
+
+
 def _called(result: Result) -> str:
-    if result.kind in ("estimate", "calibration", "joint-calibration"):
-        return result.path.name
-    return "the experiment" if result.kind == "paper" else f"the {result.kind}"
+    word = _word(result.kind)
+    return result.path.name if word in ("estimate", "calibration") else f"the {word}"
 
 
 def _option(value: Any) -> str:

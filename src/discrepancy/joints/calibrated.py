@@ -58,6 +58,7 @@ UNITS = {
     "N": "N", "s": "s",
 }  # fmt: skip
 SMALL = {"rad": ("mrad", 1e3), "m": ("mm", 1e3), "s": ("ms", 1e3)}
+COMBINED = "Determined in combination only"
 MISFIT = 2.0
 """Ratio of predicted residual and noise beyond which the model lacks something. Chosen."""
 MOST_TERMS, MOST_COMBINATIONS, ROUND = 6, 12, 1e-3
@@ -334,6 +335,18 @@ class Described(NamedTuple):
     slides: tuple[bool, ...]
 
 
+class Quantity(NamedTuple):
+    """What logs determine: title of its kind, words, unit, numbers, and terms with factors to a thousandth."""
+
+    kind: str
+    words: str
+    unit: str
+    model: float
+    value: float
+    se: float
+    terms: frozenset[tuple[tuple[str, str], float]]
+
+
 @dataclass(frozen=True, eq=False)
 class Told:
     """A calibration as its JSON has it; attributes are those of ``ArmCalibration`` that its text needs."""
@@ -358,6 +371,25 @@ class Told:
         return list(_unknown(self.found, [p for p in self.parameters if not p.determined]))
 
     @property
+    def determined(self) -> list[Quantity]:
+        """All that the logs determine: parameters, with readable units, and combinations."""
+        out = []
+        for p in (p for p in self.parameters if p.determined):
+            what, unit, x = described(p.name)
+            words, terms = (
+                f"{what} of {place_in_words(self.found, p.place)}",
+                frozenset([((p.place, p.name), 1.0)]),
+            )
+            kind = f"Determined, {'in the model' if p.in_model else 'of the log'}"
+            out.append(Quantity(kind, words, unit, x * p.model, x * p.value, x * p.se, terms))
+        for c in self.combinations:
+            name, units = next(iter(c.terms))[1], {"m": "kg"} | dict.fromkeys(("mx", "my", "mz"), "kg m")
+            unit = described(name)[1] if "_" in name else units.get(name, "kg m^2")
+            terms = frozenset((k, round(x, 3)) for k, x in c.terms.items() if abs(x) > ROUND)
+            out.append(Quantity(COMBINED, _formula(c), unit, c.model, c.value, c.se, terms))
+        return out
+
+    @property
     def names(self) -> list[str]:
         """Name and unit of every joint with torque."""
         return [f"{self.model.joints[j]} [{'N' if self.model.slides[j] else 'N m'}]" for j in self.joints]
@@ -365,13 +397,6 @@ class Told:
     def rms(self, name: str) -> Array:
         """Return an attribute of ``HeldOut`` of the joints with torque, shape (K,) [N m or N]."""
         return getattr(self.held_out[0], name)[list(self.joints)]
-
-
-def combination_in_words(c: Combination) -> tuple[str, str]:
-    """Terms of a combination of masses, first and second moments and rotors, and its unit."""
-    name = next(iter(c.terms))[1]
-    units = {"m": "kg"} | dict.fromkeys(("mx", "my", "mz"), "kg m")
-    return _formula(c), described(name)[1] if "_" in name else units.get(name, "kg m^2")
 
 
 def from_dict(values: Mapping[str, Any], where: str) -> Told:
@@ -392,9 +417,8 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
     zeros = [p.place for p in parameters if p.name.startswith("zero_")]
     joints = (next((joint for joint in held if joint not in zeros), ""), *zeros)
     sliding = {p.place for p in parameters if p.name == "coulomb_N"}
-    rubbing = {p.place for p in parameters if p.name == "coulomb_Nm"} | sliding
-    if not held or set(held) - set(joints) or set(held) - rubbing:
-        file.refuse("held_out", "an object with the torques of the joints that have friction in parameters")
+    if not held or set(held) - set(joints):
+        file.refuse("held_out", "an object with the torques of joints that are in parameters")
     known = tuple(sorted(joints.index(joint) for joint in held))
     table = np.zeros((len(HELD_OUT), len(joints)))
     for j in known:

@@ -3,7 +3,7 @@
 Keys of the JSON:
 
 format, version     "mocobot-comparison", 1
-kind                "estimate", "calibration" or "diagnosis"
+kind                "estimate", "calibration", "joint calibration" or "diagnosis"
 a, b                names of the compared files or folders
 changed             whether anything differs by more than its standard errors
 groups              list of {name, unit, chi2, dof, p, changed, together, quantities}: p is the p-value of the
@@ -43,7 +43,10 @@ from mocobot.results import Folder
 
 FORMAT, VERSION = "mocobot-comparison", 1
 NAME, REPORT, PICTURE = "comparison.json", "report.txt", "comparison.png"
-KINDS = {ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis"}
+KINDS = {
+    ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis",
+    "mocobot-joint-calibration": "joint calibration",
+}  # fmt: skip
 SOUGHT = "an estimate of `mocobot estimate`, or a calibration or diagnosis of `mocobot calibrate` or `diagnose --out`"
 WIDTH = 110
 
@@ -53,7 +56,7 @@ class Comparison(Folder):
     """Differences between two results of one kind; prints as text and writes a folder.
 
     Attributes:
-        kind: ``"estimate"``, ``"calibration"`` or ``"diagnosis"``.
+        kind: ``"estimate"``, ``"calibration"``, ``"joint calibration"`` or ``"diagnosis"``.
         a, b: names of the results.
         groups: quantities that both results contain, with their differences.
         changes: findings that only one result has or that differ, one sentence each.
@@ -182,6 +185,8 @@ def compare(a: Any, b: Any) -> Comparison:
         groups, notes = groups_of.estimate_groups(x, y), groups_of.estimate_notes(x, y)
     elif one.kind == "calibration":
         groups, notes = groups_of.calibration_groups(x, y), groups_of.calibration_notes(x, y)
+    elif one.kind == "joint calibration":
+        groups, notes = groups_of.joint_groups(x, y), groups_of.joint_notes(x, y)
     else:
         if {x.get("machine"), y.get("machine")} >= {"team", "joints"}:
             raise InputError(
@@ -237,6 +242,10 @@ def _result(name: str, where: str, values: dict[str, Any]) -> _Result:
             raise InputError(f"{where}: {error}") from error
     elif kind == "calibration":
         value = calibration_from_dict(values, where)
+    elif kind == "joint calibration":
+        from discrepancy.joints.calibrated import from_dict  # mujoco
+
+        value = from_dict(values, where)
     elif kind == "diagnosis":
         parse_diagnosis(values, Path(where))
     else:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.result import PayloadEstimate
+
+if TYPE_CHECKING:
+    from discrepancy.joints.calibrated import Told
 
 LEVEL = 0.01
 """Probability that two results of the same truth are reported as different. Chosen: one false alarm in a hundred,
@@ -383,6 +386,38 @@ def _about_com(payload: CalibratedPayload) -> tuple[Array, Array, Array]:
     found = carried(payload, 0.0)
     values = np.concatenate([[found.mass_kg], found.p_1c, inertia_parameters(found.inertia)])
     return values, found.covariance, found.by_scale
+
+
+def joint_groups(a: "Told", b: "Told") -> list[Group]:
+    """Pair what both calibrations of a robot's joints determine: parameters by place and name, combinations by terms.
+
+    Raises:
+        InputError: the calibrations are of different robots.
+    """
+    robots = [{p.place for p in one.parameters if p.name.startswith(("mass_", "zero_"))} for one in (a, b)]
+    if robots[0] != robots[1]:
+        only = [", ".join(sorted(one)) or "none" for one in (robots[0] - robots[1], robots[1] - robots[0])]
+        raise InputError(
+            f"the calibrations are of different robots: links and joints of the first alone are {only[0]}, of the "
+            f"second alone {only[1]}"
+        )
+    others, groups = {q.terms: q for q in b.determined}, []
+    for one in a.determined:
+        if other := others.get(one.terms):
+            pair = [_value({"value": q.value, "se": q.se}) for q in (one, other)]
+            groups.append(Group.of(one.words, one.unit, ("",), *pair))
+    return groups
+
+
+def joint_notes(a: "Told", b: "Told") -> list[str]:
+    """List caveats about the comparison of two calibrations of a robot's joints, one sentence each."""
+    terms = [{q.terms for q in one.determined} for one in (a, b)]
+    alone = [
+        f"{name} alone determines {', '.join(q.words for q in one.determined if q.terms not in other)}."
+        for name, one, other in (("A", a, terms[1]), ("B", b, terms[0]))
+        if {q.terms for q in one.determined} - other
+    ]
+    return ["Errors of one calibration are correlated among each other, which its file does not say.", *alone]
 
 
 Cause = Mapping[str, Any]
