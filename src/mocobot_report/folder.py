@@ -93,10 +93,8 @@ def read_folder(folder: Path) -> list[Result]:
 def _kind(path: Path, values: Json) -> str | None:
     if path.name in ("paper.json", "diagnosis.json"):
         return path.stem
-    formats = {
-        DIAGNOSIS: "diagnosis", ESTIMATE: "estimate", CAMPAIGN: "campaign", CALIBRATION: "calibration",
-        JOINT_CALIBRATION: "joint-calibration",
-    }  # fmt: skip
+    known = (ESTIMATE, CALIBRATION, DIAGNOSIS, JOINT_CALIBRATION, CAMPAIGN)
+    formats: dict[str, str] = dict(zip(known, KINDS[1:], strict=True))
     named = values.get("format")
     return formats.get(named) if isinstance(named, str) else None
 

@@ -39,9 +39,8 @@ def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
     )
     tiles.append(("parameters determined", share, more))
     rows: dict[str, list[list[Entry]]] = {}
-    for q in known:
-        cells = spelled(q.unit), value(q.model, 4), measurement(q.value, q.se)
-        rows.setdefault(q.kind, []).append([q.words, *cells])
+    for kind, words, unit, given, found, se in known.values():
+        rows.setdefault(kind, []).append([words, spelled(unit), value(given, 4), measurement(found, se)])
     head, notes = ("", "unit", "given", "found"), {calibrated.COMBINED: MOMENTS}
     return {
         "title": f"Calibration of {told.model.path.name} from {counted(len(told.logs), 'log')} of its joints",

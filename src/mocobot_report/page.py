@@ -117,11 +117,8 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
     page, answers = _Page(), Markup("")
     for result, context in zip(results, contexts, strict=True):
         several = sum(one.kind == result.kind for one in results) > 1
-        name = (
-            f"{result.kind.capitalize()} {result.path.name}"
-            if several
-            else f"The {_word(result.kind)} in detail"
-        )
+        detail = f"The {_word(result.kind)} in detail"
+        name = f"{result.kind.capitalize()} {result.path.name}" if several else detail
         page.parts.append(_Part(page.identity(result.kind), name))
         with complete(result.path):
             part = templates().get_template(f"{result.kind}.html")

@@ -1,13 +1,12 @@
 """Pictures of calibrations: parameters, misfit and information of each recording; torques left of joints."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from discrepancy.joints.calibrated import Told
 from estimator.arm.unit import AT
@@ -82,12 +81,9 @@ def _recordings(calibration: Calibration) -> Figure:
     figure = Figure(figsize=(11.0, 0.38 * len(names) + 1.5), layout="constrained")
     axes = figure.subplots(1, 2, squeeze=False, sharey=True)[0]
     for kind, (axis, title) in enumerate(zip(axes, ("loops", "balance"), strict=True)):
-        for key in FITS:
-            shown = fits_of(calibration, kind, key)
-            _marks(axis, [x for _, x in shown], [row for row, _ in shown], key)
+        _rows(axis, names, "chi²/n", {key: dict(fits_of(calibration, kind, key)) for key in FITS})
         axis.axvline(1.0, color=LIGHT["text"], lw=1.0, ls="--")
         axis.set_title(title, loc="left", fontsize=10)
-        _rows(axis, names, "chi²/n")
     handles = axes[0].get_lines()[: len(FITS)]
     figure.legend(handles=handles, loc="outside upper right", ncols=3, frameon=False, fontsize=9)
     figure.suptitle("What recordings leave over; 1 is noise alone", x=0.01, ha="left", fontsize=11)
@@ -99,9 +95,7 @@ def save_torques(told: Told, path: Path) -> None:
     figure = Figure(figsize=(9.0, 0.38 * len(told.names) + 1.5), layout="constrained")
     FigureCanvasAgg(figure)
     axis = figure.subplots()
-    for key in LEFT:
-        _marks(axis, told.rms(key.group), range(len(told.names)), key)
-    _rows(axis, told.names, "rms torque left")
+    _rows(axis, told.names, "rms torque left", {key: dict(enumerate(told.rms(key.group))) for key in LEFT})
     figure.legend(loc="outside upper right", ncols=4, frameon=False, fontsize=9)
     figure.savefig(path, dpi=110)
 
@@ -128,11 +122,10 @@ def _shares(calibration: Calibration) -> Figure:
     return figure
 
 
-def _marks(axis: Axes, x: ArrayLike, rows: Sequence[int], key: Key) -> None:
-    axis.plot(x, rows, MARKERS[key.symbol], color=LIGHT[key.colour], label=key.label, ms=6)
-
-
-def _rows(axis: Axes, names: Sequence[str], label: str) -> None:
+def _rows(axis: Axes, names: Sequence[str], label: str, series: Mapping[Key, Mapping[int, float]]) -> None:
+    """Draw the numbers of each legend entry by row, on a logarithmic axis."""
+    for key, of in series.items():
+        axis.plot([*of.values()], [*of], MARKERS[key.symbol], color=LIGHT[key.colour], label=key.label, ms=6)
     axis.set_xscale("log")
     plain_numbers(axis.xaxis)
     axis.set_yticks(range(len(names)), names, fontsize=9)

@@ -20,7 +20,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from types import SimpleNamespace
+from typing import Any, cast
 
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
@@ -45,7 +46,6 @@ FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
 KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
 PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
-COMBINATION = ("terms", "model", "value", "se")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
@@ -57,8 +57,14 @@ UNITS = {
     "Nms_per_rad": "N m s/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
     "N": "N", "s": "s",
 }  # fmt: skip
+QUANTITY = {"parameter": (
+    "a quantity with its unit, such as coulomb_Nm", lambda name: name == "gain" or (isinstance(name, str)
+    and name.partition("_")[0] in WORDS and name.endswith(tuple(f"_{unit}" for unit in UNITS))),
+)}  # fmt: skip
 SMALL = {"rad": ("mrad", 1e3), "m": ("mm", 1e3), "s": ("ms", 1e3)}
 COMBINED = "Determined in combination only"
+Quantity = tuple[str, str, str, float, float, float]
+"""Title of its kind, words, unit, given and found value, standard error."""
 MISFIT = 2.0
 """Ratio of predicted residual and noise beyond which the model lacks something. Chosen."""
 MOST_TERMS, MOST_COMBINATIONS, ROUND = 6, 12, 1e-3
@@ -327,31 +333,11 @@ def _cell(text: str) -> str:
     return f'"{quoted}"' if set(text) & set(',"\n') else text
 
 
-class Described(NamedTuple):
-    """What a file says of the model: path, joints (the first is "" if it has no torque), and which of them slide."""
-
-    path: Path
-    joints: tuple[str, ...]
-    slides: tuple[bool, ...]
-
-
-class Quantity(NamedTuple):
-    """What logs determine: title of its kind, words, unit, numbers, and terms with factors to a thousandth."""
-
-    kind: str
-    words: str
-    unit: str
-    model: float
-    value: float
-    se: float
-    terms: frozenset[tuple[tuple[str, str], float]]
-
-
 @dataclass(frozen=True, eq=False)
 class Told:
-    """A calibration as its JSON has it; attributes are those of ``ArmCalibration`` that its text needs."""
+    """A calibration as its JSON has it: attributes of ``ArmCalibration``; ``model`` has path, joints and slides."""
 
-    model: Described
+    model: Any
     joints: tuple[int, ...]
     parameters: tuple[Parameter, ...]
     combinations: tuple[Combination, ...]
@@ -371,22 +357,19 @@ class Told:
         return list(_unknown(self.found, [p for p in self.parameters if not p.determined]))
 
     @property
-    def determined(self) -> list[Quantity]:
-        """All that the logs determine: parameters, with readable units, and combinations."""
-        out = []
+    def determined(self) -> dict[frozenset[tuple[tuple[str, str], float]], Quantity]:
+        """Determined parameters and combinations by their terms, with factors to a thousandth."""
+        out = {}
         for p in (p for p in self.parameters if p.determined):
             what, unit, x = described(p.name)
-            words, terms = (
-                f"{what} of {place_in_words(self.found, p.place)}",
-                frozenset([((p.place, p.name), 1.0)]),
-            )
             kind = f"Determined, {'in the model' if p.in_model else 'of the log'}"
-            out.append(Quantity(kind, words, unit, x * p.model, x * p.value, x * p.se, terms))
+            words, terms = f"{what} of {place_in_words(self.found, p.place)}", [((p.place, p.name), 1.0)]
+            out[frozenset(terms)] = kind, words, unit, x * p.model, x * p.value, x * p.se
         for c in self.combinations:
             name, units = next(iter(c.terms))[1], {"m": "kg"} | dict.fromkeys(("mx", "my", "mz"), "kg m")
             unit = described(name)[1] if "_" in name else units.get(name, "kg m^2")
             terms = frozenset((k, round(x, 3)) for k, x in c.terms.items() if abs(x) > ROUND)
-            out.append(Quantity(COMBINED, _formula(c), unit, c.model, c.value, c.se, terms))
+            out[terms] = COMBINED, _formula(c), unit, c.model, c.value, c.se
         return out
 
     @property
@@ -406,51 +389,44 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
         InputError: a value is missing, invalid or unknown.
     """
     file = Fields(values, KEYS, where, ("provenance",))
-    file.one_of("format", (FORMAT,))
-    if file.whole("version") != VERSION:
-        file.refuse("version", str(VERSION))
-    parameters = tuple(_parameter(one) for one in file.objects("parameters", PARAMETER))
-    held = {
-        joint: Fields(sizes, HELD_OUT, f"{where}: held_out: {joint}")
-        for joint, sizes in file.object("held_out").items()
-    }
+    file.check({"version": (str(VERSION), lambda version: version == VERSION)})
+    parameters = tuple(map(_parameter, file.objects("parameters", PARAMETER)))
+    held = file.object("held_out")
+    # Zeros are those of all joints but the first, which has friction if it has torque.
     zeros = [p.place for p in parameters if p.name.startswith("zero_")]
     joints = (next((joint for joint in held if joint not in zeros), ""), *zeros)
-    sliding = {p.place for p in parameters if p.name == "coulomb_N"}
     if not held or set(held) - set(joints):
         file.refuse("held_out", "an object with the torques of joints that are in parameters")
-    known = tuple(sorted(joints.index(joint) for joint in held))
-    table = np.zeros((len(HELD_OUT), len(joints)))
+    known, table = tuple(j for j, joint in enumerate(joints) if joint in held), np.zeros((5, len(joints)))
     for j in known:
-        table[:, j] = [held[joints[j]].number(name, 0.0) for name in HELD_OUT]
+        sizes = Fields(held[joints[j]], HELD_OUT, f"{where}: held_out: {joints[j]}")
+        table[:, j] = [sizes.number(name, 0.0) for name in HELD_OUT]
+    slides = [any((p.place, p.name) == (joint, "coulomb_N") for p in parameters) for joint in joints]
+    combinations = tuple(map(_combination, file.objects("combinations", ("terms", *PARAMETER[2:5]))))
     return Told(
-        Described(Path(file.words("model")), joints, tuple(joint in sliding for joint in joints)),
-        known, parameters, tuple(_combination(one) for one in file.objects("combinations", COMBINATION)),
+        SimpleNamespace(path=Path(file.words("model")), joints=joints, slides=slides), known, parameters, combinations,
         (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"),
     )  # fmt: skip
 
 
-def _quantity(one: Fields, others: Sequence[str] = ()) -> str:
-    name = one.text("parameter")
-    try:
-        if name not in others:
-            described(name)
-    except (KeyError, StopIteration):
-        one.refuse("parameter", "a quantity with its unit, such as coulomb_Nm")
-    return name
-
-
 def _parameter(one: Fields) -> Parameter:
+    one.check(QUANTITY)
     se, prior = (one.number(key, above=0.0) for key in ("se", "prior_se"))
-    place, name, known = one.words("place"), _quantity(one), one.flag("determined")
-    return Parameter(
-        place, name, one.number("model"), one.number("value"), se, prior, known, one.flag("in_model")
+    model, value, place, name = (
+        one.number("model"),
+        one.number("value"),
+        one.words("place"),
+        one.text("parameter"),
     )
+    return Parameter(place, name, model, value, se, prior, one.flag("determined"), one.flag("in_model"))
 
 
 def _combination(one: Fields) -> Combination:
-    terms = one.objects("terms", ("place", "parameter", "factor"))
-    if not terms:
+    factors = {}
+    for term in one.objects("terms", ("place", "parameter", "factor")):
+        if term.text("parameter") not in MOMENTS:
+            term.check(QUANTITY)
+        factors[term.words("place"), term.text("parameter")] = term.number("factor")
+    if not factors:
         one.refuse("terms", "a list of at least one term")
-    factors = {(term.words("place"), _quantity(term, MOMENTS)): term.number("factor") for term in terms}
     return Combination(factors, one.number("model"), one.number("value"), one.number("se", above=0.0))

@@ -43,10 +43,8 @@ from mocobot.results import Folder
 
 FORMAT, VERSION = "mocobot-comparison", 1
 NAME, REPORT, PICTURE = "comparison.json", "report.txt", "comparison.png"
-KINDS = {
-    ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis",
-    "mocobot-joint-calibration": "joint calibration",
-}  # fmt: skip
+KINDS = {ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis"}
+KINDS["mocobot-joint-calibration"] = "joint calibration"  # discrepancy.joints.calibrated loads mujoco
 SOUGHT = "an estimate of `mocobot estimate`, or a calibration or diagnosis of `mocobot calibrate` or `diagnose --out`"
 WIDTH = 110
 
@@ -104,13 +102,13 @@ class Comparison(Folder):
         lines += _fill(self.verdict)
         lines += [line for sentence in self.changes for line in _fill(sentence, "- ")]
         names = [_label(group, entry) for group in self.groups for entry in group.entries]
-        width = max(map(len, names), default=0)
+        width = min(WIDTH // 2, max(map(len, names), default=0))
         if self.groups:
             lines += ["", f"{'':{width}}{'A':>24}{'B':>24}{'B - A':>24}{'over its error':>16}"]
         changed = self.changed_groups
         for group in self.groups:
             lines += [
-                f"{_label(group, entry):{width}}{row}{' *' * (group in changed)}"
+                f"{_beside(_label(group, entry), width)}{row}{' *' * (group in changed)}"
                 for entry, row in zip(group.entries, _rows(group), strict=True)
             ]
         if close := [group.name for group in self.groups if group.together]:
@@ -243,7 +241,7 @@ def _result(name: str, where: str, values: dict[str, Any]) -> _Result:
     elif kind == "calibration":
         value = calibration_from_dict(values, where)
     elif kind == "joint calibration":
-        from discrepancy.joints.calibrated import from_dict  # mujoco
+        from discrepancy.joints.calibrated import from_dict
 
         value = from_dict(values, where)
     elif kind == "diagnosis":
@@ -304,6 +302,10 @@ def _with_error(value: float, se: float) -> str:
 def _label(group: Group, entry: str) -> str:
     unit = f" [{group.unit}]" if group.unit else ""
     return f"{group.name}{' ' * bool(entry)}{entry}{unit}"
+
+
+def _beside(name: str, width: int) -> str:
+    return name.ljust(width) if len(name) <= width else f"{name}\n{'':{width}}"
 
 
 def _fill(text: str, mark: str = "") -> list[str]:

@@ -394,30 +394,22 @@ def joint_groups(a: "Told", b: "Told") -> list[Group]:
     Raises:
         InputError: the calibrations are of different robots.
     """
-    robots = [{p.place for p in one.parameters if p.name.startswith(("mass_", "zero_"))} for one in (a, b)]
-    if robots[0] != robots[1]:
-        only = [", ".join(sorted(one)) or "none" for one in (robots[0] - robots[1], robots[1] - robots[0])]
-        raise InputError(
-            f"the calibrations are of different robots: links and joints of the first alone are {only[0]}, of the "
-            f"second alone {only[1]}"
-        )
-    others, groups = {q.terms: q for q in b.determined}, []
-    for one in a.determined:
-        if other := others.get(one.terms):
-            pair = [_value({"value": q.value, "se": q.se}) for q in (one, other)]
-            groups.append(Group.of(one.words, one.unit, ("",), *pair))
-    return groups
+    one, two = ({p.place for p in c.parameters if p.name.startswith(("mass_", "zero_"))} for c in (a, b))
+    if one != two:
+        only = ", ".join(sorted(one ^ two))
+        raise InputError(f"the calibrations are of different robots: only one of them has {only}")
+    both = [(x, b.determined[terms]) for terms, x in a.determined.items() if terms in b.determined]
+    numbers = [[_value({"value": q[4], "se": q[5]}) for q in pair] for pair in both]
+    return [Group.of(x[1], x[2], ("",), *ab) for (x, _), ab in zip(both, numbers, strict=True)]
 
 
 def joint_notes(a: "Told", b: "Told") -> list[str]:
     """List caveats about the comparison of two calibrations of a robot's joints, one sentence each."""
-    terms = [{q.terms for q in one.determined} for one in (a, b)]
-    alone = [
-        f"{name} alone determines {', '.join(q.words for q in one.determined if q.terms not in other)}."
-        for name, one, other in (("A", a, terms[1]), ("B", b, terms[0]))
-        if {q.terms for q in one.determined} - other
-    ]
-    return ["Errors of one calibration are correlated among each other, which its file does not say.", *alone]
+    notes = ["Errors of one calibration are correlated among each other, which its file does not say."]
+    for name, one, other in (("A", a.determined, b.determined), ("B", b.determined, a.determined)):
+        if alone := [q[1] for terms, q in one.items() if terms not in other]:
+            notes.append(f"{name} alone determines: {'; '.join(alone)}.")
+    return notes
 
 
 Cause = Mapping[str, Any]
