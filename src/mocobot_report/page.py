@@ -118,7 +118,7 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
     for result, context in zip(results, contexts, strict=True):
         several = sum(one.kind == result.kind for one in results) > 1
         detail = f"The {_word(result.kind)} in detail"
-        name = f"{result.kind.capitalize()} {result.path.name}" if several else detail
+        name = f"{_word(result.kind).capitalize()} {result.path.name}" if several else detail
         page.parts.append(_Part(page.identity(result.kind), name))
         with complete(result.path):
             part = templates().get_template(f"{result.kind}.html")
