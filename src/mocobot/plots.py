@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -163,13 +164,12 @@ def save_comparison(found: Any, path: Path) -> None:
         marker = "o" if at == ratio else ">" if ratio > 0 else "<"
         axis.plot([at], [y], marker, ms=5, color=LIGHT["before" if group in changed else "after"])
         reach = max(reach, abs(at))
-    labels = [f"{group.name} {group.entries[k]}".rstrip() for group, k in rows]
+    labels = [shorten(f"{group.name} {group.entries[k]}", 50, placeholder=" ...") for group, k in rows]
     axis.set_yticks(range(len(rows)), labels, fontsize=8)
     axis.set_ylim(len(rows) - 0.5, -0.5)
     axis.set_xlim(-1.08 * reach, 1.08 * reach)
-    axis.set_xlabel(
-        "(B - A) over its standard error; band: two standard errors; orange: changed; arrow: farther off"
-    )
+    note = "band: two standard errors; orange: changed; arrow: farther off"
+    axis.set_xlabel(f"(B - A) over its standard error; {note}", fontsize=9)
     axis.set_title(f"A: {found.a}\nB: {found.b}", loc="left", fontsize=9)
     for side in ("top", "right"):
         axis.spines[side].set_visible(False)

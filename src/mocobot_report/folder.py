@@ -8,6 +8,8 @@ from typing import Any
 
 from jinja2 import UndefinedError
 
+from discrepancy.joints.calibrated import FORMAT as JOINT_CALIBRATION
+from discrepancy.joints.calibrated import from_dict
 from discrepancy.result.read import FORMAT as DIAGNOSIS
 from discrepancy.result.read import as_now, parse_diagnosis
 from discrepancy.result.report import format_verdict
@@ -29,7 +31,7 @@ from mocobot_report import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.payload import read_estimate
 
-KINDS = ("paper", "estimate", "calibration", "diagnosis", "campaign")
+KINDS = ("paper", "estimate", "calibration", "diagnosis", "joint-calibration", "campaign")
 """Kinds of results, in the order of the page."""
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
@@ -42,7 +44,7 @@ class Result:
 
     kind: str  # one of KINDS
     path: Path
-    found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, or a campaign's summary
+    found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, Told, or a campaign's summary
     provenance: Json | None
     files: tuple[Path, ...]  # files from which it was read
 
@@ -91,7 +93,8 @@ def read_folder(folder: Path) -> list[Result]:
 def _kind(path: Path, values: Json) -> str | None:
     if path.name in ("paper.json", "diagnosis.json"):
         return path.stem
-    formats = {DIAGNOSIS: "diagnosis", ESTIMATE: "estimate", CAMPAIGN: "campaign", CALIBRATION: "calibration"}
+    known = (ESTIMATE, CALIBRATION, DIAGNOSIS, JOINT_CALIBRATION, CAMPAIGN)
+    formats: dict[str, str] = dict(zip(known, KINDS[1:], strict=True))
     named = values.get("format")
     return formats.get(named) if isinstance(named, str) else None
 
@@ -152,8 +155,10 @@ def _estimate(path: Path, values: Json) -> Result:
 
 
 def _calibration(path: Path, values: Json) -> Result:
-    found = calibration_from_dict(values, str(path))
-    return Result("calibration", path, found, _provenance_within(values), (path,))
+    kind, read = "calibration", calibration_from_dict
+    if values["format"] == JOINT_CALIBRATION:
+        kind, read = "joint-calibration", from_dict
+    return Result(kind, path, read(values, str(path)), _provenance_within(values), (path,))
 
 
 def _diagnosis(path: Path, values: Json) -> Result:
@@ -177,7 +182,7 @@ def _campaign(path: Path, values: Json) -> Result:
 
 READERS: Mapping[str, Callable[[Path, Json], Result]] = {
     "paper": _paper, "estimate": _estimate, "calibration": _calibration, "diagnosis": _diagnosis,
-    "campaign": _campaign,
+    "joint-calibration": _calibration, "campaign": _campaign,
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from discrepancy.evidence.settings import SETTINGS
 from estimator.errors import InputError
 from estimator.files import add_written, check_target, file_facts, whole_file
 from estimator.inputs import printable
-from mocobot_report import NAME, SUFFIX, calibration, campaign, diagnosis, estimate, paper
+from mocobot_report import NAME, SUFFIX, calibration, campaign, diagnosis, estimate, joint_calibration, paper
 from mocobot_report.charts import Chart
 from mocobot_report.folder import Result, complete, read_folder
 from mocobot_report.numbers import counted, size
@@ -32,7 +32,7 @@ Say = Callable[[str], object]
 Context = dict[str, Any]
 PARTS: Mapping[str, Callable[[Result, Say], Context]] = {
     "paper": paper.context, "estimate": estimate.context, "calibration": calibration.context,
-    "diagnosis": diagnosis.context, "campaign": campaign.context,
+    "diagnosis": diagnosis.context, "joint-calibration": joint_calibration.context, "campaign": campaign.context,
 }  # fmt: skip
 """Function per kind of result that returns the data of its template: ``title``, ``pictures`` and further names."""
 
@@ -117,7 +117,8 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
     page, answers = _Page(), Markup("")
     for result, context in zip(results, contexts, strict=True):
         several = sum(one.kind == result.kind for one in results) > 1
-        name = f"{result.kind.capitalize()} {result.path.name}" if several else IN_DETAIL[result.kind]
+        detail = f"The {_word(result.kind)} in detail"
+        name = f"{_word(result.kind).capitalize()} {result.path.name}" if several else detail
         page.parts.append(_Part(page.identity(result.kind), name))
         with complete(result.path):
             part = templates().get_template(f"{result.kind}.html")
@@ -141,11 +142,6 @@ def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None
     return _whole(page, title_of(titles), answer)
 
 
-IN_DETAIL = {
-    "paper": "The experiment in detail", "estimate": "The estimate in detail",
-    "calibration": "The calibration in detail", "diagnosis": "The diagnosis in detail",
-    "campaign": "The campaign in detail",
-}  # fmt: skip
 LONGEST_TITLE = 160
 
 
@@ -243,10 +239,13 @@ def _jpeg(pixels: Any) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode("ascii")
 
 
+def _word(kind: str) -> str:
+    return "experiment" if kind == "paper" else kind.rpartition("-")[2]
+
+
 def _called(result: Result) -> str:
-    if result.kind in ("estimate", "calibration"):
-        return result.path.name
-    return "the experiment" if result.kind == "paper" else f"the {result.kind}"
+    word = _word(result.kind)
+    return result.path.name if word in ("estimate", "calibration") else f"the {word}"
 
 
 def _option(value: Any) -> str:

@@ -1,5 +1,6 @@
-"""Pictures of a calibration: parameters against priors, misfit of recordings, information from each recording."""
+"""Pictures of calibrations: parameters, misfit and information of each recording; torques left of joints."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,15 +8,18 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from discrepancy.joints.calibrated import Told
 from estimator.arm.unit import AT
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.text import SHOWN, shown_groups
 from mocobot_report.calibration import COLOURS, FITS, fits_of, kind_names, shares_of
+from mocobot_report.charts import Key
+from mocobot_report.joint_calibration import LEFT
 from mocobot_report.numbers import short_names
 from mocobot_report.palette import LIGHT
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 
-MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
+MARKERS = {"circle": "o", "square": "s", "diamond": "D", "x": "x"}
 
 
 @plain_words()
@@ -77,23 +81,23 @@ def _recordings(calibration: Calibration) -> Figure:
     figure = Figure(figsize=(11.0, 0.38 * len(names) + 1.5), layout="constrained")
     axes = figure.subplots(1, 2, squeeze=False, sharey=True)[0]
     for kind, (axis, title) in enumerate(zip(axes, ("loops", "balance"), strict=True)):
-        for key in FITS:
-            shown = fits_of(calibration, kind, key)
-            axis.plot(
-                [x for _, x in shown], [row for row, _ in shown], MARKERS[key.symbol], color=LIGHT[key.colour],
-                label=key.label if not kind else None, ms=6,
-            )  # fmt: skip
+        _rows(axis, names, "chi²/n", {key: dict(fits_of(calibration, kind, key)) for key in FITS})
         axis.axvline(1.0, color=LIGHT["text"], lw=1.0, ls="--")
-        axis.set_xscale("log")
-        plain_numbers(axis.xaxis)
-        axis.set_yticks(range(len(names)), names, fontsize=9)
-        axis.set_ylim(len(names) - 0.4, -0.6)
-        axis.set_xlabel("chi²/n")
         axis.set_title(title, loc="left", fontsize=10)
-        _plain(axis)
-    figure.legend(loc="outside upper right", ncols=3, frameon=False, fontsize=9)
+    handles = axes[0].get_lines()[: len(FITS)]
+    figure.legend(handles=handles, loc="outside upper right", ncols=3, frameon=False, fontsize=9)
     figure.suptitle("What recordings leave over; 1 is noise alone", x=0.01, ha="left", fontsize=11)
     return figure
+
+
+def save_torques(told: Told, path: Path) -> None:
+    """Draw the torque that is left of every joint."""
+    figure = Figure(figsize=(9.0, 0.38 * len(told.names) + 1.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    _rows(axis, told.names, "rms torque left", {key: dict(enumerate(told.rms(key.group))) for key in LEFT})
+    figure.legend(loc="outside upper right", ncols=4, frameon=False, fontsize=9)
+    figure.savefig(path, dpi=110)
 
 
 def _shares(calibration: Calibration) -> Figure:
@@ -116,6 +120,18 @@ def _shares(calibration: Calibration) -> Figure:
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     figure.suptitle("What each recording contributes to what is known", x=0.01, ha="left", fontsize=11)
     return figure
+
+
+def _rows(axis: Axes, names: Sequence[str], label: str, series: Mapping[Key, Mapping[int, float]]) -> None:
+    """Draw the numbers of each legend entry by row, on a logarithmic axis."""
+    for key, of in series.items():
+        axis.plot([*of.values()], [*of], MARKERS[key.symbol], color=LIGHT[key.colour], label=key.label, ms=6)
+    axis.set_xscale("log")
+    plain_numbers(axis.xaxis)
+    axis.set_yticks(range(len(names)), names, fontsize=9)
+    axis.set_ylim(len(names) - 0.4, -0.6)
+    axis.set_xlabel(label)
+    _plain(axis)
 
 
 def _plain(axis: Axes) -> None:

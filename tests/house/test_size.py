@@ -15,9 +15,9 @@ CEILINGS = {
     "mocobot_logs": 6_850,
     "mocobot_inspect": 2_970,
     "mocobot_sim": 5_680,
-    "discrepancy": 12_600,
+    "discrepancy": 12_690,
     "mocobot_view": 2_155,
-    "mocobot_report": 2_730,
+    "mocobot_report": 2_790,
     "mocobot": 4_850,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""

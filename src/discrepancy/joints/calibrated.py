@@ -18,20 +18,26 @@ notes               sentences
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
 import mujoco
+import numpy as np
 
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
 from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
 from discrepancy.joints.effects import numbered
+from discrepancy.joints.problem import MOMENTS
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.statistics import measured, rms
+from estimator.strict import Fields
 from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import put, take_along
@@ -39,6 +45,8 @@ from mocobot_sim.serial.mjcf import keep_inertials, set_inertial, with_effects
 
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
+KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
+PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
@@ -50,9 +58,16 @@ UNITS = {
     "Nms_per_rad": "N m s/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
     "N": "N", "s": "s",
 }  # fmt: skip
+QUANTITY = {"parameter": (
+    "a quantity with its unit, such as coulomb_Nm", lambda name: name == "gain" or (isinstance(name, str)
+    and name.partition("_")[0] in WORDS and name.endswith(tuple(f"_{unit}" for unit in UNITS))),
+)}  # fmt: skip
 SMALL = {"rad": ("mrad", 1e3), "m": ("mm", 1e3), "s": ("ms", 1e3)}
 WIDTH = 100
 """Width of the text."""
+COMBINED = "Determined in combination only"
+Quantity = tuple[str, str, str, float, float, float]
+"""Title of its kind, words, unit, given and found value, standard error."""
 MISFIT = 2.0
 """Ratio of predicted residual and noise beyond which the model lacks something. Chosen."""
 MOST_TERMS, MOST_COMBINATIONS, ROUND = 6, 12, 1e-3
@@ -95,10 +110,7 @@ def _mean(held: Sequence[HeldOut], name: str, joint: int) -> float:
 
 def to_text(found: ArmCalibration) -> str:
     """Report: the gain on held-out data, what the logs determine, and what they do not."""
-    lines = (
-        textwrap.wrap(line, WIDTH, subsequent_indent="") or [""] if line[:1] != " " else [line]
-        for line in _lines(found)
-    )
+    lines = ([line] if line[:1] in ("", " ") else textwrap.wrap(line, WIDTH) for line in _lines(found))
     return "\n".join(part for wrapped in lines for part in wrapped)
 
 
@@ -327,3 +339,102 @@ def _cell(text: str) -> str:
     """A cell of a CSV table."""
     quoted = text.replace('"', '""')
     return f'"{quoted}"' if set(text) & set(',"\n') else text
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """A calibration as its JSON has it: attributes of ``ArmCalibration``; ``model`` has path, joints and slides."""
+
+    model: Any
+    joints: tuple[int, ...]
+    parameters: tuple[Parameter, ...]
+    combinations: tuple[Combination, ...]
+    held_out: tuple[HeldOut, ...]
+    validated: bool
+    logs: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def found(self) -> ArmCalibration:
+        """The same for the functions of this module that make text and JSON, which need no more."""
+        return cast(ArmCalibration, self)
+
+    @property
+    def unknown(self) -> list[str]:
+        """What is not determined, a line for places with the same quantities."""
+        return list(_unknown(self.found, [p for p in self.parameters if not p.determined]))
+
+    @property
+    def determined(self) -> dict[frozenset[tuple[tuple[str, str], float]], Quantity]:
+        """Determined parameters and combinations by their terms, with factors to a thousandth."""
+        out = {}
+        for p in (p for p in self.parameters if p.determined):
+            what, unit, x = described(p.name)
+            kind = f"Determined, {'in the model' if p.in_model else 'of the log'}"
+            words, terms = f"{what} of {place_in_words(self.found, p.place)}", [((p.place, p.name), 1.0)]
+            out[frozenset(terms)] = kind, words, unit, x * p.model, x * p.value, x * p.se
+        for c in self.combinations:
+            name, units = next(iter(c.terms))[1], {"m": "kg"} | dict.fromkeys(("mx", "my", "mz"), "kg m")
+            unit = described(name)[1] if "_" in name else units.get(name, "kg m^2")
+            terms = frozenset((k, round(x, 3)) for k, x in c.terms.items() if abs(x) > ROUND)
+            out[terms] = COMBINED, _formula(c), unit, c.model, c.value, c.se
+        return out
+
+    @property
+    def names(self) -> list[str]:
+        """Name and unit of every joint with torque."""
+        return [f"{self.model.joints[j]} [{'N' if self.model.slides[j] else 'N m'}]" for j in self.joints]
+
+    def rms(self, name: str) -> Array:
+        """Return an attribute of ``HeldOut`` of the joints with torque, shape (K,) [N m or N]."""
+        return getattr(self.held_out[0], name)[list(self.joints)]
+
+
+def from_dict(values: Mapping[str, Any], where: str) -> Told:
+    """Read the values of ``to_dict``, with or without provenance; ``where`` is the file's name in messages.
+
+    Raises:
+        InputError: a value is missing, invalid or unknown.
+    """
+    file = Fields(values, KEYS, where, ("provenance",))
+    file.check({"version": (str(VERSION), lambda version: version == VERSION)})
+    parameters = tuple(map(_parameter, file.objects("parameters", PARAMETER)))
+    held = file.object("held_out")
+    # Zeros are those of all joints but the first, which has friction if it has torque.
+    zeros = [p.place for p in parameters if p.name.startswith("zero_")]
+    joints = (next((joint for joint in held if joint not in zeros), ""), *zeros)
+    if not held or set(held) - set(joints):
+        file.refuse("held_out", "an object with the torques of joints that are in parameters")
+    known, table = tuple(j for j, joint in enumerate(joints) if joint in held), np.zeros((5, len(joints)))
+    for j in known:
+        sizes = Fields(held[joints[j]], HELD_OUT, f"{where}: held_out: {joints[j]}")
+        table[:, j] = [sizes.number(name, 0.0) for name in HELD_OUT]
+    slides = [any((p.place, p.name) == (joint, "coulomb_N") for p in parameters) for joint in joints]
+    combinations = tuple(map(_combination, file.objects("combinations", ("terms", *PARAMETER[2:5]))))
+    return Told(
+        SimpleNamespace(path=Path(file.words("model")), joints=joints, slides=slides), known, parameters, combinations,
+        (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"),
+    )  # fmt: skip
+
+
+def _parameter(one: Fields) -> Parameter:
+    one.check(QUANTITY)
+    se, prior = (one.number(key, above=0.0) for key in ("se", "prior_se"))
+    model, value, place, name = (
+        one.number("model"),
+        one.number("value"),
+        one.words("place"),
+        one.text("parameter"),
+    )
+    return Parameter(place, name, model, value, se, prior, one.flag("determined"), one.flag("in_model"))
+
+
+def _combination(one: Fields) -> Combination:
+    factors = {}
+    for term in one.objects("terms", ("place", "parameter", "factor")):
+        if term.text("parameter") not in MOMENTS:
+            term.check(QUANTITY)
+        factors[term.words("place"), term.text("parameter")] = term.number("factor")
+    if not factors:
+        one.refuse("terms", "a list of at least one term")
+    return Combination(factors, one.number("model"), one.number("value"), one.number("se", above=0.0))

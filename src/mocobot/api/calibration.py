@@ -1,7 +1,7 @@
 """Calibrate the robots of a team from recordings of the payloads that they carry, or a single robot from joint logs.
 
 Folder of a single robot: as_found.xml with its assets, parameters.csv, calibration.json (see
-``discrepancy.joints.calibrated``) and report.txt. Folder of a team:
+``discrepancy.joints.calibrated``), report.txt and torques.png, what is left of torques. Folder of a team:
 
 calibration.json           see ``estimator.calibrate.json``
 report.txt                 text that the command prints
@@ -147,6 +147,10 @@ class JointCalibration(Folder):
             InputError: a file cannot be written, or MuJoCo refuses the model.
         """
         calibrated.write_into(self.found, folder, **more)
+        if pictures and draws_plots():
+            from mocobot_report.plots_calibration import save_torques
+
+            save_torques(calibrated.from_dict(self.to_dict(), ""), folder / "torques.png")
         return []
 
 

@@ -3,7 +3,7 @@
 Keys of the JSON:
 
 format, version     "mocobot-comparison", 1
-kind                "estimate", "calibration" or "diagnosis"
+kind                "estimate", "calibration", "joint calibration" or "diagnosis"
 a, b                names of the compared files or folders
 changed             whether anything differs by more than its standard errors
 groups              list of {name, unit, chi2, dof, p, changed, together, quantities}: p is the p-value of the
@@ -44,6 +44,7 @@ from mocobot.results import Folder
 FORMAT, VERSION = "mocobot-comparison", 1
 NAME, REPORT, PICTURE = "comparison.json", "report.txt", "comparison.png"
 KINDS = {ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis"}
+KINDS["mocobot-joint-calibration"] = "joint calibration"  # discrepancy.joints.calibrated loads mujoco
 SOUGHT = "an estimate of `mocobot estimate`, or a calibration or diagnosis of `mocobot calibrate` or `diagnose --out`"
 WIDTH = 110
 
@@ -53,7 +54,7 @@ class Comparison(Folder):
     """Differences between two results of one kind; prints as text and writes a folder.
 
     Attributes:
-        kind: ``"estimate"``, ``"calibration"`` or ``"diagnosis"``.
+        kind: ``"estimate"``, ``"calibration"``, ``"joint calibration"`` or ``"diagnosis"``.
         a, b: names of the results.
         groups: quantities that both results contain, with their differences.
         changes: findings that only one result has or that differ, one sentence each.
@@ -101,13 +102,13 @@ class Comparison(Folder):
         lines += _fill(self.verdict)
         lines += [line for sentence in self.changes for line in _fill(sentence, "- ")]
         names = [_label(group, entry) for group in self.groups for entry in group.entries]
-        width = max(map(len, names), default=0)
+        width = min(WIDTH // 2, max(map(len, names), default=0))
         if self.groups:
             lines += ["", f"{'':{width}}{'A':>24}{'B':>24}{'B - A':>24}{'over its error':>16}"]
         changed = self.changed_groups
         for group in self.groups:
             lines += [
-                f"{_label(group, entry):{width}}{row}{' *' * (group in changed)}"
+                f"{_beside(_label(group, entry), width)}{row}{' *' * (group in changed)}"
                 for entry, row in zip(group.entries, _rows(group), strict=True)
             ]
         if close := [group.name for group in self.groups if group.together]:
@@ -182,6 +183,8 @@ def compare(a: Any, b: Any) -> Comparison:
         groups, notes = groups_of.estimate_groups(x, y), groups_of.estimate_notes(x, y)
     elif one.kind == "calibration":
         groups, notes = groups_of.calibration_groups(x, y), groups_of.calibration_notes(x, y)
+    elif one.kind == "joint calibration":
+        groups, notes = groups_of.joint_groups(x, y), groups_of.joint_notes(x, y)
     else:
         if {x.get("machine"), y.get("machine")} >= {"team", "joints"}:
             raise InputError(
@@ -237,6 +240,10 @@ def _result(name: str, where: str, values: dict[str, Any]) -> _Result:
             raise InputError(f"{where}: {error}") from error
     elif kind == "calibration":
         value = calibration_from_dict(values, where)
+    elif kind == "joint calibration":
+        from discrepancy.joints.calibrated import from_dict
+
+        value = from_dict(values, where)
     elif kind == "diagnosis":
         parse_diagnosis(values, Path(where))
     else:
@@ -295,6 +302,10 @@ def _with_error(value: float, se: float) -> str:
 def _label(group: Group, entry: str) -> str:
     unit = f" [{group.unit}]" if group.unit else ""
     return f"{group.name}{' ' * bool(entry)}{entry}{unit}"
+
+
+def _beside(name: str, width: int) -> str:
+    return name.ljust(width) if len(name) <= width else f"{name}\n{'':{width}}"
 
 
 def _fill(text: str, mark: str = "") -> list[str]:

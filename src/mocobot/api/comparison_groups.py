@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.result import PayloadEstimate
+
+if TYPE_CHECKING:
+    from discrepancy.joints.calibrated import Told
 
 LEVEL = 0.01
 """Probability that two results of the same truth are reported as different. Chosen: one false alarm in a hundred,
@@ -383,6 +386,30 @@ def _about_com(payload: CalibratedPayload) -> tuple[Array, Array, Array]:
     found = carried(payload, 0.0)
     values = np.concatenate([[found.mass_kg], found.p_1c, inertia_parameters(found.inertia)])
     return values, found.covariance, found.by_scale
+
+
+def joint_groups(a: "Told", b: "Told") -> list[Group]:
+    """Pair what both calibrations of a robot's joints determine: parameters by place and name, combinations by terms.
+
+    Raises:
+        InputError: the calibrations are of different robots.
+    """
+    one, two = ({p.place for p in c.parameters if p.name.startswith(("mass_", "zero_"))} for c in (a, b))
+    if one != two:
+        only = ", ".join(sorted(one ^ two))
+        raise InputError(f"the calibrations are of different robots: only one of them has {only}")
+    both = [(x, b.determined[terms]) for terms, x in a.determined.items() if terms in b.determined]
+    numbers = [[_value({"value": q[4], "se": q[5]}) for q in pair] for pair in both]
+    return [Group.of(x[1], x[2], ("",), *ab) for (x, _), ab in zip(both, numbers, strict=True)]
+
+
+def joint_notes(a: "Told", b: "Told") -> list[str]:
+    """List caveats about the comparison of two calibrations of a robot's joints, one sentence each."""
+    notes = ["Errors of one calibration are correlated among each other, which its file does not say."]
+    for name, one, other in (("A", a.determined, b.determined), ("B", b.determined, a.determined)):
+        if alone := [q[1] for terms, q in one.items() if terms not in other]:
+            notes.append(f"{name} alone determines: {'; '.join(alone)}.")
+    return notes
 
 
 Cause = Mapping[str, Any]
