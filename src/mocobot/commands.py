@@ -329,13 +329,14 @@ def example(options: opt.Example) -> None:
     with whole_folder(options.out, "example") as folder:
         write_example(folder)
     today, last_week, model = (options.out / name for name in (TODAY, LAST_WEEK, MODEL))
+    arm = [today, "--model", model]
     print(f"{today}: 30 s of a six-axis arm with one fault. {last_week}: the arm before. {model}: its model.")
     for purpose, command, made in (
-        ("Which column is which joint?", ["map", today, "--model", model], "log.toml"),
-        ("What does the model get wrong?", ["diagnose", today, "--model", model], "verdict"),
-        ("What has changed since last week?", ["diagnose", today, "--model", model, "--reference", last_week], "changed"),
-        ("What is the model of the arm as it is?", ["calibrate", today, "--model", model], "calibrated"),
-    ):  # fmt: skip
+        ("Which column is which joint?", ["map", *arm], "log.toml"),
+        ("What does the model get wrong?", ["diagnose", *arm], "verdict"),
+        ("What has changed since last week?", ["diagnose", *arm, "--reference", last_week], "changed"),
+        ("What is the model of the arm as it is?", ["calibrate", *arm], "calibrated"),
+    ):
         print(f"\n{purpose}\n    {command_line([*command, '--out', options.out / made])}")
     print(f"\nThe answer is in {options.out / ANSWER}.")
 
