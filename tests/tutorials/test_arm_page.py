@@ -11,10 +11,11 @@ from pathlib import Path
 import mujoco
 import pytest
 
+from shown_text import in_words
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "tutorials" / "arm.md"
 BLOCK = re.compile(r"^```console\n\$ (.+)\n((?:.*\n)*?)```$", re.MULTILINE)
-NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 MOST_COMMANDS = 10
 
 
@@ -24,11 +25,6 @@ def shown() -> list[tuple[list[str], list[str]]]:
     found = [(shlex.split(command), output.splitlines()) for command, output in BLOCK.findall(text)]
     assert len(found) == text.count("\n$ ")
     return found
-
-
-def in_words(line: str) -> str:
-    """A line without its numbers, whose last digits differ between processors, and their widths."""
-    return re.sub(r"\s+", " ", NUMBER.sub("#", line)).strip()
 
 
 def outputs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:

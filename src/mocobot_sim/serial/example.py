@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.files import write_text
+from estimator.files import make_folder, write_text
 from mocobot_sim.scene.models import models_dir
 
 MODEL, TODAY, LAST_WEEK, ANSWER = "arm.xml", "today.csv", "last_week.csv", "answer.txt"
@@ -33,13 +33,13 @@ WEEK_S, TODAY_S = 604_800.0, 1_767_600_000.0
 """One week, and the time at which the log of today begins (Unix time)."""
 
 
-def write_example(folder: Path) -> None:
-    """Write model, logs and answer into an existing folder; always the same bits on one machine.
+def write_example(folder: Path | str) -> None:
+    """Write model, logs and answer into a folder, which is created if missing; the same bits each time on one machine.
 
     Raises:
         InputError: a file cannot be written.
     """
-    source = models_dir() / "six_axis" / MODEL
+    folder, source = make_folder(Path(folder)), models_dir() / "six_axis" / MODEL
     shutil.copyfile(source, folder / MODEL)
     model, rubs = mujoco.MjModel.from_xml_path(str(source)), []
     for name, more, start, seed in ((LAST_WEEK, 0.0, TODAY_S - WEEK_S, 1), (TODAY, FAULT_NM, TODAY_S, 2)):
