@@ -162,7 +162,10 @@ def _nav(uris: list[str]) -> list[dict[str, Any]]:
     out, seen = [], set()
     for title, entries in NAV.items():
         listed = [
-            uri for entry in entries for uri in sorted(uris) if uri == entry or uri.startswith(f"{entry}/")
+            uri
+            for entry in entries
+            for uri in sorted(set(uris) - seen)
+            if uri == entry or uri.startswith(f"{entry}/")
         ]
         seen.update(listed)
         out.append({title: listed})

@@ -31,7 +31,7 @@ REFUSED = {
     "simulate": "simulate --payload z --out rec.parquet",
     "campaign": "campaign --payload z --out blind",
     "effects": "effects rust",
-    "example": "example leg",
+    "example": "example arm --out whole.csv",
 }
 """A mistake for every command."""
 NAMES_AND_FILES = {
