@@ -84,6 +84,7 @@ def test_a_refusal_loads_nothing_that_takes_time(name, tmp_path):
             "does not exist",
             "or a damaged one",
             "no known format",
+            "is a file",
         )
     )
 
