@@ -1,4 +1,4 @@
-"""The page of an arm's first minutes: its commands run as they stand there, print what it shows, and are right."""
+"""The pages to type along: their commands run as they stand there, print what is shown, and are right."""
 
 from __future__ import annotations
 
@@ -14,44 +14,44 @@ import pytest
 from shown_text import in_words
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "tutorials" / "arm.md"
+PAGE, BAGS = (ROOT / "docs" / "tutorials" / name for name in ("arm.md", "paper_bag.md"))
 BLOCK = re.compile(r"^```console\n\$ (.+)\n((?:.*\n)*?)```$", re.MULTILINE)
 MOST_COMMANDS = 10
 
 
-def shown() -> list[tuple[list[str], list[str]]]:
-    """Words of each command of the page, and the lines that it prints there."""
-    text = PAGE.read_text(encoding="utf-8")
+def shown(page: Path) -> list[tuple[list[str], list[str]]]:
+    """Words of each command of a page, and the lines that it prints there."""
+    text = page.read_text(encoding="utf-8")
     found = [(shlex.split(command), output.splitlines()) for command, output in BLOCK.findall(text)]
     assert len(found) == text.count("\n$ ")
     return found
 
 
-def outputs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What each command prints in a folder; the first one installs and is left out."""
+def outputs(page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What each command prints in a folder, which has to be what the page shows; none for one that installs."""
     monkeypatch.setenv("PYTHONPATH", str(ROOT / "src"))
-    (install, _), *others = shown()
-    assert install[:2] == ["pip", "install"]
     out = []
-    for words, _ in others:
-        line = [sys.executable, "-m", *words] if words[0] == "mocobot" else words
+    for words, lines in shown(page):
+        if words[0] == "pip":
+            continue
+        line = {"mocobot": [sys.executable, "-m"], "python": [sys.executable]}.get(words[0], [])
+        line += words[words[0] == "python" :]
         done = subprocess.run(line, cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, (words, done.stderr)
         out.append(done.stdout + done.stderr)
+        printed = iter([in_words(line) for line in out[-1].splitlines()])
+        for line in lines:  # in this order; "..." stands for any lines
+            assert line == "..." or in_words(line) in printed, (words, line, out[-1])
     return out
 
 
 def test_a_newcomer_types_few_commands():
-    assert 5 < len(shown()) <= MOST_COMMANDS
+    assert 5 < len(shown(PAGE)) <= MOST_COMMANDS
 
 
 @pytest.mark.slow
 def test_the_page_tells_the_truth(tmp_path, monkeypatch):
-    said = outputs(tmp_path, monkeypatch)
-    for (words, lines), out in zip(shown()[1:], said, strict=True):
-        printed = iter([in_words(line) for line in out.splitlines()])
-        for line in lines:  # in this order; "..." stands for any lines
-            assert line == "..." or in_words(line) in printed, (words, line, out)
+    said = outputs(PAGE, tmp_path, monkeypatch)
     example = tmp_path / "mocobot-example"
     answer = (example / "answer.txt").read_text(encoding="utf-8")
     true = {log: float(size) for size, log in re.findall(r"([\d.]+) N m in (\w+)", answer)}
@@ -73,3 +73,17 @@ def test_the_page_tells_the_truth(tmp_path, monkeypatch):
     )
     assert float(table["today against last week"]) == pytest.approx(today - before, abs=0.01)
     assert float(table["today against the model"]) == pytest.approx(today - 2.5, abs=0.01)
+
+
+@pytest.mark.slow
+def test_bags_come_to_table_v(tmp_path, monkeypatch):
+    script = re.findall(r"```python\n(.*?)```", BAGS.read_text(encoding="utf-8"), re.DOTALL)[0]
+    (tmp_path / "errors.py").write_text(script, encoding="utf-8")
+    said = outputs(BAGS, tmp_path, monkeypatch)
+    errors = next(out for out in said if "true, error" in out)
+    percent = [float(x) for x in re.findall(r"error +(-?[\d.]+) %", errors)]
+    assert len(percent) == 7
+    assert max(map(abs, percent)) < 0.5
+    own = re.findall(r"I[xyz]{2} \[%\] +[\d.]+ \+- [\d.]+ +([\d.]+) \+-", said[-1])
+    assert len(own) == 3
+    assert max(map(float, own)) < 0.3
