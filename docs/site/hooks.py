@@ -33,6 +33,7 @@ REFERENCE = {
 NAV = {
     "Start": [
         "index.md",
+        "tutorials/arm.md",
         "commands/README.md",
         "commands/performance.md",
         "notation.md",
@@ -107,13 +108,17 @@ def _uri(path: str) -> str | None:
 
 
 def _notebook(path: Path) -> str:
-    """A notebook's words and code as a page."""
-    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-    return "\n\n".join(
-        text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```"
-        for cell in cells
-        for text in ["".join(cell["source"])]
-    )
+    """A notebook's words, code and kept outputs as a page."""
+    parts = []
+    for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+        text = "".join(cell["source"])
+        parts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+        parts += [
+            f"```text\n{''.join(output['text'])}\n```"
+            for output in cell.get("outputs", ())
+            if "text" in output
+        ]
+    return "\n\n".join(parts)
 
 
 def _reference() -> dict[str, str]:
@@ -157,7 +162,10 @@ def _nav(uris: list[str]) -> list[dict[str, Any]]:
     out, seen = [], set()
     for title, entries in NAV.items():
         listed = [
-            uri for entry in entries for uri in sorted(uris) if uri == entry or uri.startswith(f"{entry}/")
+            uri
+            for entry in entries
+            for uri in sorted(set(uris) - seen)
+            if uri == entry or uri.startswith(f"{entry}/")
         ]
         seen.update(listed)
         out.append({title: listed})

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
 from PIL import Image, ImageDraw
 from playwright.sync_api import Browser, sync_playwright
 
@@ -52,7 +53,31 @@ def main(folder: Path) -> None:
             shot(browser, verdict, PHONE, at="What is named"),
         ]
         beside(phones).save(IMAGES / "report_phone.jpg", quality=85)
+        first_minutes(folder, browser)
         browser.close()
+
+
+def first_minutes(folder: Path, browser: Browser) -> None:
+    """The arm of the tutorial, and the page of its verdict."""
+    arm, example = ["mocobot-example/today.csv", "--model", "mocobot-example/arm.xml"], "mocobot-example"
+    for words in (
+        ["example", "arm"],
+        ["map", *arm, "--out", f"{example}/log.toml"],
+        ["diagnose", *arm, "--out", f"{example}/verdict"],
+        ["report", f"{example}/verdict"],
+    ):
+        subprocess.run([sys.executable, "-m", "mocobot", *words, "--force"], check=True, cwd=folder)
+    page = folder / example / "verdict" / "report.html"
+    seen = shot(browser, page, (1100, 740), at="Measured and modelled torques")
+    seen.save(IMAGES / "arm_torques.jpg", quality=80)
+    model = mujoco.MjModel.from_xml_path(str(ROOT / "models" / "six_axis" / "scene.xml"))
+    data, camera = mujoco.MjData(model), mujoco.MjvCamera()
+    data.qpos[:] = [0.6, 0.3, 1.2, 0.3, 0.4, 0.0]
+    mujoco.mj_forward(model, data)
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = [0.15, 0.1, 0.35], 1.6, 150.0, -15.0
+    with mujoco.Renderer(model, 420, 640) as renderer:
+        renderer.update_scene(data, camera)
+        Image.fromarray(renderer.render()).save(IMAGES / "arm.jpg", quality=85)
 
 
 def results(folder: Path) -> None:

@@ -215,6 +215,11 @@ def check_effects(options: opt.Effects) -> None:
         check_effect_name(name)
 
 
+def check_example(options: opt.Example) -> None:
+    """Check that the folder of ``example`` may be written."""
+    check_folder(options.out, (), holds("example"), "an earlier example", force=options.force)
+
+
 def check_campaign(options: opt.Campaign) -> None:
     """Check the options and files of ``campaign`` before a team is built; sensor names are checked later."""
     options.check()

@@ -24,6 +24,10 @@ from estimator.inputs import printable, set_max_unpacked
 from mocobot_sim.errors import TrialError
 
 TASKS = {
+    "Begin": (
+        {"example": "a robot's model and logs with one hidden fault, and the commands that find it"},
+        "mocobot example arm",
+    ),
     "Look at a log": (
         {
             "inspect": "stamps, channels, clocks, wiring, excitation, before anyone trusts a number",

@@ -25,7 +25,7 @@ from estimator.strict import read_json
 from mocobot import options as opt
 from mocobot.checks import TRUTH, check_target_of, inputs_of, targets
 from mocobot.cli import NotGood
-from mocobot.next_step import next_step
+from mocobot.next_step import command_line, next_step
 from mocobot.progress import bar, share_bar, stages
 from mocobot.results import Folder, file_facts, provenance
 from mocobot_sim.scene.models import truth_path
@@ -320,6 +320,25 @@ def effects(options: opt.Effects) -> None:
             print(f"{INDENT}{each.short:15}{each.unit:12}{rule}")
         print()
     print(textwrap.fill(f"Hide one with mocobot simulate --effect {EXAMPLE} ...", width))
+
+
+def example(options: opt.Example) -> None:
+    """Write an example and print what to type next."""
+    from mocobot_sim.serial.example import ANSWER, LAST_WEEK, MODEL, TODAY, write_example
+
+    with whole_folder(options.out, "example") as folder:
+        write_example(folder)
+    today, last_week, model = (options.out / name for name in (TODAY, LAST_WEEK, MODEL))
+    arm = [today, "--model", model]
+    print(f"{today}: 30 s of a six-axis arm with one fault. {last_week}: the arm before. {model}: its model.")
+    for purpose, command, made in (
+        ("Which column is which joint?", ["map", *arm], "log.toml"),
+        ("What does the model get wrong?", ["diagnose", *arm], "verdict"),
+        ("What has changed since last week?", ["diagnose", *arm, "--reference", last_week], "changed"),
+        ("What is the model of the arm as it is?", ["calibrate", *arm], "calibrated"),
+    ):
+        print(f"\n{purpose}\n    {command_line([*command, '--out', options.out / made])}")
+    print(f"\nThe answer is in {options.out / ANSWER}.")
 
 
 def campaign(options: opt.Campaign) -> None:

@@ -46,7 +46,7 @@ def _next(options: Diagnose | Watch, values: Mapping[str, Any]) -> tuple[str, st
         if options.out is not None and (options.out / EXTENDED).is_dir():
             simulated = _free(options.out.with_name(f"{options.out.name}-simulated.parquet"))
             command = ["simulate", "--model", options.out / EXTENDED, "--out", simulated]
-            return "simulate the team with these findings in it", _line(command)
+            return "simulate the team with these findings in it", command_line(command)
     elif unlisted := [cause for cause in causes if cause["separate"] and not cause["event"]]:
         experiment = unlisted[0]["separate"].rstrip(".")
         purpose = f"at {unlisted[0]['place']}: {experiment[:1].lower()}{experiment[1:]}; log it as {new}, and"
@@ -54,7 +54,7 @@ def _next(options: Diagnose | Watch, values: Mapping[str, Any]) -> tuple[str, st
     elif verdict == "miscalibrated" and getattr(options, "calibration", None) is None:
         return f"find the {'robot' if arm else 'robots'} as built", _calibrate(options)
     elif verdict == "unexplained" and options.out is not None:
-        return "look where it is off", _line(["report", options.out])
+        return "look where it is off", command_line(["report", options.out])
     elif verdict == "consistent" and arm:
         return _of_a_clean_arm(options, new)
     return "", ""
@@ -65,13 +65,13 @@ def _of_a_clean_arm(options: Diagnose | Watch, new: Path) -> tuple[str, str]:
     assert options.model is not None
     earlier = options.model.parent.parent
     if options.out is not None and options.model.parent.name == EXTENDED and (earlier / NAME).is_file():
-        return "compare with the verdict before", _line(["compare", earlier, options.out])
+        return "compare with the verdict before", command_line(["compare", earlier, options.out])
     command = _diagnose(options, [new], options.rec)
     return f"log the same motion next week as {new}, and see what has changed", command
 
 
 def _calibrate(options: Diagnose | Watch) -> str:
-    return _line(
+    return command_line(
         ["calibrate", *options.rec, *_options(options, ("model", "map")), "--out", _free(CALIBRATED)]
     )
 
@@ -79,7 +79,7 @@ def _calibrate(options: Diagnose | Watch) -> str:
 def _diagnose(options: Diagnose | Watch, logs: Iterable[Path], reference: Iterable[Path] = ()) -> str:
     out = [] if options.out is None else ["--out", _free(options.out)]
     given = [*reference]
-    return _line(
+    return command_line(
         ["diagnose", *logs, *_options(options, KEPT), *(["--reference", *given] if given else []), *out]
     )
 
@@ -98,5 +98,6 @@ def _free(path: Path) -> Path:
     return next(each for each in chain([path], numbered) if not each.exists())
 
 
-def _line(words: Iterable[Any]) -> str:
+def command_line(words: Iterable[Any]) -> str:
+    """Return a command as a shell takes it."""
     return shlex.join(["mocobot", *map(str, words)])

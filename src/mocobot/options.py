@@ -588,6 +588,17 @@ class Replay(Files, ReplayOptions):
     """Write a file for the Rerun viewer instead of opening it."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Example:
+    """Write a robot's model and logs with one hidden fault, and print the commands that find it."""
+
+    robot: tyro.conf.Positional[Literal["arm"]]
+    """arm: a made-up arm of six axes, simulated in MuJoCo."""
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("mocobot-example")
+    """Folder for arm.xml, today.csv, last_week.csv and answer.txt."""
+    force: Force = False
+
+
 OLD_NAMES = {"duration": "duration-s", "rate": "rate-hz", "max-gap": "max-gap-s", "out-dir": "out",
              "save": "out"}  # fmt: skip
 """Earlier names of options, which commands that have the new option still accept."""

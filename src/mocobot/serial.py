@@ -13,8 +13,18 @@ from mocobot.api.inspection import JointInspection
 from mocobot.api.inspection import inspect as _inspect
 from mocobot.api.joints import GivenLogs, GivenModel, read_logs, read_model
 from mocobot_logs.joints.joint_log import JointLog
+from mocobot_sim.serial.example import write_example
 
-__all__ = ["JointInspection", "JointLog", "SerialModel", "diagnose", "inspect", "read_logs", "read_model"]
+__all__ = [
+    "JointInspection",
+    "JointLog",
+    "SerialModel",
+    "diagnose",
+    "inspect",
+    "read_logs",
+    "read_model",
+    "write_example",
+]
 
 
 def inspect(log: Path | str, model: GivenModel, **options: Any) -> JointInspection:

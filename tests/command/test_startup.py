@@ -31,6 +31,7 @@ REFUSED = {
     "simulate": "simulate --payload z --out rec.parquet",
     "campaign": "campaign --payload z --out blind",
     "effects": "effects rust",
+    "example": "example arm --out whole.csv",
 }
 """A mistake for every command."""
 NAMES_AND_FILES = {
@@ -83,6 +84,7 @@ def test_a_refusal_loads_nothing_that_takes_time(name, tmp_path):
             "does not exist",
             "or a damaged one",
             "no known format",
+            "is a file",
         )
     )
 
