@@ -232,14 +232,8 @@ class JointProblem:
         rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
         middle, n = (shape["start_s"] + 0.5 * shape["duration_s"]) * rate, shape["duration_s"] * rate
         out = []
-        for shift, stretch in (
-            (-0.15, 1.0),
-            (0.15, 1.0),
-            (0.0, 0.75),
-            (0.0, 1.33),
-            (-0.15, 1.33),
-            (0.15, 1.33),
-        ):
+        shifts = ((-0.15, 1.0), (0.15, 1.0), (0.0, 0.75), (0.0, 1.33), (-0.15, 1.33), (0.15, 1.33))
+        for shift, stretch in shifts:
             length = round(stretch * n)
             first = round(middle + shift * n - 0.5 * length)
             if length > 2 and first >= BEGIN_S * rate and first + length <= most:
