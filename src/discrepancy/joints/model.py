@@ -20,6 +20,7 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
+_NUMBERS = ("body_pos", "body_mass", "body_ipos", "body_inertia", "jnt_axis", "dof_damping", "dof_frictionloss", "eq_data")
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
@@ -137,6 +138,10 @@ def _check(model: mujoco.MjModel) -> None:
         raise InputError(
             "the model has no joints that turn or slide; a diagnosis of joint logs needs a fixed-base tree of them"
         )
+    for name in _NUMBERS:
+        if not np.isfinite(values := getattr(model, name)).all():
+            row = int(np.argwhere(~np.isfinite(values))[0, 0])
+            raise InputError(f"{name} of entry {row} is {values[row]}; the model's numbers must be finite")
     for name in (model.joint(j).name for j in range(model.njnt)):
         if not name.isprintable():
             raise InputError(f"joint {name!r:.80} must have a printable name")

@@ -63,13 +63,15 @@ def read_spec(path: Path) -> Read:
     for bare in (False, True):
         try:
             read = Read(mujoco.MjSpec.from_file(str(path)))
-        except ERRORS as error:
+            spec = read.spec
+            if root is not None and root[1] == b"robot":
+                read.notes.extend(_as_urdf_says(spec, path, read.exact))
+        except InputError:
+            raise
+        except ERRORS as error:  # a name that occurs twice shows when a URDF's bodies are visited
             raise InputError(
                 f"{path}: MuJoCo cannot read it ({sentence(error)}); correct the file there"
             ) from error
-        spec = read.spec
-        if root is not None and root[1] == b"robot":
-            read.notes.extend(_as_urdf_says(spec, path, read.exact))
         if bare:
             body = _body_of_meshes(spec)
             if body is not None:
