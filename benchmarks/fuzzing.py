@@ -361,7 +361,11 @@ def _joint_columns(path: Path) -> None:
     """Columns as a well-known driver names them."""
     recording = small_recording(200, 1)
     columns = {"timestamp": recording.time}
-    for name, values in (("actual_q", recording.phi), ("actual_qd", recording.theta), ("actual_current", recording.tau)):
+    for name, values in (
+        ("actual_q", recording.phi),
+        ("actual_qd", recording.theta),
+        ("actual_current", recording.tau),
+    ):
         columns |= {f"{name}_{j}": np.round(values[:, 0, j], 6) for j in range(3)}
     pcsv.write_csv(pa.table(columns), path)
 
@@ -423,7 +427,9 @@ URDF = (
     + _joint("elbow", "continuous", "upper", "fore")
     + _joint("wrist", "fixed", "fore", "hand")
     + _joint("jaw", "prismatic", "hand", "left", '<limit lower="0" upper="0.04" effort="9" velocity="1"/>\n')
-    + _joint("jaw2", "prismatic", "hand", "right", '<mimic joint="jaw" multiplier="-1" offset="0"/>\n' + _LIMIT)
+    + _joint(
+        "jaw2", "prismatic", "hand", "right", '<mimic joint="jaw" multiplier="-1" offset="0"/>\n' + _LIMIT
+    )
     + "</robot>\n"
 )
 LOCKS = "upper\nelbow=90deg\njaw=0.02 m\n"

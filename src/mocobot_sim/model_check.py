@@ -69,7 +69,9 @@ class _Check:
         self._limit(self._elements, MOST_ELEMENTS, f"{what} makes", "elements of the model")
         for key, value in attributes.items():
             if key != "name" and _NAN.search(value):
-                raise InputError(f"{printable(what)} has {key} = {value!r:.80}; every number must be a finite one")
+                raise InputError(
+                    f"{printable(what)} has {key} = {value!r:.80}; every number must be a finite one"
+                )
         for rows, columns in (("nrow", "ncol"), ("width", "height")):
             if rows in attributes and columns in attributes:
                 points = _whole(attributes[rows]) * _whole(attributes[columns])

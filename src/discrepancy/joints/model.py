@@ -20,7 +20,16 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
-_NUMBERS = ("body_pos", "body_mass", "body_ipos", "body_inertia", "jnt_axis", "dof_damping", "dof_frictionloss", "eq_data")
+_NUMBERS = (
+    "body_pos",
+    "body_mass",
+    "body_ipos",
+    "body_inertia",
+    "jnt_axis",
+    "dof_damping",
+    "dof_frictionloss",
+    "eq_data",
+)
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
