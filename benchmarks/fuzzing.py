@@ -296,7 +296,7 @@ def damaged_words(content: bytes, rng: np.random.Generator) -> bytes:
     text = content.decode("utf-8")
     for _ in range(int(rng.choice([1, 1, 2, 4]))):
         lines, words = text.splitlines(keepends=True), list(_WORD.finditer(text))
-        if rng.random() < 0.3:
+        if lines and rng.random() < 0.3:
             at, to = (int(rng.integers(len(lines))) for _ in range(2))
             lines[to:to] = lines[at : at + 1]
             del lines[at : at + int(rng.integers(3))]

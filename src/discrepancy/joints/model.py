@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,12 @@ def load_model(path: Path | str, lock: Lock = (), base: str | None = None) -> Se
         InputError: MuJoCo cannot read the file, or the model is of another kind: without joints, or with free or ball
             joints, closed chains, soft bodies or plugins that act on bodies.
     """
-    path = Path(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        return _load(Path(path), lock, base)
+
+
+def _load(path: Path, lock: Lock, base: str | None) -> SerialModel:
     read = read_spec(path)
     spec, notes = read.spec, list(read.notes)
     try:
