@@ -225,7 +225,7 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
     """
     found, doubt, out = [], np.zeros(len(x)), x
     for column, (own, size) in enumerate(zip(x.T, steps, strict=True)):
-        step = size or FINEST
+        step = size or quantisation_step(own) or FINEST  # a fast joint rarely repeats a value of a coarse encoder
         plain = held_spans(own, step)
         spans = held_spans(own, max(step, scatter(own))) if size else plain
         if not spans or sum(b - a for a, b in plain) > MOST * len(own):

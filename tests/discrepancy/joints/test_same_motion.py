@@ -121,7 +121,7 @@ def named(verdict: Diagnosis) -> set[str]:
 def test_the_plain_form_tells_what_is_wrong(plain: Read) -> None:
     """Friction in all joints and a heavier last link."""
     causes = {(cause["cause"], cause["place"]) for cause in plain[0].to_dict()["causes"]}
-    assert causes == {("friction", "all joints"), ("payload", "link three")}
+    assert causes == {("friction", "all joints"), ("link_mass", "link three")}
 
 
 @pytest.mark.parametrize("form", OTHERS, ids=lambda form: f"{form.name} {form.every} {form.angle}")
