@@ -124,8 +124,14 @@ def draft_joint_map(
         table, candidates, csv = opened_table(path, kind, episode)
         time, doubts, lost = [*time_lines(table, candidates, Robots((), "")), *csv], [], []
         clock = tomllib.loads("\n".join(time)).get("time", {})
-        places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
-    found = _sections(places, slides, [*doubts, *(f"{joint} is in no message" for joint in lost)])
+        used = {clock.get("column"), clock.get("nanosec")}
+        places, unused = in_table(table, joints, used)
+        named = [joint for joint in joints if any(_named(joint, name) for name in table.shapes)]
+        if named and not set(POSITIONS) & set(places):
+            places, unused = in_table(table, named, used)
+            lost = [f"joint {joint}" for joint in joints if joint not in named]
+    where = "message" if kind == "bag" else "column; if it does not move, name it by --lock"
+    found = _sections(places, slides, [*doubts, *(f"{joint} is in no {where}" for joint in lost)])
     lines, missing = found
     text = "\n".join([*head, *time, "[channels]", *lines, *unused_lines(unused)]) + "\n"
     return Draft(text, text.count(DOUBTFUL), (*missing, *lost))
@@ -234,13 +240,17 @@ def _columns_of(template: str, templates: Mapping[str, Mapping[int, str]]) -> se
     return {name for column in templates[template].values() for name in (column, column.partition("[")[0])}
 
 
+def _named(joint: str, name: str) -> re.Match[str] | None:
+    return re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
+
+
 def _joint_templates(name: str, joints: Sequence[str]) -> Iterator[tuple[str, int]]:
     """Yield a name with a placeholder for a joint's name or number, and that joint's index.
 
     If the name holds no joint's name, the name itself comes last, with index 0.
     """
     for j, joint in sorted(enumerate(joints), key=lambda each: -len(each[1])):
-        at = re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
+        at = _named(joint, name)
         if at is not None:
             yield name[: at.start()] + "{joint}" + name[at.end() :], j
             return
