@@ -32,7 +32,7 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot.api.comparison import compare
-from mocobot.cli import COMMANDS, with_config
+from mocobot.cli import with_config
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.draft_joints import draft_joint_map
 from mocobot_logs.joints.joint_map import read_joint_map
@@ -312,7 +312,7 @@ def damaged_words(content: bytes, rng: np.random.Generator) -> bytes:
 
 
 def damaged_messages(content: bytes, rng: np.random.Generator) -> bytes:
-    """A copy of an uncompressed bag with a number of one message, or of every message, replaced; some are any damage."""
+    """A copy of an uncompressed bag with a number of one message, or of each, replaced; some are any damage."""
     if rng.random() < 0.2:
         return damaged(content, rng)
     data, starts = bytearray(content), [m.start() for m in re.finditer(rb"\x00\x01\x00\x00", content)]
@@ -437,7 +437,7 @@ UNITS = json.dumps({"as_built": [{"phi_zero_rad": [0.01, 0, 0]}, {}, {}]})
 KINDS = {
     "units": Kind("units.json", _written(UNITS), read_units),
     "options": Kind(
-        "options.toml", _written(OPTIONS), lambda path: with_config(COMMANDS, ["simulate", "--config", str(path)])
+        "options.toml", _written(OPTIONS), lambda path: with_config(["simulate", "--config", str(path)])
     ),
     "effect": Kind("effect.txt", _written(EXAMPLE), _effect),
     "tolerances": Kind("tolerances.toml", _written(TOLERANCES), read_tolerances),

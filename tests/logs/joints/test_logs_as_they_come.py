@@ -180,7 +180,9 @@ def test_a_joint_whose_column_is_empty(tmp_path, capsys, values) -> None:
 def test_a_joint_that_no_column_names(tmp_path, capsys, values) -> None:
     """A gripper that nobody logged: the draft names it, and what it says to type makes the map complete."""
     text = write_model(tmp_path).read_text()
-    hand = '<body name="jaw"><joint name="grip" range="-1 1"/><inertial pos="0 0 0" mass="0.1" diaginertia="1 1 1"/></body>'
+    hand = (
+        '<body><joint name="grip" range="-1 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+    )
     (tmp_path / "arm.xml").write_text(
         text.replace(
             '<geom type="capsule" fromto="0 0 0 0 0 0.3"',
