@@ -149,9 +149,9 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
     part = found[0] * A[:, 0]
     if found[0] <= 0 or np.sum(part**2) < LEAST_DRIVEN_SHARE * np.sum(b**2):
         raise InputError(
-            f"{signals[0].log.name}: the drive of joint {name} does not go with the torque that the model asks for. "
-            "Either a sign or joint is wrong, for which `mocobot inspect LOG --model ROBOT` looks, or the motion does not "
-            "tell the torque of gravity from that of the inertia, as a single sine; log faster and slower motion"
+            f"{signals[0].log.name}: the drive of joint {name} does not go with the torque that the model asks for; "
+            "`mocobot inspect LOG --model ROBOT` looks for wrong signs and joints, and motion at several frequencies tells "
+            "gravity from inertia"
         )
     return Motor(j, float(1.0 / found[0]), unit)
 
