@@ -22,15 +22,9 @@ from estimator.errors import InputError
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _NUMBERS = (
-    "body_pos",
-    "body_mass",
-    "body_ipos",
-    "body_inertia",
-    "jnt_axis",
-    "dof_damping",
-    "dof_frictionloss",
-    "eq_data",
-)
+    "body_pos", "body_mass", "body_ipos", "body_inertia", "jnt_axis", "dof_damping", "dof_frictionloss", "eq_data",
+)  # fmt: skip
+"""Arrays of a compiled model that inverse dynamics needs finite; MuJoCo lets infinite numbers pass."""
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
