@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import resource
 import shutil
 import signal
@@ -31,8 +32,9 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot.api.comparison import compare
-from mocobot.cli import COMMANDS, with_config
+from mocobot.cli import with_config
 from mocobot_logs.bag.write import write_bag
+from mocobot_logs.draft_joints import draft_joint_map
 from mocobot_logs.joints.joint_map import read_joint_map
 from mocobot_logs.log import collect
 from mocobot_logs.maps import MAPS, builtin_map_text, read_map
@@ -280,6 +282,46 @@ class Kind:
     name: str
     write: Callable[[Path], object]
     read: Callable[[Path], object]
+    damage: Callable[[bytes, np.random.Generator], bytes] = damaged
+
+
+_WORD = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?|[A-Za-z_]\w*")
+_NUMBERS = ("0", "-1", "nan", "inf", "1e999", "1e300", "-1e-300", "0.5", "1 2", "", "9" * 40)
+
+
+def damaged_words(content: bytes, rng: np.random.Generator) -> bytes:
+    """A copy of a text with a few words or numbers exchanged, or lines lost, doubled or moved; half are any damage."""
+    if rng.random() < 0.3:
+        return damaged(content, rng)
+    text = content.decode("utf-8")
+    for _ in range(int(rng.choice([1, 1, 2, 4]))):
+        lines, words = text.splitlines(keepends=True), list(_WORD.finditer(text))
+        if lines and rng.random() < 0.3:
+            at, to = (int(rng.integers(len(lines))) for _ in range(2))
+            lines[to:to] = lines[at : at + 1]
+            del lines[at : at + int(rng.integers(3))]
+            text = "".join(lines)
+        elif words:
+            numbers = [word for word in words if word[0][-1].isdigit()]
+            wanted = numbers if numbers and rng.random() < 0.6 else words
+            at = wanted[int(rng.integers(len(wanted)))]
+            numeric = at[0][-1].isdigit() and rng.random() < 0.8
+            choice = _NUMBERS if numeric else [word[0] for word in words]
+            text = text[: at.start()] + choice[int(rng.integers(len(choice)))] + text[at.end() :]
+    return text.encode()
+
+
+def damaged_messages(content: bytes, rng: np.random.Generator) -> bytes:
+    """A copy of an uncompressed bag with a number of one message, or of each, replaced; some are any damage."""
+    if rng.random() < 0.2:
+        return damaged(content, rng)
+    data, starts = bytearray(content), [m.start() for m in re.finditer(rb"\x00\x01\x00\x00", content)]
+    for _ in range(int(rng.choice([1, 1, 2, 4]))):
+        offset, every = 4 + 4 * int(rng.integers(80)), rng.random() < 0.5
+        value = int(rng.choice([0, 1, 2, 3, 5, 7, 0x7FF00000, 0x7FF80000, 0xFFFFFFFF, 0x7FFFFFFF]))
+        for at in starts if every else rng.choice(starts, 1):
+            data[at + offset : at + offset + 4] = struct.pack("<I", value)[: max(len(data) - at - offset, 0)]
+    return bytes(data)
 
 
 def _written(words: str) -> Callable[[Path], object]:
@@ -307,11 +349,95 @@ def _effect(path: Path) -> None:
         raise InputError(f"{path}: {error}") from error
 
 
+CHAIN = ("phi1", "phi2", "phi3", "gimbal_z", "gimbal_y", "gimbal_x")
+"""Joints that a bag of one robot names."""
+
+
+def _joint_states(path: Path) -> None:
+    write_bag(small_recording(200, 1), path, storage="sqlite3")
+
+
+def _joint_columns(path: Path) -> None:
+    """Columns as a well-known driver names them."""
+    recording = small_recording(200, 1)
+    columns = {"timestamp": recording.time}
+    for name, values in (
+        ("actual_q", recording.phi),
+        ("actual_qd", recording.theta),
+        ("actual_current", recording.tau),
+    ):
+        columns |= {f"{name}_{j}": np.round(values[:, 0, j], 6) for j in range(3)}
+    pcsv.write_csv(pa.table(columns), path)
+
+
+def _drafted(joints: tuple[str, ...]) -> Callable[[Path], None]:
+    """Draft a map of a log, and read and inspect the log by it."""
+
+    def read(path: Path) -> None:
+        links = "".join(
+            f'<body pos="0 0 .1"><joint name="{joint}" axis="{k % 2} {1 - k % 2} 0"/>'
+            '<inertial pos="0 0 .05" mass="1" diaginertia=".01 .01 .01"/>'
+            for k, joint in enumerate(joints)
+        )
+        model = path.with_name("robot.xml")
+        model.write_text(f"<mujoco><worldbody>{links}{'</body>' * len(joints)}</worldbody></mujoco>")
+        draft = draft_joint_map(path, joints, [False] * len(joints))
+        if not draft.missing:
+            log_map = path.with_name("drafted.toml")
+            log_map.write_text(draft.text, encoding="utf-8")
+            mocobot.inspect(path, model=model, map=log_map).to_dict()
+
+    return read
+
+
+def _locked(path: Path) -> None:
+    """Options of the command line, which are no file: a base, and joints to lock."""
+    base, *locks = path.read_bytes().decode("utf-8", "backslashreplace").split("\n")
+    model = path.with_name("robot.urdf")
+    model.write_text(URDF)
+    try:
+        load_model(model, [text for text in locks if text], base or None)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _link(name: str, inertial: bool = True, more: str = "") -> str:
+    own = '<origin xyz="0 0 .1" rpy="0.1 0 0"/>\n<mass value="1.2"/>\n'
+    own += '<inertia ixx="0.02" ixy="0" ixz="0.001" iyy="0.02" iyz="0" izz="0.01"/>'
+    return f'<link name="{name}">\n{f"<inertial>{own}</inertial>" if inertial else ""}\n{more}</link>\n'
+
+
+def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str:
+    return (
+        f'<joint name="{name}" type="{kind}">\n<parent link="{parent}"/>\n<child link="{child}"/>\n'
+        f'<origin xyz="0 0 0.3" rpy="0 0.1 0"/>\n<axis xyz="0 1 0"/>\n{more}</joint>\n'
+    )
+
+
+_LIMIT = '<limit lower="-2" upper="2" effort="50" velocity="3"/>\n<dynamics damping="0.1" friction="0.2"/>\n'
+URDF = (
+    '<robot name="arm">\n'
+    + _link("base", inertial=False)
+    + _link("upper", more='<collision><geometry><box size=".1 .1 .3"/></geometry></collision>\n')
+    + _link("fore", more='<visual><geometry><mesh filename="package://arm/fore.stl"/></geometry></visual>\n')
+    + _link("hand", inertial=False)
+    + _link("left")
+    + _link("right")
+    + _joint("shoulder", "revolute", "base", "upper", _LIMIT)
+    + _joint("elbow", "continuous", "upper", "fore")
+    + _joint("wrist", "fixed", "fore", "hand")
+    + _joint("jaw", "prismatic", "hand", "left", '<limit lower="0" upper="0.04" effort="9" velocity="1"/>\n')
+    + _joint(
+        "jaw2", "prismatic", "hand", "right", '<mimic joint="jaw" multiplier="-1" offset="0"/>\n' + _LIMIT
+    )
+    + "</robot>\n"
+)
+LOCKS = "upper\nelbow=90deg\njaw=0.02 m\n"
 UNITS = json.dumps({"as_built": [{"phi_zero_rad": [0.01, 0, 0]}, {}, {}]})
 KINDS = {
     "units": Kind("units.json", _written(UNITS), read_units),
     "options": Kind(
-        "options.toml", _written(OPTIONS), lambda path: with_config(COMMANDS, ["simulate", "--config", str(path)])
+        "options.toml", _written(OPTIONS), lambda path: with_config(["simulate", "--config", str(path)])
     ),
     "effect": Kind("effect.txt", _written(EXAMPLE), _effect),
     "tolerances": Kind("tolerances.toml", _written(TOLERANCES), read_tolerances),
@@ -321,6 +447,11 @@ KINDS = {
     "arm": Kind("arm.xml", _copy("xl330/xl330.xml"), load_model),
     "map of an arm": Kind("arm.toml", _copy("xl330/log.toml"), _joint_map),
     "estimate": Kind("estimate.json", _estimate, lambda path: compare(path, path)),
+    "URDF": Kind("robot.urdf", _written(URDF), load_model, damaged_words),
+    "words of a map": Kind("arm.toml", _copy("xl330/log.toml"), _joint_map, damaged_words),
+    "locks": Kind("locks.txt", _written(LOCKS), _locked, damaged_words),
+    "joint states": Kind("log.db3", _joint_states, _drafted(CHAIN), damaged_messages),
+    "joint columns": Kind("log.csv", _joint_columns, _drafted(("a", "b", "c")), damaged_words),
 }  # fmt: skip
 
 
@@ -373,7 +504,8 @@ def try_damaged(kind: str, log: Path, file: Path, content: bytes, seed: int) -> 
         content: what the file holds when it is good.
         seed: of the damage.
     """
-    file.write_bytes(damaged(content, np.random.default_rng(seed)))
+    damage = KINDS[kind].damage if kind in KINDS else damaged
+    file.write_bytes(damage(content, np.random.default_rng(seed)))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
     try:

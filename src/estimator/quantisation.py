@@ -225,9 +225,12 @@ def filled(x: Array, steps: Sequence[float] | Array) -> tuple[Array, tuple[Held,
     """
     found, doubt, out = [], np.zeros(len(x)), x
     for column, (own, size) in enumerate(zip(x.T, steps, strict=True)):
-        step = size or FINEST
-        plain = held_spans(own, step)
-        spans = held_spans(own, max(step, scatter(own))) if size else plain
+        # A fast joint rarely repeats a value of a coarse encoder, and a log of five digits is coarser above 100.
+        blocks = (own[k : k + BLOCK] for k in range(0, len(own), BLOCK))
+        step = max(size, *(quantisation_step(block) or 0.0 for block in blocks))
+        plain = held_spans(own, step or FINEST)
+        spans = held_spans(own, max(step, scatter(own))) if step else plain
+        step = step or FINEST
         if not spans or sum(b - a for a, b in plain) > MOST * len(own):
             continue
         there = np.zeros(len(own), dtype=bool)

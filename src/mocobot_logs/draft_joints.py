@@ -127,12 +127,10 @@ def draft_joint_map(
         if lacking:
             slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint not in lacking]
             joints = [joint for joint in joints if joint not in lacking]
-            doubts.append(
-                f"no column names {', '.join(lacking)}; with --lock JOINT=VALUE for each, the model has them where "
-                "they stood"
-            )
+            lost = [f"joint {joint}" for joint in lacking]
         places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
-    found = _sections(places, slides, [*doubts, *(f"{joint} is in no message" for joint in lost)])
+    where = "message" if kind == "bag" else "column; if it does not move, name it by --lock"
+    found = _sections(places, slides, [*doubts, *(f"{joint} is in no {where}" for joint in lost)])
     lines, missing = found
     head += [f"joints = {json.dumps(list(joints), ensure_ascii=False)}", ""]
     text = "\n".join([*head, *time, "[channels]", *lines, *unused_lines(unused)]) + "\n"
@@ -142,13 +140,8 @@ def draft_joint_map(
 def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
     """Return the joints that no column names, if columns name others; empty if columns name none."""
     names = [*table.aliases, *table.shapes]
-    there = [
-        any(template.count("{joint}") for n in names for template, _ in _joint_templates(n, [j]))
-        for j in joints
-    ]
-    return (
-        [joint for joint, is_there in zip(joints, there, strict=True) if not is_there] if any(there) else []
-    )
+    lost = [joint for joint in joints if not any(_named(joint, name) for name in names)]
+    return lost if len(lost) < len(joints) else []
 
 
 def _sections(
@@ -262,13 +255,17 @@ def _columns_of(template: str, templates: Mapping[str, Mapping[int, str]]) -> se
     return {name for column in templates[template].values() for name in (column, column.partition("[")[0])}
 
 
+def _named(joint: str, name: str) -> re.Match[str] | None:
+    return re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
+
+
 def _joint_templates(name: str, joints: Sequence[str]) -> Iterator[tuple[str, int]]:
     """Yield a name with a placeholder for a joint's name or number, and that joint's index.
 
     If the name holds no joint's name, the name itself comes last, with index 0.
     """
     for j, joint in sorted(enumerate(joints), key=lambda each: -len(each[1])):
-        at = re.search(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])", name)
+        at = _named(joint, name)
         if at is not None:
             yield name[: at.start()] + "{joint}" + name[at.end() :], j
             return

@@ -15,6 +15,7 @@ from estimator.inputs import JSON_BYTES, open_input, printable, read_input
 MOST_ELEMENTS, MOST_POINTS = 100_000, 1 << 24
 """Largest number of elements of a model, copies included, and of points of one height field or texture. Chosen."""
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_NAN = re.compile(r"(?<!\S)[-+]?nan(?!\S)", re.IGNORECASE)
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -66,6 +67,11 @@ class _Check:
         self._elements += self._copies[-1]
         what = f"{self._path}: <{tag} {attributes.get('name', ''):.60}>".replace(" >", ">")
         self._limit(self._elements, MOST_ELEMENTS, f"{what} makes", "elements of the model")
+        for key, value in attributes.items():
+            if key != "name" and _NAN.search(value):
+                raise InputError(
+                    f"{printable(what)} has {key} = {value!r:.80}; every number must be a finite one"
+                )
         for rows, columns in (("nrow", "ncol"), ("width", "height")):
             if rows in attributes and columns in attributes:
                 points = _whole(attributes[rows]) * _whole(attributes[columns])

@@ -18,7 +18,7 @@ CEILINGS = {
     "discrepancy": 12_900,
     "mocobot_view": 2_155,
     "mocobot_report": 2_790,
-    "mocobot": 4_850,
+    "mocobot": 4_900,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700

@@ -114,10 +114,15 @@ class Judge(ABC):
     def findings(self, o: Odds, values: Values | None = None) -> list[Finding]:
         """Findings of one cause: one, or one for each outlier if few joints of an "all joints" cause are off."""
         c, probability = o.chosen.group, o.probability
-        first = next((r for r in o.rivals if r.probability > o.probability), None)
+        others = o.rivals
+        first = next((r for r in others if r.probability > o.probability), None)
         if (
             first and first.group and first.group.cause == "unlisted"
         ):  # report the likelier unlisted effect instead
+            others = (
+                replace(first, group=c, probability=probability),
+                *(r for r in others if r is not first),
+            )
             c, probability = first.group, first.probability
         open_ = sum(r.probability for r in o.rivals if r.group and r.group.cause == "unlisted")
         nothing = sum(r.probability for r in o.rivals if r.group is None)
@@ -125,8 +130,8 @@ class Judge(ABC):
         kin = sum(r.probability for r in listed if r.group and c.family and r.group.family == c.family)
         rivals = tuple(
             Rival(*r.group.key, self.joint(*r.group.key), r.probability,
-                  float(np.log(max(o.probability, 1e-12) / max(r.probability, 1e-12))))
-            for r in o.rivals[:RIVALS] if r.group is not None
+                  float(np.log(max(probability, 1e-12) / max(r.probability, 1e-12))))
+            for r in others[:RIVALS] if r.group is not None
         )  # fmt: skip
         plain = Finding(
             cause=c.cause,
@@ -149,7 +154,19 @@ class Judge(ABC):
     def fit_of(self, group: Group) -> tuple[Array, Array, Array]:
         """Mean and covariance of a group's values, and their (wide) prior variances."""
         at, (mean, covariance) = self.parts.columns_of(group.columns), self.whole
-        return mean[at], covariance[np.ix_(at, at)], self.parts.prior[at]
+        if set(group.columns) <= set(self.parts.active.tolist()):
+            return mean[at], covariance[np.ix_(at, at)], self.parts.prior[at]
+        # A rival that is likelier than the cause in the fit: fit it in the place of that cause.
+        other = next(o for o in (*self.named, *self.suspected) if any(r.group == group for r in o.rivals))
+        rest = self.search.value(
+            [c for c in self.state.chosen if c.group.key != other.chosen.group.key], self.state.posterior
+        )
+        scale = rest.posterior.gain(group, self.search.settings.octaves)[1]
+        p, at = (
+            self.search.with_one(rest.chosen, Chosen(group, scale), rest.posterior).posterior,
+            list(group.columns),
+        )
+        return p.mean[at], p.covariance[np.ix_(at, at)], p.prior[at]
 
     def _is_off(self, columns: Sequence[int]) -> bool:
         """Whether a value exceeds its standard error and the healthy tolerance, combined, by a factor of ``apart``."""

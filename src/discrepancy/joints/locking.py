@@ -70,7 +70,12 @@ def _position(model: mujoco.MjModel, name: str, text: str) -> float:
         HINGE: ("a number in rad, or in degrees such as 30deg", ("", "deg", "rad")),
         SLIDE: ("a number in m", ("", "m")),
     }.get(kind, ("0, which leaves a free or ball joint as it is modelled", ("",)))
-    if match is None or match[2] not in units or (number and kind not in (HINGE, SLIDE)):
+    if (
+        not math.isfinite(number)
+        or match is None
+        or match[2] not in units
+        or (number and kind not in (HINGE, SLIDE))
+    ):
         raise InputError(f"lock of {name} is {text!r:.40}; it must be {what}")
     value = math.radians(number) if match[2] == "deg" else number
     low, high = joint.range if joint.limited[0] else (-math.inf, math.inf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,10 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
+_NUMBERS = (
+    "body_pos", "body_mass", "body_ipos", "body_inertia", "jnt_axis", "dof_damping", "dof_frictionloss", "eq_data",
+)  # fmt: skip
+"""Arrays of a compiled model that inverse dynamics needs finite; MuJoCo lets infinite numbers pass."""
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
@@ -66,7 +71,12 @@ def load_model(path: Path | str, lock: Lock = (), base: str | None = None) -> Se
         InputError: MuJoCo cannot read the file, or the model is of another kind: without joints, or with free or ball
             joints, closed chains, soft bodies or plugins that act on bodies.
     """
-    path = Path(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        return _load(Path(path), lock, base)
+
+
+def _load(path: Path, lock: Lock, base: str | None) -> SerialModel:
     read = read_spec(path)
     spec, notes = read.spec, list(read.notes)
     try:
@@ -137,6 +147,10 @@ def _check(model: mujoco.MjModel) -> None:
         raise InputError(
             "the model has no joints that turn or slide; a diagnosis of joint logs needs a fixed-base tree of them"
         )
+    for name in _NUMBERS:
+        if not np.isfinite(values := getattr(model, name)).all():
+            row = int(np.argwhere(~np.isfinite(values))[0, 0])
+            raise InputError(f"{name} of entry {row} is {values[row]}; the model's numbers must be finite")
     for name in (model.joint(j).name for j in range(model.njnt)):
         if not name.isprintable():
             raise InputError(f"joint {name!r:.80} must have a printable name")

@@ -20,8 +20,8 @@ from mocobot_logs.formats import shown
 from mocobot_sim.model_check import check_model
 from mocobot_sim.serial.mjcf import set_inertial
 
-ERRORS = (ValueError, RuntimeError, OSError)
-"""What MuJoCo raises for a file that it cannot use."""
+ERRORS = (ValueError, RuntimeError, OSError, UserWarning)
+"""What MuJoCo raises for a file that it cannot use; a warning is one of a singular inertia matrix."""
 LEAST_KG, LEAST_KGM2 = 1e-9, 1e-12
 """Mass and inertia of a moving link without any, since MuJoCo demands some. Chosen: 1e-8 N of weight."""
 _COMMENT, _TAG = re.compile(rb"<!--.*?-->", re.DOTALL), re.compile(rb"<([A-Za-z_][^\s/>]*)")
@@ -63,13 +63,15 @@ def read_spec(path: Path) -> Read:
     for bare in (False, True):
         try:
             read = Read(mujoco.MjSpec.from_file(str(path)))
-        except ERRORS as error:
+            spec = read.spec
+            if root is not None and root[1] == b"robot":
+                read.notes.extend(_as_urdf_says(spec, path, read.exact))
+        except InputError:
+            raise
+        except ERRORS as error:  # a name that occurs twice shows when a URDF's bodies are visited
             raise InputError(
                 f"{path}: MuJoCo cannot read it ({sentence(error)}); correct the file there"
             ) from error
-        spec = read.spec
-        if root is not None and root[1] == b"robot":
-            read.notes.extend(_as_urdf_says(spec, path, read.exact))
         if bare:
             body = _body_of_meshes(spec)
             if body is not None:
@@ -108,6 +110,8 @@ def _as_urdf_says(spec: mujoco.MjSpec, path: Path, exact: dict[str, Array]) -> I
         xx, yy, zz, xy, xz, yz = body.fullinertia
         full = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         matrix = np.diag(body.inertia) if np.isnan(xx) else full
+        if not np.isfinite(matrix).all():
+            raise InputError(f"{path}: link {body.name} has an inertia that is not finite; correct it there")
         moments = np.linalg.eigvalsh(matrix)
         if moments[0] >= LEAST_KGM2 and moments[0] + moments[1] >= moments[2]:
             continue

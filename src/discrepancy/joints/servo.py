@@ -150,7 +150,8 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
     if found[0] <= 0 or np.sum(part**2) < LEAST_DRIVEN_SHARE * np.sum(b**2):
         raise InputError(
             f"{signals[0].log.name}: the drive of joint {name} does not go with the torque that the model asks for; "
-            "`mocobot inspect --model` looks for wrong signs and joints"
+            "`mocobot inspect LOG --model ROBOT` looks for wrong signs and joints, and motion at several frequencies "
+            "tells gravity from inertia"
         )
     return Motor(j, float(1.0 / found[0]), unit)
 

@@ -130,7 +130,7 @@ def test_a_draft_says_which_joints_the_log_lacks(leg, tmp_path, capsys):
     code, out, _ = run(capsys, "map", leg / "log.csv", "--model", tmp_path / "more.xml")
     assert code == 0
     assert 'joints = ["hip", "knee"]' in out
-    assert "no column names tail; with --lock JOINT=VALUE" in out
+    assert "joint tail is in no column; if it does not move, name it by --lock" in out
     (tmp_path / "draft.toml").write_text(
         out.replace('# gain_of = "torque"', f'gain_of = "torque"\nposition_gain = {KP}')
     )

@@ -372,3 +372,38 @@ def test_holds_by_mocap_bodies_are_left_out(tmp_path) -> None:
     found = load_model(path)
     assert len(found.joints) == 6
     assert any("left out: they hold finger" in note for note in found.notes)
+
+
+SPOILT = {
+    "NaN mass": ('value="2.5"', 'value="nan"', "<mass> has value = 'nan'; every number must be a finite one"),
+    "NaN inertia": ('ixy="0"', 'ixy="NaN"', "<inertia> has ixy = 'NaN'"),
+    "infinite inertia": ('ixx="0.006"', 'ixx="inf"', "link boom has an inertia that is not finite"),
+    "infinite mass": ('value="2.5"', 'value="inf"', "body_mass of entry 1 is inf"),
+    "infinite place": ('xyz="0.35 0 0"', 'xyz="inf 0 0"', "body_pos of entry 2 is"),
+    "a name twice": ('name="elbow"', 'name="shoulder"', "repeated name 'shoulder' in joint"),
+    "singular": ('ixz="0.0003"', 'ixz="1e300"', "Inertia matrix is too close to singular"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(SPOILT))
+def test_numbers_and_names_that_no_model_has_are_refused(tmp_path, case) -> None:
+    good, bad, said = SPOILT[case]
+    assert good in DUO
+    text = DUO.replace(good, bad)
+    path = urdf(tmp_path, text)
+    with pytest.raises(InputError, match=re.escape(said)) as refused:
+        load_model(path)
+    assert str(refused.value).startswith(f"{path}: ")
+
+
+def test_a_limit_may_be_infinite(tmp_path) -> None:
+    assert load_model(urdf(tmp_path, DUO.replace('effort="50"', 'effort="inf"'))).joints == (
+        "shoulder",
+        "elbow",
+    )
+
+
+def test_no_joint_is_locked_at_infinity(tmp_path) -> None:
+    path = urdf(tmp_path, DUO.replace("revolute", "continuous"))
+    with pytest.raises(InputError, match="lock of elbow is '1e999'; it must be a number in rad"):
+        load_model(path, ["elbow=1e999"])

@@ -11,7 +11,15 @@ import pytest
 from estimator.arm.delta import inverse_kinematics
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass
-from estimator.quantisation import Repeats, angle_of, doubtful, held_spans, quantisation_step, without_held
+from estimator.quantisation import (
+    Repeats,
+    angle_of,
+    doubtful,
+    filled,
+    held_spans,
+    quantisation_step,
+    without_held,
+)
 from estimator.recording.checks import RATE_TOLERANCE, check_duration, check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
@@ -424,3 +432,18 @@ def test_beyond_doubtful_samples_held_readings_change_less_than_noise():
         changed, usual = (low_pass(x, RATE_HZ, 5.0) for x in (off, noise))
         assert np.abs(changed[kept]).max() < 2.0 * usual.std()
         off, noise = (differentiate(x, RATE_HZ) for x in (off, noise))
+
+
+@pytest.mark.parametrize("digits", [None, 5], ids=["fast", "five digits"])
+def test_a_joint_that_turns_round_holds_no_reading(digits):
+    """A coarse encoder at 250 Hz, whose values rarely repeat; a log of five digits, ten times coarser above 100."""
+    time = np.arange(20000) / (250.0 if digits is None else 5000.0)
+    x = sum(a * np.sin(w * time + p) for a, w, p in ((0.9, 1.3, 0.3), (0.3, 0.7, 1.1)))
+    if digits is None:
+        x, step = np.round(x / 5e-5) * 5e-5, 0.0
+    else:
+        x, step = np.array([float(f"{value:.{digits}g}") for value in 40.0 * x + 60.0]), 0.001
+    out, held, doubt = filled(x[:, None], [step])
+    assert not held
+    assert not doubt.any()
+    np.testing.assert_array_equal(out[:, 0], x)

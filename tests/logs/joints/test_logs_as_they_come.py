@@ -177,6 +177,31 @@ def test_a_joint_whose_column_is_empty(tmp_path, capsys, values) -> None:
     assert serial.read_logs(log, tmp_path / "arm.xml")[0].notes == ()
 
 
+def test_a_joint_that_no_column_names(tmp_path, capsys, values) -> None:
+    """A gripper that nobody logged: the draft names it, and what it says to type makes the map complete."""
+    text = write_model(tmp_path).read_text()
+    hand = (
+        '<body><joint name="grip" range="-1 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+    )
+    (tmp_path / "arm.xml").write_text(
+        text.replace(
+            '<geom type="capsule" fromto="0 0 0 0 0 0.3"',
+            f'{hand}<geom type="capsule" fromto="0 0 0 0 0 0.3"',
+        )
+    )
+    log, out = write_csv(tmp_path / "log.csv", values), tmp_path / "log.toml"
+    code, _, err = run(capsys, "map", log, "--model", tmp_path / "arm.xml", "--out", out)
+    assert code == 0
+    assert "the draft is not complete: joint grip must be filled in" in err
+    drafted = out.read_text()
+    assert "# doubtful: joint grip is in no column; if it does not move, name it by --lock" in drafted
+    assert 'q = { column = "{joint} q"' in drafted
+    more = ("--model", tmp_path / "arm.xml", "--lock", "grip=0")
+    _, _, err = run(capsys, "map", log, *more, "--out", out, "--force")
+    assert "not complete" not in err
+    assert run(capsys, "inspect", log, *more)[1].splitlines()[-1] == READY
+
+
 def rtde(values: Values, per_ampere: np.ndarray, *more: str) -> Values:
     """Columns of a recording by UR's RTDE client, in its order."""
     time = values["time"]

@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.errors import InputError
-from fuzzing import FORMATS, check_original, try_damaged, write_original
+from fuzzing import FORMATS, KINDS, check_original, try_damaged, write_original
 from mocobot_logs.log import CHANNELS, REF, collect
 from mocobot_logs.maps import TIME_UNITS, parse_map
 from mocobot_logs.open_log import open_log
@@ -37,6 +37,19 @@ def test_damaged_files(tmp_path: Path, kind: str) -> None:
     assert not [outcome for outcome in outcomes if outcome.is_fault]
     assert sum(outcome.result == "refused" for outcome in outcomes) > 5
     check_original(kind, log)
+
+
+@pytest.mark.parametrize("kind", ["URDF", "words of a map", "locks", "joint states", "joint columns"])
+def test_damaged_models_maps_and_joint_logs(tmp_path: Path, kind: str) -> None:
+    """The same for what commands of a single robot read."""
+    file = tmp_path / KINDS[kind].name
+    KINDS[kind].write(file)
+    content = file.read_bytes()
+    check_original(kind, file)
+    count = 100 if kind in ("URDF", "locks") else 20
+    outcomes = [try_damaged(kind, file, file, content, seed) for seed in range(1000, 1000 + count)]
+    assert not [outcome for outcome in outcomes if outcome.is_fault]
+    assert sum(outcome.result == "refused" for outcome in outcomes) > 5
 
 
 def refusal(call: Callable[[], object]) -> str | None:
