@@ -25,7 +25,7 @@ from estimator.strict import read_json
 from mocobot import options as opt
 from mocobot.checks import TRUTH, check_target_of, inputs_of, targets
 from mocobot.cli import NotGood
-from mocobot.next_step import command_line, next_step
+from mocobot.next_step import after_calibration, command_line, next_step
 from mocobot.progress import bar, share_bar, stages
 from mocobot.results import Folder, file_facts, provenance
 from mocobot_sim.scene.models import truth_path
@@ -143,6 +143,8 @@ def calibrate(options: opt.Calibrate) -> None:
     print("\n".join([*notes, str(found)]))
     if options.out:
         print("\n".join([f"\nWritten to {options.out}.", *(f"But {note}." for note in missing)]))
+        if options.model is not None:
+            print(after_calibration(options))
     if options.strict and found.findings:
         raise NotGood(f"the calibration is not to be trusted: {found.findings[0].rstrip('.')}")
 

@@ -44,7 +44,7 @@ def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
     head, notes = ("", "unit", "given", "found"), {calibrated.COMBINED: MOMENTS}
     return {
         "title": f"Calibration of {told.model.path.name} from {counted(len(told.logs), 'log')} of its joints",
-        "told": told, "gain": calibrated.to_text(told.found).partition("\n")[0],
+        "told": told, "gain": calibrated.gain(told.found),
         "findings": calibrated.findings(told.found), "tiles": tiles, "left": _chart(told),
         "tables": [table(name, head, own, note=notes.get(name, ""), stack=True) for name, own in rows.items()],
         "pictures": [],

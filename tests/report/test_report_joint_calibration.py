@@ -15,7 +15,7 @@ from PIL import Image
 
 from chromium import DESKTOP, PHONE, browser_running, opened
 from command import refused, run
-from discrepancy.joints.calibrated import from_dict, to_dict, to_text
+from discrepancy.joints.calibrated import from_dict, gain, to_dict, to_text
 from made_arm import JOINTS, made, write_log
 from test_report_page import MOST_BYTES, Reader
 
@@ -76,7 +76,8 @@ def test_the_file_holds_all_that_the_text_says(arm: Path) -> None:
 
 def test_the_gain_comes_first_and_charts_hold_the_file(arm: Path, page: Reader) -> None:
     values, text = read(arm / "cal"), page.rows()
-    first = (arm / "cal" / "report.txt").read_text(encoding="utf-8").splitlines()[0]
+    first = gain(from_dict(values, "calibration.json").found)
+    assert " ".join((arm / "cal" / "report.txt").read_text(encoding="utf-8").split()).startswith(first)
     assert (
         text.index(first) < text.index("torque left, calibrated") < text.rindex("The calibration in detail")
     )

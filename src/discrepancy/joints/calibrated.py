@@ -51,7 +51,7 @@ HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
     "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "zero": "zero",
-    "position": "position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
+    "position": "frame position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
     "com": "centre of mass", "inertia": "inertia",
 }  # fmt: skip
 UNITS = {
@@ -70,8 +70,8 @@ Quantity = tuple[str, str, str, float, float, float]
 """Title of its kind, words, unit, given and found value, standard error."""
 MISFIT = 2.0
 """Ratio of predicted residual and noise beyond which the model lacks something. Chosen."""
-MOST_TERMS, MOST_COMBINATIONS, ROUND = 6, 12, 1e-3
-"""Terms of a combination and combinations that the text shows, and the rounding of a factor of 1."""
+MOST_TERMS, MOST_COMBINATIONS, MOST_ROWS, ROUND = 6, 12, 30, 1e-3
+"""Terms of a combination, combinations and parameters that the text shows, and the rounding of a factor of 1."""
 
 
 def to_dict(found: ArmCalibration) -> dict[str, Any]:
@@ -114,18 +114,23 @@ def to_text(found: ArmCalibration) -> str:
     return "\n".join(part for wrapped in lines for part in wrapped)
 
 
-def _lines(found: ArmCalibration) -> Iterator[str]:
+def gain(found: ArmCalibration) -> str:
+    """Sentence on what the model predicts of data that it was not fitted to."""
     shares = {n: _share(found, n) for n in HELD_OUT[:4]}
     which = (
         "torques of parts that were not fitted"
         if found.validated
         else "the torques it was fitted to (one part only)"
     )
-    yield (
+    return (
         f"The calibrated model leaves {_percent(shares['calibrated'])} of {which}; the given model leaves "
-        f"{_percent(shares['model'])}, ordinary least squares {_percent(shares['least_squares'])}, noise is "
-        f"{_percent(shares['noise'])}."
+        f"{_percent(shares['model'])}, ordinary least squares of the same parameters "
+        f"{_percent(shares['least_squares'])}. Sensor noise is about {_percent(shares['noise'])}."
     )
+
+
+def _lines(found: ArmCalibration) -> Iterator[str]:
+    yield gain(found)
     told = sum(p.determined for p in found.parameters)
     count = len(found.combinations)
     both = f" and {count} combination{'s' if count > 1 else ''} of others" if count else ""
@@ -138,12 +143,18 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
         numbers = [_mean(found.held_out, n, j) for n in ("torque", *HELD_OUT[:4])]
         cells = "".join(f"{x:>{12 if k == 3 else 10}.3g}" for k, x in enumerate(numbers))
         yield f" {f'{found.model.joints[j]} [{unit}]':<24.24}{cells}"
-    for title, wanted in (("Determined, in the model", True), ("Determined, of the log", False)):
+    for title, wanted in (
+        ("Determined, in the model (clearest change first)", True),
+        ("Determined, of the log", False),
+    ):
         own = [p for p in found.parameters if p.determined and p.in_model == wanted]
+        own.sort(key=lambda p: -abs(p.value - p.model) / p.se)
         if own:
             yield ""
             yield f" {title:<53}{'given':>10}   found"
-            yield from (_row(found, p) for p in own)
+            yield from (_row(found, p) for p in own[:MOST_ROWS])
+        if len(own) > MOST_ROWS:
+            yield f"  {len(own) - MOST_ROWS} more are in {TABLE}."
     if found.combinations:
         yield ""
         yield f" {'Determined in combination only':<53}{'given':>10}   found"
@@ -159,7 +170,7 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
     unknown = [p for p in found.parameters if not p.determined]
     if unknown:
         yield ""
-        yield "Not determined by these logs, so near the given values:"
+        yield f"Not determined by these logs, so near the given values ({MODEL} holds the likeliest ones):"
         yield from (f"  {line}" for line in _unknown(found, unknown))
         yield "Faster motion in more poses determines more; a known weight determines the common factor of all torques."
     if found.notes:
@@ -242,7 +253,7 @@ def _unknown(found: ArmCalibration, parameters: Sequence[Parameter]) -> Iterator
     for p in parameters:
         what = described(p.name)[0]
         stem = next(
-            (w for w in ("centre of mass", "inertia", "tilt", "position") if what.startswith(w)), what
+            (w for w in ("centre of mass", "inertia", "tilt", "frame position") if what.startswith(w)), what
         )
         own = by_place.setdefault(p.place, [])
         if stem not in own:

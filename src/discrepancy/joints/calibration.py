@@ -105,7 +105,7 @@ class HeldOut:
         part: name.
         model, least_squares, calibrated: rms of measured minus predicted torque with the given model, with ordinary
             least squares of the same parameters, and with this fit, shape (J,) [N m or N].
-        noise: standard deviation of the noise of the rows, shape (J,).
+        noise: standard deviation of the sensors' noise in the rows, shape (J,).
         torque: rms of the measured torque, shape (J,).
     """
 
@@ -584,7 +584,8 @@ class _Fit:
             values = self.solved(others)[0] - self.at
             sides = self._left(t, nothing, free=False), self._plain(t, others), self._left(t, values)
             rows = self.rows[t]
-            noise = np.sqrt(np.sum(rows * self.variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
+            variance = self.variance if self.problem.sensors is None else self.problem.sensors
+            noise = np.sqrt(np.sum(rows * variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
             torque = np.sqrt(np.mean(self.trials.signals[t].torque ** 2, axis=0))
             plain, least, best = (self._wide(np.sqrt(np.mean(left**2, axis=0))) for left in sides)
             out.append(HeldOut(self.trials.names[t], plain, least, best, self._wide(noise), torque))
