@@ -14,7 +14,7 @@ CEILINGS = {
     "estimator": 6_660,
     "mocobot_logs": 6_950,
     "mocobot_inspect": 2_970,
-    "mocobot_sim": 5_760,
+    "mocobot_sim": 5_780,
     "discrepancy": 12_900,
     "mocobot_view": 2_155,
     "mocobot_report": 2_790,
