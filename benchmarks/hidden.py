@@ -113,6 +113,7 @@ class MadeLog:
     level: Level = "joint"
     channels: tuple[str, ...] = (*CHANNELS["joint"], *REF)
     metadata: RecordingMetadata | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def robots(self) -> int:

@@ -37,7 +37,8 @@ def test_hidden_bias_is_named_extended_and_written(biased_trials, tmp_path, caps
     assert code == 0
     assert text.startswith("EXPLAINED: one finding accounts for what the model gets wrong")
     assert "torque zero of joint 1 of robot 2" in " ".join(text.split())
-    assert max(len(line) for line in text.splitlines() if "Written" not in line) <= 100
+    lines = [line for line in text.splitlines() if "Written" not in line and "    mocobot " not in line]
+    assert max(map(len, lines)) <= 100
     report = (out / "report.txt").read_text()
     assert "Robot 2, joint 1: the torque sensor reads 0.0" in report
     assert text.splitlines()[0] == report.splitlines()[0]

@@ -27,9 +27,9 @@ INSIDE = "cannot be written (.../rec.parquet is a file)"
 PAYLOADS, PRESETS = "the payloads are a, b, c, d", "the presets are ideal, nominal, uncalibrated"
 
 WORDS = {
-    "": "no command given; it must be one of inspect, map, convert, ...",
+    "": "no command given; it must be one of example, inspect, map, convert, ...",
     "estimat rec.parquet": "there is no command 'estimat'; did you mean 'estimate'?",
-    "rec.parquet": "there is no command 'rec.parquet'; the commands are inspect, map, convert, ...",
+    "rec.parquet": "there is no command 'rec.parquet'; the commands are example, inspect, map, convert, ...",
     "--colour red": "the command line has no option --colour; see mocobot --help",
     "estimate rec.parquet --metod joint": "estimate has no option --metod; did you mean --method?",
     "estimate rec.parquet --rec rec.parquet": "estimate has no option --rec; see mocobot estimate --help",

@@ -286,7 +286,10 @@ BAD = {
         _payload(f'{LOAD}</body><geom size="0.1" mass="5"/>'),
         "a geom stands in the world",
     ),
-    "nan": (_payload(f'{LOAD}<site name="grasp2" pos="nan 0 0"/></body>'), "position is not finite"),
+    "nan": (
+        _payload(f'{LOAD}<site name="grasp2" pos="nan 0 0"/></body>'),
+        "every number must be a finite one",
+    ),
     "infinite mass": (
         _payload(f"{LOAD}</body>".replace('mass="1"', 'mass="inf"')),
         "not finite",
