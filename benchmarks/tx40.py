@@ -196,7 +196,7 @@ def main() -> None:
         for m in f.members:
             print(
                 f"    {m.place}: "
-                + ", ".join(f"{n} {v:.4g} +- {m.errors[n]:.2g}" for n, v in m.values.items())
+                + ", ".join(f"{n} {v:.4g} +- {m.errors.get(n) or 0.0:.2g}" for n, v in m.values.items())
             )
     print("\nTorque left unpredicted in the last third, rms over that of the torque [%]")
     first, last = parts(model, log)
