@@ -16,12 +16,13 @@ from scipy.linalg import qr
 from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import floor_of
 from discrepancy.joints.causes import parameter_name
+from discrepancy.joints.closed_loop import ClosedLoop, commanded
 from discrepancy.joints.diagnose import in_parts
 from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links
 from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import mount_of
-from discrepancy.joints.problem import LENGTH_M, MOMENTS, Given, JointProblem, joint_problem
+from discrepancy.joints.problem import LENGTH_M, MOMENTS, REST, Given, JointProblem, joint_problem
 from discrepancy.joints.servo import driven_by_voltage
 from discrepancy.joints.signals import Signals
 from discrepancy.joints.trials import Trials, at_limits, notes_of, resting, trials_of
@@ -167,7 +168,8 @@ def calibrate_arm(
     """
     say("smoothing the logs")
     trials = trials_of(model, logs)
-    fit = _Fit(model, trials)
+    loops = [ClosedLoop.of(s) for s in trials.runs] if all(map(commanded, logs)) else []
+    fit = _Fit(model, trials, loops)
     for k in range(ROUNDS):
         say(f"fitting all parameters, step {k + 1}")
         if fit.step() < SETTLED:
@@ -199,8 +201,8 @@ class _Scalar:
 class _Fit:
     """The fit around its current values."""
 
-    def __init__(self, model: SerialModel, trials: Trials) -> None:
-        self.model, self.trials = model, trials
+    def __init__(self, model: SerialModel, trials: Trials, loops: Sequence[ClosedLoop] = ()) -> None:
+        self.model, self.trials, self.loops = model, trials, loops
         self.known = tuple(map(int, trials.joints))
         volts = np.flatnonzero(driven_by_voltage(trials.motors, len(model.joints))).tolist()
         switched = any(s.enabled is not None and not s.enabled.all() for s in trials.runs)
@@ -217,6 +219,8 @@ class _Fit:
         self.links = tuple(body.body for body in self.bodies)
         self.problem = self._linear()
         self.scalars = list(self._scalars())
+        names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
+        self.options = replace(self.options, wanted=frozenset([*names, *(s.label for s in self.scalars)]))
         self.first = 10 * len(self.bodies)  # number of inertial parameters; scalars follow
         n, basis = self.first, self._gain_basis()
         self.basis = np.zeros((n + len(self.scalars), n + basis.shape[1]))
@@ -317,11 +321,42 @@ class _Fit:
 
     def _linear(self) -> JointProblem:
         t, before = self.tree, self.given
+        if self.loops:
+            self._see()
         parts: list[Signals] = []
         for s in self.trials.runs:
             inverse = s.inverse + torque_of(t, s.q, s.dq, s.ddq) - rigid_torque(s.motion)
             parts.append(replace(s, tree=t, inverse=inverse + (t.armature - before.armature) * s.ddq))
         return joint_problem(self.model, parts, self.values, self.options)
+
+    def _see(self) -> None:
+        """Take the present motion of the closed loops as the trials' signals."""
+        late, scale = (np.array([self.values.get(f"{n} {what}", 0.0) for n in self.model.joints]) for what in (
+            "delay_s", "scale"))  # fmt: skip
+        runs = tuple(loop.seen(self.model, late) for loop in self.loops)
+        self.options = replace(self.options, noise=None, kept=(), loops=[
+            (loop, loop.filtered(s, self.tree, scale, np.maximum(self.tree.coulomb, 0.05 * np.sqrt(np.mean(s.torque**2, axis=0))), REST * s.slow))
+            for loop, s in zip(self.loops, runs, strict=True)
+        ])  # fmt: skip
+        parts = []
+        for k, at in self.trials.parts:
+            share = len(runs[k].time) / len(self.trials.runs[k].time)
+            parts.append((k, slice(round(at.start * share), round(at.stop * share))))
+        self.trials = replace(self.trials, runs=runs, parts=tuple(parts), kept=(), noise=())
+
+    def _settle(self) -> None:
+        """Learn the torques that nothing explains, and move the motions to their likeliest course."""
+        x = np.zeros(len(self.active))
+        x[self.fit] = self.x - self.at
+        squares = [np.mean(np.square(s.residual - s.columns @ x), axis=0) for s in self.series]
+        print("settle", np.round(np.mean(squares, axis=0),3), [(np.sqrt(l.torque),np.sqrt(l.reading),np.sqrt(l.jitter)) for l in self.loops][0])
+        for t, (loop, filtered) in enumerate(self.options.loops):
+            lacking = self.problem.residual[t].copy()
+            for i, value in zip(self._columns(), self.x - self.at, strict=True):
+                for j, own in self.problem.series[i].items():
+                    lacking[:, j] -= value * own[t]
+            loop.move(filtered, lacking)
+            loop.learn(filtered, lacking)
 
     def _columns(self) -> NDArray[np.intp]:
         """Columns of the problem that are fitted, in the order of ``x``."""
@@ -351,6 +386,8 @@ class _Fit:
         found, self.covariance = self.solved(range(len(self.normals)))
         way = (found - self.x) / np.sqrt(np.diag(self.covariance))
         self.x = found
+        if self.loops:
+            self._settle()
         self.jump(self.x)
         return float(np.max(np.abs(way)))
 

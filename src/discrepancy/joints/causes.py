@@ -104,6 +104,7 @@ class JointSignals:
         load: modelled torque without friction and rotor inertia [N m or N], shape (W,).
         asked: modelled torque with friction and rotor inertia [N m or N], shape (W,).
         torque: measured torque, shape (W,).
+        by_delay: residual torque per second of delay, shape (W,).
         t: time [s], shape (W,).
         span: typical sizes over all logs.
     """
@@ -115,6 +116,7 @@ class JointSignals:
     load: Array
     asked: Array
     torque: Array
+    by_delay: Array
     t: Array
     span: Span
 
@@ -264,7 +266,7 @@ CAUSES = (
     ),
     JointCause(
         "torque_delay", "delay of the torque of {joint}", ("delay_s",),
-        lambda s, h: (-np.gradient(s.torque, s.step_s),), lambda z, h: (0.02,), kind=True,
+        lambda s, h: (s.by_delay,), lambda z, h: (0.02,), kind=True,
         sentence=lambda n: (
             f"the torque of {n.place} comes {n('delay_s', 'ms', 1e3)} {n.either('delay_s', 'late', 'early')}"
         ),

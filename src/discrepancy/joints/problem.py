@@ -15,6 +15,8 @@ from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
+from discrepancy.joints.closed_loop import ClosedLoop, bands_of, cells_of
+from discrepancy.joints.loop_filter import Filtered
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.joints.mechanics import (
     Tree,
@@ -50,6 +52,7 @@ class Given:
         kept: weight of each sample, shape (W, J) for each log; empty: all samples count.
         inertias: whether every link has a column for each of its ten inertial parameters.
         mount: gravity of another mount of the base than the model's [m/s^2], shape (3,); None: the model's.
+        loops: closed position loop and its filter for each log, if rows are positions; empty: rows are torques.
     """
 
     changed: int | None = None
@@ -62,6 +65,8 @@ class Given:
     kept: Sequence[Array] = ()
     inertias: bool = False
     mount: Array | None = None
+    loops: Sequence[tuple[ClosedLoop, Filtered]] = ()
+    wanted: frozenset[str] = frozenset()
 
 
 EDGES_HZ = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 3.5, 5.0, 7.0, 10.0])
@@ -352,6 +357,8 @@ class _Builder:
         known = range(self.J) if more.joints is None else more.joints
         kept = [w[:, list(known)] for w in more.kept]
         self.bands = Bands(rates, [len(r) for r in residual], edges, FADE_S, kept)
+        if more.loops:
+            self.bands = bands_of([loop for loop, _ in more.loops])
         self.channel = {j: c for c, j in enumerate(known)}
         self.out = JointProblem(
             model, self.parts, self._cells(residual), joints=self.joints, channel=self.channel
@@ -397,7 +404,7 @@ class _Builder:
         of = lambda what: np.array([v.get(f"{n} {what}", 0.0) for n in self.names])  # noqa: E731
         torque = s.torque
         late = of("delay_s")
-        if late.any():
+        if late.any() and s.by_delay is None:
             torque = np.column_stack([
                 CubicSpline(s.time, torque[:, j])(np.clip(s.time + late[j], s.time[0], s.time[-1]))
                 for j in range(self.J)
@@ -406,12 +413,15 @@ class _Builder:
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
         load = s.inverse - self.given.armature * s.ddq
         load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # filter: noise has no direction
+        by_delay = -np.gradient(torque, step, axis=0) if s.by_delay is None else s.by_delay
         for j in range(self.J):
-            own = (x[:, j] for x in (s.q, s.dq, s.ddq, side, load, asked, torque))
+            own = (x[:, j] for x in (s.q, s.dq, s.ddq, side, load, asked, torque, by_delay))
             self.joints[j].append(JointSignals(*own, t=s.time, span=self.spans[j]))
         return torque - asked * (1.0 + of("scale"))
 
     def _cells(self, residual: Sequence[Array]) -> Cells:
+        if self.more.loops:
+            return Cells.of(self.bands, [np.zeros((n, len(self.channel))) for n in self.bands.lengths])
         return Cells.of(self.bands, [r[:, list(self.channel)] for r in residual])
 
     # --- columns
@@ -453,12 +463,12 @@ class _Builder:
         self._arm()
         for body in self.tree.links:
             self._link(int(body))
-        for j in range(self.J):
+        for j in range(0 if self.more.loops else self.J):  # there, friction at rest is noise of the torque
             self._rests(j)
         out = self.out
         out.changed, out.mount = self.more.changed, self.more.mount
         body = int(self.tree.joint_body[self.tree.last_link])
-        none = self.more.motors or "push" in self.more.excluded  # a sticking gear looks like a push
+        none = self.more.motors or self.more.loops or "push" in self.more.excluded  # a sticking gear looks like a push
         for s in () if none else self.parts:
             out.pushed.append(force_torque(s.motion, body, self.tree.com[body]))
         for i, label in enumerate(
@@ -470,8 +480,14 @@ class _Builder:
                         self.residual[t][:, c] += self.values[label] * own
         if self.more.changed is not None:
             self._apart(self.more.changed)
-        out.cells = self._cells(self.residual)
-        out.cells.add(out.rows(out.series))
+        if self.more.loops:
+            out.cells = cells_of(self.more.loops, self.residual, [
+                own if label in self.more.wanted or " form " in label else {}
+                for label, own in zip(out.labels, out.series, strict=True)
+            ])  # fmt: skip
+        else:
+            out.cells = self._cells(self.residual)
+            out.cells.add(out.rows(out.series))
         out.residual = self.residual
         if self.more.noise is not None:
             out.sensors = self._sensors(self.more.noise)

@@ -53,6 +53,7 @@ class Signals:
         enabled: whether the drives are on, shape (W,); None: not logged.
         held: intervals of the log in which an encoder holds its last value.
         spoilt: samples that these intervals change by more than noise, shape (W,); None: no such samples.
+        by_delay: residual torque per second of delay of the commands, shape (W, J); None: torques are logged.
     """
 
     log: JointLog
@@ -70,6 +71,7 @@ class Signals:
     enabled: NDArray[np.bool_] | None = None
     held: tuple[Held, ...] = ()
     spoilt: NDArray[np.bool_] | None = None
+    by_delay: Array | None = None
 
     @classmethod
     def of(cls, log: JointLog, tree: Tree, inverse_torque: Callable[[Array, Array, Array], Array]) -> Signals:

@@ -36,7 +36,8 @@ def with_asked_torques(log: JointLog) -> JointLog:
     names = ", ".join(name for name, is_told in zip(log.joints, told, strict=True) if is_told)
     how = "commanded" if drive.command == "torque" else "asked for by the position loop with the map's gains"
     note = f"Torques of {names} are those {how}; no sensor measured them."
-    return replace(log, torque=np.where(told, asked, torque), notes=(*log.notes, note))
+    by_loop = drive.command == "position" and bool(told.all())
+    return replace(log, torque=np.where(told, asked, torque), asked=by_loop, notes=(*log.notes, note))
 
 
 def _by_loop(log: JointLog) -> Array:

@@ -74,6 +74,7 @@ class JointLog:
         enabled: whether the drives are switched on, shape (Q,); None if the log does not say.
         motor: motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log
             has positions on both sides of some drive.
+        asked: whether all torques are what position loops with known gains ask for, and none is measured.
         notes: sentences on irregularities and how they were handled.
     """
 
@@ -93,6 +94,7 @@ class JointLog:
     start_s: float = 0.0
     enabled: NDArray[np.bool_] | None = None
     motor: Array | None = None
+    asked: bool = False
     notes: tuple[str, ...] = ()
 
     @property

@@ -1,0 +1,301 @@
+"""Positions of drives that tell no torque: the likelihood of the encoders' readings in the closed position loop.
+
+The torque that a position loop asks for depends on the true motion, which the encoders tell with noise. So the motion
+on a fine grid is estimated together with the parameters: the loop is linearised around it, deviations are filtered
+(``loop_filter``), and the rows of the linear problem are the whitened innovations of the positions. The motion obeys
+the implicit midpoint rule, and torques that no parameter explains act as noise of learnt size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize
+
+from discrepancy.evidence.cells import Bands, Cells, Series
+from discrepancy.joints import friction
+from discrepancy.joints.loop_filter import Filtered, LinearLoop, cost
+from discrepancy.joints.mechanics import Tree, inverse_torque, torque_of
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.signals import STEP_M, STEP_RAD, Signals
+from estimator.arrays import Array
+from estimator.filtering import low_pass
+from mocobot_logs.joints.joint_log import JointLog
+
+STEP_S = 2e-3
+"""Longest step of the grid [s]. Derived: the midpoint rule errs by a thousandth at 10 Hz."""
+MATRICES_HZ = 100.0
+"""Rate at which inertias and stiffnesses of the arm are computed. Chosen: ten times the fastest motion."""
+SHARE = 0.4
+"""Cut-off of the first guess of the motion over the log's rate. Chosen."""
+MOTION_HZ = 20.0
+"""Highest frequency of the motion about which the loop is linear [Hz]: noise in it would make inertias too small."""
+DELAY_STEP_S = 1e-3
+"""Half the step of the derivative by the delay [s]. Chosen: commands are held for longer."""
+START_RAD, START_RAD_PER_S = 0.02, 1.0
+"""Standard deviations of the first state. Chosen: far above the encoders' errors."""
+REST_S = 0.05
+"""Correlation time of friction at rest [s], where it is any torque up to the Coulomb friction. Chosen."""
+FIRST_SHARE, FIRST_JITTER_S, LARGEST, LEAST_RAD = 0.5, 1e-4, 10.0, 1e-6
+"""First guesses of the torque that nothing explains, over the rms torque, and of the stamps' jitter [s]; the largest
+change of a variance's logarithm in one step; the least error of a reading [rad]. Chosen."""
+BANDS = np.array([0.0, 0.02, 0.04, 0.08, 0.15, 0.25, 0.35, 0.5])
+"""Edges of the bands of the innovations over the log's rate."""
+CHUNK = 64
+"""Columns that are filtered at once."""
+
+
+def commanded(log: JointLog) -> bool:
+    """Whether positions and commands are all that a log tells of its drives, in torque per error."""
+    drive = log.drive
+    known = log.command is not None and np.isfinite(log.command).any(axis=0).all()
+    return bool(known and log.asked and drive.command == "position" and drive.gain_of == "torque")
+
+
+@dataclass(eq=False)
+class ClosedLoop:
+    """One run of a log on a grid of N steps: the estimated motion and the noise.
+
+    Attributes:
+        signals: the run as the diagnosis smooths it.
+        first: sample of the log at the first grid point.
+        every: steps of the grid for each sample.
+        q, dq: motion at the grid points, shape (N + 1, J).
+        measured: positions read, NaN where there is none, shape (M, J).
+        reading: variance of the readings at rest, shape (J,) [rad^2].
+        jitter: variance of the time at which a position was read, shape (J,) [s^2].
+        torque: variance of unexplained torque over one second, shape (J,) [(N m)^2 s].
+    """
+
+    signals: Signals
+    first: int
+    every: int
+    q: Array
+    dq: Array
+    measured: Array
+    reading: Array
+    jitter: Array
+    torque: Array
+
+    @classmethod
+    def of(cls, s: Signals) -> ClosedLoop:
+        """Begin with the low-passed positions."""
+        log = s.log
+        first, last = (int(np.argmin(np.abs(log.time - t))) for t in (s.time[0], s.time[-1]))
+        every = int(np.ceil(log.period_s / STEP_S - 1e-9))
+        here = slice(first, last + 1)
+        way = CubicSpline(log.time, low_pass(log.q, log.rate_hz, min(MOTION_HZ, SHARE * log.rate_hz)), axis=0)
+        time = log.time[first] + np.arange((last - first) * every + 1) * log.period_s / every
+        measured = np.where(log.usable[here, None], log.q[here], np.nan)
+        noise = np.maximum(log.position_step**2 / 12.0, _reading(log))
+        size = np.mean(s.torque**2, axis=0)
+        return cls(
+            s, first, every, way(time), way(time, 1), measured, noise,
+            np.full(len(size), FIRST_JITTER_S**2), FIRST_SHARE**2 * size * log.period_s,
+        )  # fmt: skip
+
+    @property
+    def least(self) -> Array:
+        """Least variance of the readings: that of their rounding, shape (J,)."""
+        return self.signals.log.position_step**2 / 12.0 + LEAST_RAD**2
+
+    @property
+    def step_s(self) -> float:
+        """Step of the grid [s]."""
+        return self.signals.log.period_s / self.every
+
+    @property
+    def middle(self) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations at the middles of the steps, shape (N, J) each."""
+        h = self.step_s
+        return 0.5 * (self.q[1:] + self.q[:-1]), np.diff(self.q, axis=0) / h, np.diff(self.dq, axis=0) / h
+
+    def seen(self, model: SerialModel, late: Array) -> Signals:
+        """The motion and the torque that the loop asks for, at the middles of the steps.
+
+        Args:
+            model: the robot as described.
+            late: delay of the commands, shape (J,) [s].
+        """
+        q, dq, ddq = self.middle
+        log, h = self.signals.log, self.step_s
+        time = log.time[self.first] + (np.arange(len(q)) + 0.5) * h
+        command, before, after = (self._command(late + d) for d in (0.0, -DELAY_STEP_S, DELAY_STEP_S))
+        kp, kd, limit, on = self._gains(len(q))
+        asked = kp * (command - q) - kd * dq
+        torque = np.clip(asked, -limit, limit) * on
+        free = (np.abs(asked) < limit) * on
+        by_delay = -free * kp * (after - before) / (2.0 * DELAY_STEP_S)
+        ones = np.ones(q.shape, dtype=bool)
+        return replace(
+            self.signals, rate_hz=1.0 / h, time=time, q=q, dq=dq, ddq=ddq, torque=torque, usable=ones,
+            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, enabled=None, spoilt=None,
+        )  # fmt: skip
+
+    def _gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
+        log = self.signals.log
+        d = log.drive
+        on = np.ones((steps, 1))
+        if log.enabled is not None:
+            on[:, 0] = log.enabled[self.first + np.arange(steps) // self.every]
+        limit = np.where(np.isnan(d.limit), np.inf, d.limit)
+        return d.position_gain, np.nan_to_num(d.velocity_gain), limit, on
+
+    def _command(self, late: Array) -> Array:
+        """Mean of the held commands over each step, shape (N, J)."""
+        log = self.signals.log
+        assert log.command is not None
+        edges = log.time[self.first] + np.arange(len(self.q)) * self.step_s
+        stamps = np.append(log.time, log.time[-1] + log.period_s)
+        out = np.empty((len(edges) - 1, log.command.shape[1]))
+        for j, own in enumerate(late):
+            whole = np.append(0.0, np.cumsum(log.command[:, j]) * log.period_s)
+            at = edges - own
+            passed = np.interp(at, stamps, whole) + np.minimum(at - stamps[0], 0.0) * log.command[0, j]
+            out[:, j] = np.diff(passed) / self.step_s
+        return out
+
+    def filtered(self, s: Signals, tree: Tree, scale: Array, dry: Array, slow: Array) -> Filtered:
+        """Filter of the loop linearised around the motion.
+
+        Args:
+            s: the motion at the middles of the steps.
+            tree: kinematic tree with the present numbers.
+            scale: errors of the torque gains, shape (J,).
+            dry: largest torque of friction at rest, shape (J,).
+            slow: speed below which a joint may rest, shape (J,).
+        """
+        h, J, N = self.step_s, len(scale), len(s.time)
+        kp, kd, limit, on = self._gains(N)
+        free = (np.abs(s.torque) < limit) * on
+        thin = max(1, round(s.rate_hz / MATRICES_HZ))
+        at = np.arange(0, N, thin)
+        inertia, damping, stiffness = (
+            x * (1.0 + scale)[:, None] for x in _matrices(tree, s.q[at], s.dq[at], s.ddq[at])
+        )
+        K = stiffness[np.arange(N) // thin] + np.eye(J) * (free * kp)[:, None, :]
+        D = damping[np.arange(N) // thin] + np.eye(J) * (free * kd + (1.0 + scale) * tree.viscous)[:, None, :]
+        M = inertia[np.arange(N) // thin]
+        inner = np.linalg.inv(M + 0.5 * h * D + 0.25 * h**2 * K)
+        kept, back = inner @ (M - 0.5 * h * D - 0.25 * h**2 * K), inner @ K
+        A, B = np.empty((N, 2 * J, 2 * J)), np.empty((N, 2 * J, J))
+        A[:, :J, :J], A[:, :J, J:] = np.eye(J) - 0.5 * h**2 * back, 0.5 * h * (np.eye(J) + kept)
+        A[:, J:, :J], A[:, J:, J:] = -h * back, kept
+        B[:, :J], B[:, J:] = 0.5 * h**2 * inner, h * inner
+        Q = np.tile(self.torque / h, (N, 1))
+        for j in range(J):
+            for a, b in friction.rests(s.dq[:, j], h, slow[j]):
+                Q[a:b, j] += (0.5 * dry[j]) ** 2 * REST_S / h
+        speed = self.dq[:: self.every] ** 2
+        R = np.where(np.isfinite(self.measured).all(axis=1, keepdims=True), self.reading + self.jitter * speed, np.inf)
+        start = np.repeat([START_RAD**2, START_RAD_PER_S**2], J)
+        return Filtered.of(LinearLoop(A, B, Q, R, self.every, start))
+
+    @property
+    def off(self) -> Array:
+        """Measured positions minus the motion, 0 where there is none, shape (M, J)."""
+        return np.nan_to_num(self.measured - self.q[:: self.every])
+
+    def learn(self, filtered: Filtered, lacking: Array) -> None:
+        """Maximise the likelihood of each joint by the variances of reading, jitter and unexplained torque.
+
+        Deviations of other joints are neglected.
+
+        Args:
+            filtered: filter around the present motion.
+            lacking: torque that the model lacks there, shape (N, J).
+        """
+        loop, J = filtered.loop, self.q.shape[1]
+        speed, off, seen = self.dq[:: self.every] ** 2, self.off, np.isfinite(loop.R).all(axis=1)
+        for j in range(J):
+            at = [j, J + j]
+            A, B = (np.ascontiguousarray(x) for x in (loop.A[:, at][:, :, at], loop.B[:, at, j]))
+            rest = loop.Q[:, j] - self.torque[j] / self.step_s
+            u, y, v, start = (np.ascontiguousarray(x) for x in (lacking[:, j], off[:, j], speed[:, j], loop.start[at]))
+            now = np.log([self.reading[j], self.jitter[j], self.torque[j]])
+
+            def left(x: Array) -> float:
+                read, jitter, torque = np.exp(np.clip(x, now - LARGEST, now + LARGEST))
+                R = np.where(seen, np.maximum(read, self.least[j]) + jitter * v, np.inf)
+                return cost(A, B, rest + torque / self.step_s, R, self.every, start, u, y)
+
+            simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
+            best = minimize(left, now, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1})
+            self.reading[j], self.jitter[j], self.torque[j] = np.exp(np.clip(best.x, now - LARGEST, now + LARGEST))
+            self.reading[j] = max(self.reading[j], self.least[j])
+
+    def move(self, filtered: Filtered, lacking: Array) -> None:
+        """Move the motion to its likeliest course.
+
+        Args:
+            filtered: filter around the present motion.
+            lacking: torque that the model lacks there, shape (N, J).
+        """
+        J = self.q.shape[1]
+        way = filtered.smoothed(np.ascontiguousarray(lacking), self.off)
+        rate = 1.0 / self.step_s
+        cutoff = min(MOTION_HZ, SHARE * self.signals.log.rate_hz)
+        self.q, self.dq = (low_pass(x, rate, cutoff) for x in (self.q + way[:, :J], self.dq + way[:, J:]))
+
+
+def _reading(log: JointLog) -> Array:
+    """Variance of the readings' white noise, from differences of high order, shape (J,)."""
+    order = 4
+    white = np.diff(log.q, order, axis=0)
+    factor = 70.0  # sum of the squared binomial coefficients of order 4
+    return np.median(white**2, axis=0) / 0.455 / factor
+
+
+def _matrices(tree: Tree, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array, Array]:
+    """Derivatives of the torques by accelerations, velocities and positions, shape (Q, J, J) each."""
+    J, out = q.shape[1], []
+    for k in (2, 1, 0):
+        columns = []
+        for j in range(J):
+            step = STEP_M if tree.slides[j] else STEP_RAD
+            up, down = ([x.copy() for x in (q, dq, ddq)] for _ in range(2))
+            up[k][:, j] += step
+            down[k][:, j] -= step
+            columns.append((torque_of(tree, *up) - torque_of(tree, *down)) / (2.0 * step))
+        out.append(np.stack(columns, axis=2))
+    out[0] = out[0] + np.diag(tree.armature)
+    return out[0], out[1], out[2]
+
+
+def bands_of(loops: Sequence[ClosedLoop]) -> Bands:
+    """Bands of the innovations."""
+    rates = [loop.signals.log.rate_hz for loop in loops]
+    return Bands(rates, [len(loop.measured) for loop in loops], BANDS * min(rates))
+
+
+def cells_of(
+    loops: Sequence[tuple[ClosedLoop, Filtered]], residual: Sequence[Array], series: Sequence[Series]
+) -> Cells:
+    """Rows of the problem: whitened innovations of the positions.
+
+    Args:
+        loops: closed loop and filter of each run.
+        residual: torque that the model lacks, shape (N, J) for each run.
+        series: columns in torque by joint; an empty one stays without rows.
+    """
+    bands = bands_of([loop for loop, _ in loops])
+    white = [f.innovations(r[:, :, None], loop.off)[:, :, 0] for (loop, f), r in zip(loops, residual, strict=True)]
+    cells = Cells.of(bands, white)
+    rows = []
+    for t, ((_, f), r) in enumerate(zip(loops, residual, strict=True)):
+        own = np.zeros((bands.lengths[t], r.shape[1], len(series)))
+        for first in range(0, len(series), CHUNK):
+            some = [p for p in range(first, min(first + CHUNK, len(series))) if series[p]]
+            torque = np.zeros((*r.shape, len(some)))
+            for k, p in enumerate(some):
+                for j, x in series[p].items():
+                    torque[:, j, k] = x[t]
+            own[:, :, some] = f.innovations(torque)
+        rows.append(dct(bands.faded(own, t), axis=0, norm="ortho")[: len(bands.of_trial(t))])
+    cells.add_rows(np.concatenate(rows)[cells.order].swapaxes(0, 1))
+    return cells

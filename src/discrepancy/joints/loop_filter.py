@@ -1,0 +1,172 @@
+"""Kalman filter and smoother of deviations from a motion, for many input series at once.
+
+The state is x = (deviation of positions, deviation of velocities). Over one step of the grid
+
+    x' = A x + B (u + w),   w ~ N(0, diag(Q)),
+
+with u the torque that the motion lacks, and at every ``every``-th grid point y = positions of x + e, e ~ N(0, diag(R)).
+The filter is linear: the innovations of a sum of inputs are the sums of their innovations. Eliminating all states this
+way is the block-tridiagonal elimination of the whole trajectory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.arrays import Array
+from mocobot_sim.kernels import compiled
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLoop:
+    """Linearised closed loop of J joints over N steps of a grid, with M measurements.
+
+    Attributes:
+        A, B: shapes (N, 2J, 2J) and (N, 2J, J).
+        Q: variance of the torque of each step, shape (N, J) [(N m)^2].
+        R: variance of each measurement, inf where there is none, shape (M, J) [rad^2].
+        every: steps from one measurement to the next; the first is at grid point 0.
+        start: variance of the initial state, shape (2J,).
+    """
+
+    A: Array
+    B: Array
+    Q: Array
+    R: Array
+    every: int
+    start: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """Gains of the filter, which depend on no data.
+
+    Attributes:
+        loop: the loop.
+        gain: shape (M, 2J, J).
+        root: inverse of the lower Cholesky factor of the innovations' covariance, shape (M, J, J).
+    """
+
+    loop: LinearLoop
+    gain: Array
+    root: Array
+
+    @classmethod
+    def of(cls, loop: LinearLoop) -> Filtered:
+        """Run the covariance recursion."""
+        M, J = loop.R.shape
+        gain, root = np.zeros((M, 2 * J, J)), np.zeros((M, J, J))
+        _gains(loop.A, loop.B, loop.Q, loop.R, loop.every, loop.start, gain, root)
+        return cls(loop, gain, root)
+
+    def innovations(self, torque: Array, position: Array | None = None) -> Array:
+        """Whitened innovations of input series, shape (M, J, P).
+
+        Args:
+            torque: input torques, shape (N, J, P).
+            position: measurements of the first series, shape (M, J); None: 0.
+        """
+        M, J = self.loop.R.shape
+        out = np.zeros((M, J, torque.shape[2]))
+        y = np.zeros((M, J)) if position is None else position
+        _filter(self.loop.A, self.loop.B, self.gain, self.root, self.loop.every, np.ascontiguousarray(torque), y, out)
+        return out
+
+    def smoothed(self, torque: Array, position: Array) -> Array:
+        """Likeliest deviations at all grid points given the inputs and the measurements, shape (N + 1, 2J).
+
+        Args:
+            torque: input torques, shape (N, J).
+            position: measurements, shape (M, J).
+        """
+        N, twice = self.loop.A.shape[:2]
+        white = self.innovations(torque[:, :, None], position)[:, :, 0]
+        out = np.zeros((N + 1, twice))
+        _smooth(
+            self.loop.A, self.loop.B, self.loop.Q, self.gain, self.root, self.loop.every, self.loop.start, torque,
+            white, out,
+        )  # fmt: skip
+        return out
+
+
+@compiled
+def _gains(A, B, Q, R, every, start, gain, root):
+    N, twice, J = B.shape
+    P = np.diag(start)
+    for n in range(N + 1):
+        if n % every == 0:
+            k = n // every
+            if np.isfinite(R[k]).all():
+                H = np.ascontiguousarray(P[:, :J])
+                S = P[:J, :J] + np.diag(R[k])
+                inverse = np.linalg.inv(np.linalg.cholesky(S))
+                K = np.dot(np.dot(H, np.ascontiguousarray(inverse.T)), inverse)
+                P = P - np.dot(K, np.ascontiguousarray(H.T))
+                P = 0.5 * (P + P.T)
+                gain[k] = K
+                root[k] = inverse
+        if n < N:
+            noise = B[n] * Q[n]
+            P = np.dot(np.dot(A[n], P), np.ascontiguousarray(A[n].T)) + np.dot(noise, np.ascontiguousarray(B[n].T))
+
+
+@compiled
+def _filter(A, B, gain, root, every, torque, position, out):
+    N, twice, J = B.shape
+    x = np.zeros((twice, torque.shape[2]))
+    for n in range(N + 1):
+        if n % every == 0:
+            k = n // every
+            e = -x[:J]
+            e[:, 0] += position[k]
+            out[k] = np.dot(root[k], e)
+            x = x + np.dot(gain[k], e)
+        if n < N:
+            x = np.dot(A[n], x) + np.dot(B[n], torque[n])
+
+
+@compiled
+def _smooth(A, B, Q, gain, root, every, start, torque, white, out):
+    N, twice, J = B.shape
+    back = np.zeros(twice)
+    push = np.zeros((N, J))
+    for n in range(N, -1, -1):
+        if n < N:
+            push[n] = Q[n] * np.dot(np.ascontiguousarray(B[n].T), back)
+            back = np.dot(np.ascontiguousarray(A[n].T), back)
+        if n % every == 0:
+            k = n // every
+            score = np.dot(np.ascontiguousarray(root[k].T), white[k]) - np.dot(np.ascontiguousarray(gain[k].T), back)
+            back[:J] += score
+    x = start * back
+    out[0] = x
+    for n in range(N):
+        x = np.dot(A[n], x) + np.dot(B[n], torque[n] + push[n])
+        out[n + 1] = x
+
+
+@compiled
+def cost(A, B, Q, R, every, start, torque, position):
+    """Negative log likelihood of one joint, up to a constant: as above with J = 1, in one pass and without matrices."""
+    p, v = 0.0, 0.0
+    P, C, V = start[0], 0.0, start[1]
+    out = 0.0
+    for n in range(len(Q) + 1):
+        if n % every == 0 and np.isfinite(R[n // every]):
+            e, S = position[n // every] - p, P + R[n // every]
+            out += 0.5 * (e * e / S + np.log(S))
+            f, g = P / S, C / S
+            p, v = p + f * e, v + g * e
+            V, C, P = V - g * C, C - f * C, P - f * P
+        if n < len(Q):
+            a, b, c, d = A[n, 0, 0], A[n, 0, 1], A[n, 1, 0], A[n, 1, 1]
+            x, y = B[n, 0], B[n, 1]
+            p, v = a * p + b * v + x * torque[n], c * p + d * v + y * torque[n]
+            P, C, V = (
+                a * a * P + 2.0 * a * b * C + b * b * V + x * x * Q[n],
+                a * c * P + (a * d + b * c) * C + b * d * V + x * y * Q[n],
+                c * c * P + 2.0 * c * d * C + d * d * V + y * y * Q[n],
+            )
+    return out
