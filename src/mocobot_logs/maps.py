@@ -76,6 +76,7 @@ class ChannelMap:
         optional: whether a log may lack the channel: commands of a team; of joints all but positions.
         bits: width of a signed number that was logged as unsigned (two's complement), or None.
         counted: whether raw values are counts, whose step is 1.
+        held: whether a value holds until the next one, as commands do; else it is interpolated.
     """
 
     topic: str | None = None
@@ -87,6 +88,7 @@ class ChannelMap:
     optional: bool = False
     bits: int | None = None
     counted: bool = False
+    held: bool = False
 
     def apply(self, raw: Array) -> Array:
         """Convert raw samples to SI; return the same array if nothing changes."""

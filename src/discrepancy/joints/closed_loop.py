@@ -127,7 +127,7 @@ class ClosedLoop:
         time = log.time[self.first] + (np.arange(len(q)) + 0.5) * h
         command, before, after = (self._command(late + d) for d in (0.0, -DELAY_STEP_S, DELAY_STEP_S))
         kp, kd, limit, on = self._gains(len(q))
-        asked = kp * (command - q) - kd * dq
+        asked = kp * (command - q) - kd * dq + self._added(late)
         torque = np.clip(asked, -limit, limit) * on
         free = (np.abs(asked) < limit) * on
         by_delay = -free * kp * (after - before) / (2.0 * DELAY_STEP_S)
@@ -146,18 +146,33 @@ class ClosedLoop:
         limit = np.where(np.isnan(d.limit), np.inf, d.limit)
         return d.position_gain, np.nan_to_num(d.velocity_gain), limit, on
 
+    def _added(self, late: Array) -> Array | float:
+        """Torque that the loop gets beside the error of position, shape (N, J)."""
+        d, out = self.signals.log.drive, 0.0
+        for told, factor in ((d.feedforward, 1.0), (d.command_velocity, np.nan_to_num(d.velocity_gain))):
+            if told is not None:
+                out = out + factor * self._mean(np.nan_to_num(told), late)
+        return out
+
     def _command(self, late: Array) -> Array:
-        """Mean of the held commands over each step, shape (N, J)."""
+        assert self.signals.log.command is not None
+        return self._mean(self.signals.log.command, late)
+
+    def _mean(self, told: Array, late: Array) -> Array:
+        """Mean over each step of what a drive was told, held from sample to sample or interpolated, shape (N, J)."""
         log = self.signals.log
-        assert log.command is not None
+        late = late + np.nan_to_num(log.drive.delay_s)
         edges = log.time[self.first] + np.arange(len(self.q)) * self.step_s
-        stamps = np.append(log.time, log.time[-1] + log.period_s)
-        out = np.empty((len(edges) - 1, log.command.shape[1]))
+        out = np.empty((len(edges) - 1, told.shape[1]))
         for j, own in enumerate(late):
-            whole = np.append(0.0, np.cumsum(log.command[:, j]) * log.period_s)
-            at = edges - own
-            passed = np.interp(at, stamps, whole) + np.minimum(at - stamps[0], 0.0) * log.command[0, j]
-            out[:, j] = np.diff(passed) / self.step_s
+            if log.drive.held:
+                stamps = np.append(log.time, log.time[-1] + log.period_s)
+                whole = np.append(0.0, np.cumsum(told[:, j]) * log.period_s)
+                at = edges - own
+                passed = np.interp(at, stamps, whole) + np.minimum(at - stamps[0], 0.0) * told[0, j]
+                out[:, j] = np.diff(passed) / self.step_s
+            else:
+                out[:, j] = np.interp(edges[:-1] + 0.5 * self.step_s - own, log.time, told[:, j])
         return out
 
     def filtered(self, s: Signals, tree: Tree, scale: Array, dry: Array, slow: Array) -> Filtered:

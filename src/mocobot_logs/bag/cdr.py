@@ -241,7 +241,7 @@ class Walk:
 
     Attributes:
         leaves: the wanted numbers and arrays of numbers, by dotted path.
-        joints: strings of the field ``name``, if wanted.
+        joints: strings of the field ``name`` or ``joint_names``, if wanted.
         fixed: positions of all bytes that determine the layout: encapsulation, lengths, and names if wanted.
         unread: bytes after the last field, without padding; ROS 2 leaves them unread, too.
     """
@@ -253,7 +253,7 @@ class Walk:
             message: the message.
             kind: its type.
             wanted: dotted paths of numbers or of arrays of numbers.
-            names: whether to collect the strings of a field ``name``.
+            names: whether to collect the strings of a field ``name`` or ``joint_names``.
 
         Raises:
             CdrError: the message does not match its type, or its encapsulation is not plain CDR.
@@ -305,7 +305,7 @@ class Walk:
         length = self._length()
         begin = self._at
         self._skip(length)
-        if self._names and path.startswith("name["):
+        if self._names and path.startswith(("name[", "joint_names[")):
             self.fixed += range(begin, self._at)
             self.joints.append(self._message[begin : self._at].rstrip(b"\0").decode(errors="replace"))
 

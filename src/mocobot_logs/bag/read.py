@@ -31,6 +31,7 @@ from mocobot_logs.bag.cdr import (
     CdrReader,
     MessageType,
     Selector,
+    Walk,
     message_type,
     string_of,
     type_name,
@@ -56,6 +57,9 @@ class RowAligner:
     the cubic through two samples on either side. Its relative error for a sine is 3/128 of the fourth power of the
     phase per sample. At 100 Hz this is 4e-7 for 1 Hz and 2.3e-4 for 5 Hz. Nothing is decimated, so nothing aliases.
     There are no rows before a topic's first sample, after its last, or in its gaps.
+
+    Channels that are held, such as commands, are not interpolated: a row has their last value at its stamp. A topic
+    of such channels alone does not set the rows, and may pause or end.
     """
 
     def __init__(
@@ -64,6 +68,7 @@ class RowAligner:
         names: Sequence[str],
         periods_ns: Sequence[float],
         columns: Sequence[NDArray[np.intp]],
+        held: NDArray[np.bool_] | None = None,
     ) -> None:
         """Initialise without samples.
 
@@ -72,9 +77,14 @@ class RowAligner:
             names: names of its topics.
             periods_ns: median periods of the topics [ns]; the first that is close to the shortest sets the rows.
             columns: columns of a row that each topic fills.
+            held: whether each column of a row is held; None if none is.
         """
+        held = np.zeros(sum(map(len, columns)), dtype=bool) if held is None else held
         self._where, self._names, self._periods, self._columns = where, names, periods_ns, columns
-        self._leader = next(k for k, period in enumerate(periods_ns) if period <= _SAME * min(periods_ns))
+        self._held = [held[each] for each in columns]
+        measured = [k for k, each in enumerate(self._held) if not each.all()] or [*range(len(columns))]
+        least = min(periods_ns[k] for k in measured)
+        self._leader = next(k for k in measured if periods_ns[k] <= _SAME * least)
         self._topics = [joined([], len(each)) for each in columns]
 
     def push(self, parts: Mapping[int, Samples]) -> Samples | None:
@@ -107,7 +117,7 @@ class RowAligner:
             keep = ready
             if number != self._leader:
                 values[:, self._columns[number]], near = _interpolated(
-                    topic, rows.stamp_ns, self._periods[number]
+                    topic, rows.stamp_ns, self._periods[number], self._held[number]
                 )
                 good &= near
                 keep = max(len(topic.stamp_ns) - HELD // 2, 0)
@@ -127,8 +137,22 @@ class RowAligner:
             )
 
 
-def _interpolated(topic: Samples, at_ns: Stamps, period_ns: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Return interpolated values at some stamps, and which stamps have close enough samples on both sides."""
+def _interpolated(
+    topic: Samples, at_ns: Stamps, period_ns: float, held: NDArray[np.bool_]
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return values at some stamps, and which stamps have close enough samples on both sides.
+
+    Columns that are ``held`` have the last value; a stamp after the first sample suffices if all of them are.
+    """
+    if held.any():
+        last = np.searchsorted(topic.stamp_ns, at_ns, side="right") - 1
+        if not len(topic.stamp_ns):
+            return np.full((len(at_ns), len(held)), np.nan), last >= 0
+        if held.all():
+            return topic.values[np.maximum(last, 0)], last >= 0
+        values, good = _interpolated(topic, at_ns, period_ns, np.zeros_like(held))
+        values[:, held] = topic.values[np.maximum(last, 0)][:, held]
+        return values, good
     fresh = np.ones(len(topic.stamp_ns), bool)
     fresh[1:] = topic.stamp_ns[1:] > topic.stamp_ns[:-1]  # drop repeated stamps
     stamp, values = topic.stamp_ns[fresh], topic.values[fresh]
@@ -269,6 +293,32 @@ class Look:
             )
             found[joint] = x[np.isfinite(x)], f"{why} in the first {reader.count} messages"
         return found
+
+    def series(self, topic: str, fields: Sequence[str], clock: Clock) -> tuple[Stamps, Array]:
+        """Return stamps [ns], shape (q,), and numbers, shape (q, C), of fields in all messages of a topic.
+
+        A number that a message lacks is NaN.
+        """
+        kind = message_type(self._files.topics[topic], self._bag)
+        reader = CdrReader(kind, [Selector(field) for field in fields], clock == "header")
+        stamps, values = [np.empty(0, np.int64)], [np.empty((0, len(fields)))]
+        for block in self._files.blocks((topic,), lambda _: None) if self._files.has_messages(topic) else ():
+            stamp, numbers = reader.read(block[topic])
+            stamps.append(stamp if clock == "header" else block[topic].log_ns)
+            values.append(numbers)
+        return np.concatenate(stamps), np.concatenate(values)
+
+    def joint_names(self, topic: str) -> tuple[str, ...]:
+        """Return the texts of ``joint_names`` in the first message of a topic, empty if it has none."""
+        found = self.first(topic, 1)
+        if found is None:
+            return ()
+        return tuple(Walk(found[0], message_type(self._files.topics[topic], self._bag), set(), True).joints)
+
+    def fields(self, topic: str) -> tuple[str, ...]:
+        """Return the names of the fields of a topic's type."""
+        kind = message_type(self._files.topics[topic], self._bag)
+        return tuple(name for name, _ in kind.fields(kind.name))
 
     def is_stamped(self, topic: str) -> bool:
         """Return whether messages have header stamps, and the first ones are not all zero."""
@@ -533,14 +583,15 @@ class BagSource:
             joints = [maps[self.channels[k]].joint or "" for k in columns]
             stamps = every[topic] if topics.count(topic) == 1 else self._look.sent(topic, joints, self._clock)
             steps = np.diff(stamps)
-            if not (steps > 0).any():
+            if not (steps > 0).any() and not all(maps[self.channels[k]].held for k in columns):
                 raise InputError(
                     f"{self.name}: topic {printable(topic)} has too few stamps to be brought onto one time with the "
                     f"other topics of robot {robot + 1}"
                 )
-            periods.append(float(np.median(steps[steps > 0])))
+            periods.append(float(np.median(steps[steps > 0])) if (steps > 0).any() else np.inf)
         names = tuple(map(printable, topics))
-        return RowAligner(f"{self.name}: robot {robot + 1}", names, periods, self._columns[robot])
+        held = np.array([maps[name].held for name in self.channels], dtype=bool)
+        return RowAligner(f"{self.name}: robot {robot + 1}", names, periods, self._columns[robot], held)
 
     def _read_metadata(self) -> RecordingMetadata | None:
         topic = self._files.topics.get(METADATA_TOPIC)

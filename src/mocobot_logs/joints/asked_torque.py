@@ -17,15 +17,16 @@ SMOOTH_HZ, SMOOTH_SHARE = 60.0, 0.2
 def with_asked_torques(log: JointLog) -> JointLog:
     """Fill in the torques of joints that have neither a torque nor a duty, if their commands tell them.
 
-    A position loop whose gains give torques asks for position_gain (command - position) - velocity_gain velocity,
-    within its limit. A drive that is off gives none.
+    A position loop whose gains are known and give torques asks for position_gain (command - position) + velocity_gain
+    (command_velocity - velocity) + feedforward, within its limit, ``delay_s`` after the command. A drive that is off
+    gives none.
     """
     if log.command is None or log.drive.command not in ("position", "torque"):
         return log
     drive, known = log.drive, np.zeros(len(log.joints), dtype=bool)
     for logged in (log.torque, drive.duty):
         known |= False if logged is None else np.isfinite(logged).any(axis=0)
-    asked = log.command if drive.command == "torque" else _by_loop(log)
+    asked = _late(log, log.command) if drive.command == "torque" else _by_loop(log)
     asked = np.clip(asked, -_limit(log), _limit(log))
     if log.enabled is not None:
         asked = asked * log.enabled[:, None]
@@ -36,6 +37,9 @@ def with_asked_torques(log: JointLog) -> JointLog:
     names = ", ".join(name for name, is_told in zip(log.joints, told, strict=True) if is_told)
     how = "commanded" if drive.command == "torque" else "asked for by the position loop with the map's gains"
     note = f"Torques of {names} are those {how}; no sensor measured them."
+    rough = drive.gain_within[told].max(initial=1.0)
+    if drive.command == "position" and rough > 1.0:
+        note += f" The gains are known within a factor of {rough:g}, and so are these torques."
     by_loop = drive.command == "position" and bool(told.all())
     return replace(log, torque=np.where(told, asked, torque), asked=by_loop, notes=(*log.notes, note))
 
@@ -50,8 +54,23 @@ def _by_loop(log: JointLog) -> Array:
     velocity = differentiate(smooth, log.rate_hz)
     if log.dq is not None:
         velocity = np.where(np.isfinite(log.dq), log.dq, velocity)
-    damping = np.nan_to_num(drive.velocity_gain)
-    return drive.position_gain * (log.command - log.q) - damping * velocity
+    damping = np.where(drive.gain_free[:, 1], np.nan, np.nan_to_num(drive.velocity_gain))
+    wanted = 0.0 if drive.command_velocity is None else np.nan_to_num(_late(log, drive.command_velocity))
+    added = 0.0 if drive.feedforward is None else np.nan_to_num(_late(log, drive.feedforward))
+    return drive.position_gain * (_late(log, log.command) - log.q) + damping * (wanted - velocity) + added
+
+
+def _late(log: JointLog, told: Array) -> Array:
+    """Return what the drives have been told by ``delay_s`` before each instant, shape (Q, J)."""
+    late_s = np.nan_to_num(log.drive.delay_s)
+    if not late_s.any():
+        return told
+    at = log.time[:, None] - late_s
+    if log.drive.held:
+        rows = np.floor(at * log.rate_hz + 1e-6).astype(int)
+        return np.take_along_axis(told, np.clip(rows, 0, None), axis=0)
+    columns = [np.interp(x, log.time, y) for x, y in zip(at.T, told.T, strict=True)]
+    return np.column_stack(columns)
 
 
 def _limit(log: JointLog) -> Array:

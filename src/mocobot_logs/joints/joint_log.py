@@ -34,6 +34,15 @@ class Drive:
         limit: largest output of the loop, in the quantity of ``gain_of`` (a duty for firmware gains), shape (J,).
         supply_V: mean supply voltage of the motors [V], shape (Q,), or None.
         duty: share of the supply voltage applied to each motor, -1 to 1, shape (Q, J), or None.
+        gain_within: factor within which position and velocity gain are known, shape (J, 2): 1 if exactly, infinity if
+            free, that is unknown, although the loop has them. Ones if not given.
+        delay_s: time from the stamp of a command until the drive follows it [s], shape (J,), NaN where unknown.
+        held: whether a command holds until the next one; else the robot interpolates between commands. The samples of
+            ``JointLog.command``, ``command_velocity`` and ``feedforward`` are the values in force at their instants.
+        feedforward: commanded torque that is added to the loop's [N m or N], shape (Q, J), NaN where a joint has none;
+            None if no joint has one.
+        command_velocity: commanded velocity beside a commanded position [rad/s or m/s], shape (Q, J), NaN where a joint
+            has none; None if no joint has one. The velocity gain acts on its difference from the velocity.
     """
 
     gear: Array
@@ -47,6 +56,23 @@ class Drive:
     limit: Array
     supply_V: Array | None = None
     duty: Array | None = None
+    gain_within: Array = None  # type: ignore[assignment]
+    delay_s: Array = None  # type: ignore[assignment]
+    held: bool = True
+    feedforward: Array | None = None
+    command_velocity: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Fill in the arrays that are not given."""
+        if self.gain_within is None:
+            object.__setattr__(self, "gain_within", np.ones((len(self.gear), 2)))
+        if self.delay_s is None:
+            object.__setattr__(self, "delay_s", np.full(len(self.gear), np.nan))
+
+    @property
+    def gain_free(self) -> NDArray[np.bool_]:
+        """Whether the position and the velocity gain are unknown, shape (J, 2)."""
+        return np.isinf(self.gain_within)
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,6 +60,8 @@ QUANTITIES: dict[str, Quantity] = {
     "current": Quantity("current", motor=True),
     "command": Quantity("position"),
     "motor_command": Quantity("position", motor=True),
+    "command_velocity": Quantity("velocity"),
+    "feedforward": Quantity("effort"),
     "duty": Quantity("duty", motor=True),
     "motor_voltage": Quantity("voltage", motor=True),
     "supply": Quantity("voltage", shared=True),
@@ -71,6 +73,8 @@ VELOCITIES = ("dq", "motor_velocity")
 EFFORTS = ("torque", "link_torque", "motor_torque", "current")
 COMMANDS = ("command", "motor_command")
 DUTIES = ("duty", "motor_voltage")
+ORDERS = (*COMMANDS, "command_velocity", "feedforward")
+"""Quantities that the robot is told, and that hold until it is told others."""
 KEYS = (*PLACES, "unit", "sign", "offset", "bits", *units.NUMBERED)
 """Keys of a channel."""
 MOST_BITS = 53
@@ -85,12 +89,15 @@ _DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
     "flag": ("flags", "flag", "flag"),
 }
 """Plural, and dimension for a turning and for a sliding joint."""
+BETWEEN = ("held", "interpolated")
+"""What the robot does between two commands."""
 _COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
 _PLACEHOLDERS = ("joint", "number", "index")
 _OPTIONAL = ("version", "time", "csv", "defaults", "drive", "control", "joint", "log")
 _DRIVE = ("gear", "zero", "torque_constant")
 _GAIN = ("position_gain", "velocity_gain", "limit")
-_OF_JOINT = (*_DRIVE, *_GAIN, "channels")
+_LOOP = (*_GAIN, "gain_known_within", "delay_s")
+_OF_JOINT = (*_DRIVE, *_LOOP, "channels")
 _OF_LOG = ("match", *_GAIN, "supply_V")
 _LEAST_RECIPROCAL_CONDITION = 1e-9
 _UNKNOWN = float("nan")
@@ -107,10 +114,13 @@ class Control:
 
     Attributes:
         command: what the logged commands are: one of ``Command``.
-        position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,).
+        position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,); infinity where free.
         gain_of: what the loop outputs, gain times error: one of ``GainOf``.
         limit: largest output of the loop, in the quantity of ``gain_of``, shape (J,).
         supply_V: nominal supply voltage, or None.
+        gain_known_within: factor within which gains that are not free are known, shape (J,).
+        delay_s: see ``joint_log.Drive``, shape (J,).
+        held: whether commands hold until the next one; else they are interpolated.
     """
 
     command: Command
@@ -119,6 +129,9 @@ class Control:
     gain_of: GainOf
     limit: Array
     supply_V: float | None
+    gain_known_within: Array
+    delay_s: Array
+    held: bool
 
 
 Channels = dict[tuple[str, str], ChannelMap]
@@ -162,11 +175,16 @@ class JointMap:
                 control = replace(control, **differs)
         return control
 
+    @property
+    def held(self) -> tuple[bool, ...]:
+        """Whether each channel holds its value until the next one."""
+        return tuple(self.control.held and quantity in ORDERS for quantity, _ in self.channels)
+
     def of_source(self) -> LogMap:
         """Return the map in the form that readers of logs use: one robot with all channels in order."""
         mapped = {
-            label(*key): replace(channel, optional=key[0] not in POSITIONS)
-            for key, channel in self.channels.items()
+            label(*key): replace(channel, optional=key[0] not in POSITIONS, held=held)
+            for (key, channel), held in zip(self.channels.items(), self.held, strict=True)
         }
         return LogMap(self.name, "joint", 1, None, self.time, self.csv, mapped, required=tuple(mapped))
 
@@ -375,6 +393,12 @@ def _check_together(channels: Channels, control: Control, where: str) -> None:
         raise InputError(
             f"{where}: control: command is {control.command!r}, but there is no channel command or motor_command"
         )
+    for name, needed in (("feedforward", ("position", "velocity")), ("command_velocity", ("position",))):
+        if name in names and control.command not in needed:
+            raise InputError(
+                f"{where}: channels: {name} goes with a command of a {' or '.join(needed)}; control's key command is "
+                f"{control.command!r}"
+            )
     if "motor_voltage" in names and control.supply_V is None and "supply" not in names:
         raise InputError(
             f"{where}: channels: motor_voltage needs the supply, a channel supply or control's key supply_V"
@@ -407,11 +431,28 @@ def _constant(value: Any) -> float | None:
     return _UNKNOWN if value == "free" else _positive(value)
 
 
+def _gain(value: Any) -> float | None:
+    return np.inf if value == "free" else _positive(value)
+
+
+def _factor(value: Any) -> float | None:
+    number = _number(value)
+    return number if number is not None and number >= 1 else None
+
+
+def _not_negative(value: Any) -> float | None:
+    number = _number(value)
+    return number if number is not None and number >= 0 else None
+
+
 _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
     "gear": (1.0, _nonzero, "a number of motor turns per joint turn, not 0"),
     "zero": (0.0, _number, "a finite number"),
     "torque_constant": (1.0, _constant, 'a positive number of newton metres per ampere, or "free"'),
-    **dict.fromkeys(_GAIN, (_UNKNOWN, _positive, "a positive number")),
+    **dict.fromkeys(_GAIN[:2], (_UNKNOWN, _gain, 'a positive number, or "free" where the loop has an unknown one')),
+    "limit": (_UNKNOWN, _positive, "a positive number"),
+    "gain_known_within": (1.0, _factor, "a factor of at least 1, such as 2 for half to twice the gain"),
+    "delay_s": (_UNKNOWN, _not_negative, "a number of seconds, not negative"),
 }
 """By key of a joint: default, converter (None refuses the value), and description of allowed values."""
 
@@ -510,9 +551,11 @@ def _control(
     """Return how the robot is commanded, and the overrides of single logs."""
     inside = f"{joints.where}: control"
     table = table_of(values, "control", joints.where)
-    fields = Fields(table, (), inside, ("command", "gain_of", "supply_V", *_GAIN))
+    fields = Fields(table, (), inside, ("command", "between_commands", "gain_of", "supply_V", *_LOOP))
+    between = fields.one_of("between_commands", BETWEEN) if "between_commands" in fields else BETWEEN[0]
     control = Control(
-        **{key: joints.read(table, key, inside) for key in _GAIN},
+        **{key: joints.read(table, key, inside) for key in _LOOP},
+        held=between == BETWEEN[0],
         command=fields.one_of("command", get_args(Command)) if "command" in fields else "none",
         gain_of=fields.one_of("gain_of", get_args(GainOf)) if "gain_of" in fields else "torque",
         supply_V=fields.number("supply_V", above=0.0) if "supply_V" in fields else None,

@@ -32,11 +32,13 @@ from mocobot_logs.joints.joint_map import (
     JointMap,
     label,
 )
-from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated
+from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated, rows_of
 from mocobot_logs.open_log import open_log
 from mocobot_logs.resample import LARGEST, MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
 from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, on_grid
 
+EVEN_SHARE = 2e-3
+"""Largest deviation of even stamps, as a share of a period. Derived: an arm turns by micrometres meanwhile."""
 MAX_GAP_S = 0.05
 """Longest time without samples, beyond one period, that is bridged [s]."""
 SHORTEST_S, LEAST_ROWS = 1.0, 32
@@ -93,6 +95,8 @@ def joint_logs_of(
         InputError: see ``read_joint_log``.
     """
     samples, log_map, without = _with_values(name, samples, log_map)
+    held = np.array(log_map.held, dtype=bool)
+    samples = _with_commands(samples, held)
     channels = tuple(label(*key) for key in log_map.channels)
     at = [k for k, (quantity, _) in enumerate(log_map.channels) if QUANTITIES[quantity].kind == "position"]
     positions, turned = unwrapped(samples.values[:, at], [channels[k] for k in at])
@@ -103,7 +107,7 @@ def joint_logs_of(
     control = log_map.control_of(Path(name).name)
     logs = [
         _joint_log(part, log_map, name, control, (*notes, *without, *turned))
-        for part in _even_parts(name, channels, samples, log_map.rate_hz)
+        for part in _even_parts(name, channels, samples, log_map.rate_hz, held)
     ]
     if len(logs) == 1:
         return logs
@@ -136,6 +140,18 @@ def _with_values(name: str, samples: Samples, log_map: JointMap) -> tuple[Sample
     log_map = replace(log_map, channels=left, control=control)
     samples = replace(samples, values=samples.values[:, kept])
     return samples, log_map, [f"No row has a value of {each}; it is left out." for each in told]
+
+
+def _with_commands(samples: Samples, held: NDArray[np.bool_]) -> Samples:
+    """Let each command hold until the next one; drop rows before the first command, and rows of commands alone."""
+    gaps = np.isnan(samples.values[:, held])
+    if not gaps.any():
+        return samples
+    last = np.maximum.accumulate(np.where(gaps, -1, np.arange(len(gaps))[:, None]), axis=0)
+    values = samples.values.copy()
+    values[:, held] = np.take_along_axis(values[:, held], np.maximum(last, 0), axis=0)
+    alone = np.isnan(values[:, ~held]).all(axis=1)
+    return rows_of(replace(samples, values=values), (last >= 0).all(axis=1) & ~alone)
 
 
 def empty_channels(values: Array, log_map: JointMap) -> list[tuple[str, str]]:
@@ -171,8 +187,13 @@ class _Even:
     notes: tuple[str, ...]
 
 
-def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz: float | None) -> list[_Even]:
-    """Split a log at gaps too long to be bridged and resample each part to ``rate_hz`` [Hz] or the log's own rate."""
+def _even_parts(
+    name: str, channels: tuple[str, ...], samples: Samples, rate_hz: float | None, held: NDArray[np.bool_]
+) -> list[_Even]:
+    """Split a log at gaps too long to be bridged and resample each part to ``rate_hz`` [Hz] or the log's own rate.
+
+    Channels that are ``held``, shape (C,), are not interpolated: each instant has the last value before it.
+    """
     _check_values(name, channels, samples.values)
     screen = Screen(name, channels)
     time_ns, values = screen.keep(samples)
@@ -200,7 +221,7 @@ def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz:
         if length_s < SHORTEST_S or end - first < LEAST_ROWS:
             lost_s += length_s
             continue
-        parts.append(_even(time_ns[first:end], values[first:end], period_ns, rate_hz))
+        parts.append(_even(time_ns[first:end], values[first:end], period_ns, rate_hz, held))
     if not parts:
         raise InputError(
             f"{name}: no part of it has samples for {SHORTEST_S:g} s without a gap of more than {MAX_GAP_S:g} s"
@@ -214,7 +235,9 @@ def _even_parts(name: str, channels: tuple[str, ...], samples: Samples, rate_hz:
     return [replace(part, notes=(*notes, *part.notes)) for part in parts]
 
 
-def _even(time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | None) -> _Even:
+def _even(
+    time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | None, held: NDArray[np.bool_]
+) -> _Even:
     """Resample one part without long gaps."""
     first_ns = int(time_ns[0])
     time_ns = time_ns - first_ns
@@ -252,6 +275,8 @@ def _even(time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | Non
             )
     out, lead = on_grid(time_ns, values, grid, k)
     at_ns = (lead + np.arange(len(out))) / wanted / NS
+    last = np.searchsorted(time_ns, at_ns + TOLERANCE_NS, side="right") - 1
+    out[:, held] = values[np.ix_(last, held)]
     usable = _between_samples(at_ns, time_ns, grid.period_ns)
     if not usable.all():
         notes.append(f"{np.sum(~usable)} of {len(out)} samples are bridged gaps and are left out.")
@@ -293,7 +318,7 @@ def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int6
         return None
     off_ns = np.abs(time_ns - offset_ns - index * spacing_ns).max()
     coarse = step_ns if step_ns > 2.0 * TOLERANCE_NS and step_ns < 1.01 * period_ns else 0.0
-    if off_ns <= TOLERANCE_NS + 0.5:
+    if off_ns <= max(TOLERANCE_NS + 0.5, EVEN_SHARE * period_ns):
         return float(spacing_ns), index, 0.0
     if coarse and off_ns <= 0.75 * coarse and coarse < 0.75 * period_ns:
         return float(spacing_ns), index, coarse
@@ -460,12 +485,17 @@ def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, note
         torque_constant=_constants(columns, log_map, where),
         link_side=_given(columns.of("link_torque")),
         command=control.command,
-        position_gain=control.position_gain,
-        velocity_gain=control.velocity_gain,
+        position_gain=np.where(np.isinf(control.position_gain), np.nan, control.position_gain),
+        velocity_gain=np.where(np.isinf(control.velocity_gain), np.nan, control.velocity_gain),
         gain_of=control.gain_of,
         limit=control.limit,
         supply_V=supply_V,
         duty=_duty(columns, supply_V),
+        gain_within=_gain_within(control),
+        delay_s=control.delay_s,
+        held=control.held,
+        feedforward=columns.of("feedforward") if columns.has("feedforward") else None,
+        command_velocity=columns.of("command_velocity") if columns.has("command_velocity") else None,
     )
     flags = columns.shared("enabled")
     log = JointLog(
@@ -488,6 +518,12 @@ def _joint_log(part: _Even, log_map: JointMap, name: str, control: Control, note
         notes=(*notes, *part.notes),
     )
     return with_asked_torques(log)
+
+
+def _gain_within(control: Control) -> Array:
+    """Return the factors within which position and velocity gains are known, shape (J, 2)."""
+    gains = np.column_stack([control.position_gain, control.velocity_gain])
+    return np.where(np.isinf(gains), np.inf, control.gain_known_within[:, None])
 
 
 def _given(values: Array) -> NDArray[np.bool_]:
