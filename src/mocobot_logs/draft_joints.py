@@ -25,8 +25,17 @@ from mocobot_logs.draft import (
     time_lines,
     unused_lines,
 )
+from mocobot_logs.draft_drives import (
+    Place,
+    follow,
+    gain_lines,
+    lerobot_places,
+    motors_of,
+    numbered,
+    zero_lines,
+)
 from mocobot_logs.draft_names import TOKEN, UNITS, Robots
-from mocobot_logs.formats import log_kind
+from mocobot_logs.formats import Kind, log_kind
 from mocobot_logs.joints.joint_map import (
     COMMANDS,
     DUTIES,
@@ -37,13 +46,21 @@ from mocobot_logs.joints.joint_map import (
     units_of,
 )
 from mocobot_logs.joints.read import unwrapped
-from mocobot_logs.presets import TYPES, Meaning, column_meaning, effort_meaning
+from mocobot_logs.presets import (
+    ORDERS,
+    TRAJECTORY,
+    TRAJECTORY_FIELDS,
+    TYPES,
+    Meaning,
+    column_meaning,
+    effort_meaning,
+)
 from mocobot_logs.table.table import Table, Wanted
 from mocobot_logs.table.text import BrokenRowsError
-from mocobot_logs.units import COUNTS, FACTORS
+from mocobot_logs.units import COUNTS, FACTORS, TIME_UNITS
 
 if TYPE_CHECKING:
-    from mocobot_logs.bag.read import Look
+    from mocobot_logs.bag.read import Clock, Look
 
 WORDS: dict[str, set[str]] = {
     "enabled": {"enable", "enabled"},
@@ -65,6 +82,8 @@ _AT_MOTOR = {
     "torque": "motor_torque",
     "command": "motor_command",
 }
+GAINS = ("position_gain", "velocity_gain")
+"""Keys of [control] that columns may tell."""
 _TURNS = 4.0 * np.pi
 """Largest range of a turning joint in radians; a larger one counts as degrees."""
 _METRES = 20.0
@@ -72,33 +91,10 @@ _METRES = 20.0
 _ROWS = 20_000
 
 
+_ADDED = ("command_velocity", "feedforward")
+"""Quantities of no use if they are zero throughout."""
 _WEAK = {"joint", "state"}
 """Words that identify a quantity only if no other column does."""
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Location of one quantity of all joints.
-
-    Attributes:
-        keys: keys of a map with placeholders.
-        values: first finite values of each joint, one for all if the quantity is shared; None if they cannot be read.
-        meaning: unit and comment, where the name is well known.
-        own: keys of single joints that differ.
-        lacks: why a joint has no value.
-    """
-
-    keys: Mapping[str, str]
-    values: Sequence[Array | None] = ()
-    meaning: Meaning | None = None
-    own: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    lacks: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def every(self) -> Array | None:
-        """All values, None if they cannot be read."""
-        known = [values for values in self.values if values is not None]
-        return np.concatenate(known) if known else None
 
 
 def draft_joint_map(
@@ -116,25 +112,124 @@ def draft_joint_map(
         InputError: there is no such log, or it is damaged.
     """
     head = [*head_lines(path, "docs/serial/guide.md says what may stand here."), "version = 1"]
-    kind, lacking = log_kind(path), []
+    kind = log_kind(path)
     if kind == "bag":
-        places, time, unused, doubts, lost = _in_bag(path, joints)
+        found, where = _in_bag(path, joints), "message"
     else:
-        table, candidates, csv = opened_table(path, kind, episode)
-        time, doubts, lost = [*time_lines(table, candidates, Robots((), "")), *csv], [], []
-        clock = tomllib.loads("\n".join(time)).get("time", {})
-        lacking = _unlogged(table, joints)
-        if lacking:
-            slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint not in lacking]
-            joints = [joint for joint in joints if joint not in lacking]
-            lost = [f"joint {joint}" for joint in lacking]
-        places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
-    where = "message" if kind == "bag" else "column; if it does not move, name it by --lock"
-    found = _sections(places, slides, [*doubts, *(f"{joint} is in no {where}" for joint in lost)])
-    lines, missing = found
-    head += [f"joints = {json.dumps(list(joints), ensure_ascii=False)}", ""]
-    text = "\n".join([*head, *time, "[channels]", *lines, *unused_lines(unused)]) + "\n"
+        found, where = (
+            _in_columns(path, kind, joints, episode),
+            "column; if it does not move, name it by --lock",
+        )
+    lost = [f"joint {joint}" for joint in found.lost]
+    slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint in found.joints]
+    doubts = [*found.doubts, *(f"{joint} is in no {where}" for joint in lost)]
+    if len(lost) > 1:
+        doubts.append(f"all of them: {' '.join(f'--lock {joint}=0' for joint in found.lost)}")
+    lines, missing = _sections(found, slides, doubts)
+    head += [f"joints = {json.dumps(list(found.joints), ensure_ascii=False)}", ""]
+    text = "\n".join([*head, *found.time, "[channels]", *lines, *unused_lines(found.unused)]) + "\n"
     return Draft(text, text.count(DOUBTFUL), (*missing, *lost))
+
+
+@dataclass(eq=False)
+class _Found:
+    """What a log holds of a robot.
+
+    Attributes:
+        joints: joints of the model that it holds, in its order.
+        lost: joints of the model that it does not hold.
+        places: places by quantity.
+        time: lines of [time] and [csv].
+        unused: names of what is not used.
+        doubts: what the user must check.
+        gains: gains of all rows by key of [control], shape (q, J) each.
+        gain_of: what the gains make.
+        known: whether the command is known to be a position.
+        free: whether zeros and signs are the user's choice.
+        spare: places that the map may hold instead, by quantity.
+    """
+
+    joints: Sequence[str]
+    lost: Sequence[str]
+    places: dict[str, Place]
+    time: list[str]
+    unused: list[str]
+    doubts: list[str]
+    gains: dict[str, Array] = field(default_factory=dict)
+    gain_of: str = "torque"
+    known: bool = False
+    free: bool = False
+    spare: dict[str, Place] = field(default_factory=dict)
+
+
+def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | None) -> _Found:
+    """Return what a table holds."""
+    table, candidates, csv = opened_table(path, kind, episode)
+    time = [*time_lines(table, candidates, Robots((), "")), *csv]
+    clock = tomllib.loads("\n".join(time)).get("time", {})
+    lacking = _unlogged(table, joints)
+    joints = [joint for joint in joints if joint not in lacking]
+    motors = motors_of(joints)
+    if motors and any(re.search(r"motor_(state|cmd)", name) for name in table.shapes):
+        joints = sorted(joints, key=lambda joint: motors[joint])
+    places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
+    found = _Found(joints, lacking, places, time, unused, [])
+    for name in GAINS:
+        if name in places:
+            gain = places.pop(name)
+            found.gains[name] = _rows(table, _columns(table, gain.keys["column"], joints), clock)[1]
+            found.gain_of = "firmware" if "p_gain" in gain.keys["column"].lower() else "torque"
+    q, command = places.get("q"), places.get("command")
+    if q is not None and "command" in places and "column" in clock:
+        at, rows = _rows(table, _columns(table, q.keys["column"], joints), clock)
+        best = None
+        for other in (command, *command.others) if command else ():
+            told = follow(at, rows, *_rows(table, _columns(table, other.keys["column"], joints), clock))
+            if told is not None and (best is None or told.left < best[0].left):
+                best = told, other
+        if best is not None:
+            places["command"] = best[0].of(best[1], joints)
+    found.known = command is not None and command.meaning is not None
+    if kind == "lerobot" and q is not None and all(x is not None for x in q.values):
+        columns = _columns(table, q.keys["column"], joints)
+        where = {place: name for name, place in table.aliases.items()}
+        named = [where.get(_place_in(table, column), column) for column in columns]
+        names = [name.removeprefix("observation.state.").removesuffix(".pos") for name in named]
+        found.places, doubts = lerobot_places(path, places, joints, names)
+        found.doubts += doubts
+        found.known = True
+        if found.places != places:
+            found.gain_of, found.free = "duty", True
+    found.free |= any(place.meaning is not None and place.meaning.whole for place in (q, command) if place)
+    return found
+
+
+def _columns(table: Table, template: str, joints: Sequence[str]) -> list[str]:
+    """Return the columns of a template."""
+    fills = [{"joint": joint, "number": f"{k + 1}", "index": f"{k}"} for k, joint in enumerate(joints)]
+    return [re.sub(r"\{(joint|number|index)\}", lambda at: fill[at[1]], template) for fill in fills]  # noqa: B023
+
+
+def _rows(table: Table, columns: Sequence[str], clock: Mapping[str, str]) -> tuple[Array, Array]:
+    """Return times after the first row [s], shape (q,), and the first rows of columns, NaN where there is no value."""
+    places = [_place_in(table, column) for column in columns]
+    below = [clock[key] for key in ("nanosec",) if key in clock]
+    wanted = Wanted(
+        tuple(dict.fromkeys([*(name for name, _ in places), *below])),
+        (clock["column"],),
+        TIME_UNITS.get(clock["unit"]),
+    )
+    block = next(table.blocks(wanted, lambda _: None), None)
+    if block is None:
+        return np.empty(0), np.empty((0, len(columns)))
+    ns = block.clocks[clock["column"]][0][:_ROWS]
+    time: Array = 1e-9 * (ns - ns[:1]).astype(np.float64)
+    for name in below:
+        time = time + 1e-9 * np.asarray(block.columns[name], float).ravel()[:_ROWS]
+    values = [
+        np.asarray(block.columns[name], float)[(slice(_ROWS), *index)].ravel() for name, index in places
+    ]
+    return time, np.column_stack(values)
 
 
 def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
@@ -144,12 +239,13 @@ def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
     return lost if len(lost) < len(joints) else []
 
 
-def _sections(
-    places: Mapping[str, _Place], slides: Sequence[bool], doubts: list[str]
-) -> tuple[list[str], list[str]]:
+def _sections(found: _Found, slides: Sequence[bool], doubts: list[str]) -> tuple[list[str], list[str]]:
     """Return the lines from [channels] on, and what is missing; ``doubts`` are further doubts."""
+    places: Mapping[str, Place] = found.places
     absent = {
-        name: place for name, place in places.items() if place.every is not None and not len(place.every)
+        name: place
+        for name, place in places.items()
+        if place.every is not None and not (place.every.any() if name in _ADDED else len(place.every))
     }
     places = {name: place for name, place in places.items() if name not in absent}
     # One torque, velocity, command and duty of a joint are used.
@@ -159,13 +255,15 @@ def _sections(
         for name in [each for each in group if each in places][1:]
     }
     spare = [f"# or {_line(name, places[name], slides)}" for name in places if name in others]
+    spare += [f"# or {_line(name, place, slides)}" for name, place in found.spare.items()]
     places = {name: place for name, place in places.items() if name not in others}
     missing = [] if set(POSITIONS) & set(places) else ["a position"]
     if not {*EFFORTS, *COMMANDS, *DUTIES} & set(places):
         missing.append("a torque, a current, a command or a duty")
     lines = [*(_line(name, place, slides) for name, place in places.items()), *spare]
     for name, place in absent.items():
-        reasons = "; ".join(dict.fromkeys(place.lacks.values())) or "its columns have no value"
+        empty = "it is zero throughout" if name in _ADDED else "its columns have no value"
+        reasons = "; ".join(dict.fromkeys(place.lacks.values())) or empty
         lines.append(f"# no {name}: {printable(reasons)}")
     for name in set(POSITIONS) & set(places):
         doubts += [f"{name} of {joint}: {why}" for joint, why in places[name].lacks.items()]
@@ -173,16 +271,19 @@ def _sections(
     lines += [f"# {DOUBTFUL}nothing was found that is {what}" for what in missing]
     lines += [f"# {DOUBTFUL}{printable(doubt)}" for doubt in doubts]
     tail = _own_lines(places)
-    if command := places.get("command") or places.get("motor_command"):
-        doubt = "" if command.meaning else f"  # {DOUBTFUL}or velocity, or torque?"
+    if {*COMMANDS} & set(places):
+        doubt = "" if found.known else f"  # {DOUBTFUL}or velocity, or torque?"
         tail += ["", "[control]", f'command = "position"{doubt}']
-        if not {*EFFORTS, *DUTIES} & set(places):
-            what = "no torque is logged; the loop's gains tell it, where they are known:"
+        if found.gains:
+            tail += [f'gain_of = "{found.gain_of}"', *gain_lines(found.gains, found.joints)]
+        elif not {*EFFORTS, *DUTIES} & set(places):
+            what = (
+                'no torque is logged; which gains has the loop, of torque or of duty? unknown ones are "free"'
+            )
             tail += [
                 f"# {DOUBTFUL}{what}",
-                '# gain_of = "torque"',
-                "# position_gain = ...",
-                "# velocity_gain = ...",
+                f'gain_of = "{found.gain_of}"',
+                *(f'{name} = "free"' for name in GAINS),
             ]
     motors = {"motor_position", "motor_velocity", "motor_torque"} & set(places)
     if motors:
@@ -195,10 +296,12 @@ def _sections(
         tail += [f'torque_constant = "free"  # {what}']
     elif motors:
         tail += ["# [drive]", "# gear = [ ... ]"]
+    if found.free:
+        tail += [*([] if "[drive]" in tail else ["", "[drive]"]), *zero_lines()]
     return [*lines, *tail], missing
 
 
-def _own_lines(places: Mapping[str, _Place]) -> list[str]:
+def _own_lines(places: Mapping[str, Place]) -> list[str]:
     """Return tables of the joints that lack a quantity, or have it elsewhere."""
     tables: dict[str, list[str]] = {}
     for name, place in places.items():
@@ -215,7 +318,7 @@ def _own_lines(places: Mapping[str, _Place]) -> list[str]:
 
 def in_table(
     table: Table, joints: Sequence[str], time: set[str | None]
-) -> tuple[dict[str, _Place], list[str]]:
+) -> tuple[dict[str, Place], list[str]]:
     """Return places by quantity, and the unused columns; ``time`` are the columns of time."""
     names = [name for name in dict.fromkeys([*table.aliases, *table.shapes]) if name not in time]
     templates: dict[str, dict[int, str]] = {}
@@ -232,21 +335,35 @@ def in_table(
         if not shared and len(of) < len(joints):
             continue
         quantity, rank, meaning = quantity_in(template)
-        if quantity is not None and QUANTITIES[quantity].shared == (
-            shared or quantity in ("supply", "enabled")
+        if quantity in GAINS and not shared:
+            found.setdefault(quantity, []).append((rank, template, None))
+        elif quantity in QUANTITIES and QUANTITIES[quantity].shared == (
+            shared or (quantity in ("supply", "enabled") and "{" not in template)
         ):
             found.setdefault(quantity, []).append((rank, template, meaning))
-    places = {}
-    for quantity, each in found.items():
-        _, template, meaning = min(each, key=lambda told: told[0])
+
+    def placed(quantity: str, template: str, meaning: Meaning | None) -> Place:
         columns = [templates[template][j] for j in sorted(templates[template])]
         values = _first_values(table, columns)
+        alone = quantity in QUANTITIES and QUANTITIES[quantity].shared
         lacks = {
             joint: f"{column} has no value"
             for joint, column, x in zip(joints, columns, values, strict=False)
-            if x is not None and not len(x) and not QUANTITIES[quantity].shared
+            if x is not None and not len(x) and not alone
         }
-        places[quantity] = _Place({"column": template}, values, meaning, lacks=lacks)
+        whole = all(x is not None and bool((x == np.rint(x)).all()) for x in values)
+        return Place(
+            {"column": template},
+            values,
+            None if meaning and meaning.whole and not whole else meaning,
+            lacks=lacks,
+        )
+
+    places = {}
+    for quantity, each in found.items():
+        first, *others = sorted(each, key=lambda told: told[0])
+        more = [placed(quantity, *told[1:]) for told in others] if quantity == "command" else []
+        places[quantity] = replace(placed(quantity, *first[1:]), others=tuple(more))
     used = {name for quantity in places for name in _columns_of(places[quantity].keys["column"], templates)}
     return places, [name for name in names if name not in used and name in table.shapes]
 
@@ -292,8 +409,8 @@ def quantity_in(name: str) -> tuple[str | None, int, Meaning | None]:
     return None, 0, None
 
 
-def _line(name: str, place: _Place, slides: Sequence[bool]) -> str:
-    kind, motor, doubts = QUANTITIES[name].kind, QUANTITIES[name].motor, []
+def _line(name: str, place: Place, slides: Sequence[bool]) -> str:
+    kind, motor, doubts = QUANTITIES[name].kind, QUANTITIES[name].motor, [*place.doubts]
     values = place.every
     slide = all(slides) and not motor
     if any(slides) and not all(slides) and kind in ("position", "velocity", "effort"):
@@ -303,27 +420,30 @@ def _line(name: str, place: _Place, slides: Sequence[bool]) -> str:
         unit = _unit_in(place.keys.get("column", ""), kind, slide=slide)
     if place.meaning is not None and place.meaning.doubtful:
         doubts, said = [*doubts, said], ""
-    more = ""
+    more = f", {place.meaning.more}" if place.meaning is not None and place.meaning.more else ""
+    largest = 0.0 if values is None or not len(values) else float(np.nanmax(np.abs(values)))
+    bits = ", bits = 16" if kind == "duty" and largest > 32767 else ""
     if unit is None:
         unit = units_of(kind, slides=slide)[0]
         if values is not None and kind != "flag":
             doubts.append("unit?")
-        largest = 0.0 if values is None or not len(values) else float(np.nanmax(np.abs(values)))
         if kind == "position" and not slide and not motor and largest > _TURNS:
             unit = "deg"
         if kind == "position" and slide and largest > _METRES:
             unit = "mm"
         if kind == "duty" and largest > 1.0:
-            unit, more = COUNTS, ", full_scale = 1.0" + (", bits = 16" if largest > 32767 else "")
+            unit, more = COUNTS, ", full_scale = 1.0"
             doubts.append("full scale?")
-    if unit == COUNTS and kind == "position":
+    if unit == COUNTS and kind == "position" and not more:
         more, doubts = ", counts_per_turn = 1.0", [*doubts, "counts per turn?"]
     unit_text = "" if kind == "flag" else f', unit = "{unit}"'
     extent = "" if values is None or not len(values) else f"{np.min(values):.4g} to {np.max(values):.4g}"
     if kind == "position" and not slide and unit in FACTORS["angle"] and _wraps(place, unit):
         extent += ", told within one turn: full turns are taken out"
     extent = "; ".join(filter(None, (extent, said)))
-    return f"{name} = {{ {', '.join(pairs_of(place.keys))}{unit_text}{more} }}{comment_of(doubts, extent)}"
+    return (
+        f"{name} = {{ {', '.join(pairs_of(place.keys))}{unit_text}{more}{bits} }}{comment_of(doubts, extent)}"
+    )
 
 
 def _unit_in(column: str, kind: str, *, slide: bool) -> str | None:
@@ -337,7 +457,7 @@ def _unit_in(column: str, kind: str, *, slide: bool) -> str | None:
     return next((each for each in reversed(said) if each in allowed), None)
 
 
-def _wraps(place: _Place, unit: str) -> bool:
+def _wraps(place: Place, unit: str) -> bool:
     """Return whether some joint's position starts again after a turn."""
     scale = FACTORS["angle"][unit]
     return any(x is not None and unwrapped(scale * x[:, None], [""])[1] for x in place.values)
@@ -373,10 +493,8 @@ def _place_in(table: Table, column: str) -> tuple[str, tuple[int, ...]]:
 # Bags.
 
 
-def _in_bag(
-    path: Path, joints: Sequence[str]
-) -> tuple[dict[str, _Place], list[str], list[str], list[str], list[str]]:
-    """Return places by quantity, the lines of [time], unused topics, doubts, and joints that no message names."""
+def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
+    """Return what a bag holds."""
     from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
     from mocobot_logs.bag.files import BagFiles
     from mocobot_logs.bag.read import Look
@@ -388,25 +506,91 @@ def _in_bag(
     of: dict[str, str] = {}  # the topic of each joint: that with most joints of the model
     for topic in sorted(named, key=lambda topic: -len(named[topic])):
         of = {joint: topic for joint in joints if joint in named[topic]} | of
+    orders = {topic: _index(look, topic, types[topic], joints) for topic in types if _tells(types[topic])}
+    order = max(orders, key=lambda topic: len(orders[topic]), default=None)
     known = next((topic for topic in types if types[topic] in TYPES), None)
-    doubts: list[str] = []
-    if of or known is None:
-        places, used = _states(look, joints, of) if of else {}, set(of.values())
-    else:
-        fields = TYPES[types[known]].items()
-        places = {
-            quantity: _Place({"topic": known, "field": path}, (), meaning)
-            for quantity, (path, meaning) in fields
-        }
-        order = ", ".join(f"{k} is {joint}" for k, joint in enumerate(joints))
-        used, of = {known}, dict.fromkeys(joints, known)
-        doubts = [f"messages number the joints; is this their order? {order}"]
-    time = [] if all(map(look.is_stamped, used)) else ["[time]", 'clock = "log"  # no header stamps', ""]
-    lost = [f"joint {joint}" for joint in joints if joint not in of] if of else []
-    return places, time, [topic for topic in types if topic not in used], doubts, lost
+    at = orders[order] if order is not None else {}
+    if not of and known is not None:
+        at = at or motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
+    elif not of and order is not None and types[order] == TRAJECTORY:
+        known = order
+    has = {joint for joint in joints if joint in (of or (at if known else joints))}
+    found = _Found(
+        [j for j in sorted(at, key=at.__getitem__) if j in has] if at else [j for j in joints if j in has],
+        [joint for joint in joints if joint not in has], {}, [], [], [],
+    )  # fmt: skip
+    used = {*of.values(), *([known] if known and not of else []), *([order] if order else [])}
+    found.unused = [topic for topic in types if topic not in used]
+    clock = "header" if all(map(look.is_stamped, used)) else "log"
+    found.time = [] if clock == "header" else ["[time]", 'clock = "log"  # no header stamps', ""]
+    at = {joint: at[joint] for joint in found.joints if joint in at}
+    if of:
+        found.places = _states(look, found.joints, {joint: of[joint] for joint in of if joint in has})
+    elif known is not None and types[known] in TYPES:
+        for quantity, (field_path, meaning) in TYPES[types[known]].items():
+            found.places[quantity] = replace(numbered(known, field_path, at), meaning=meaning)
+        if motors_of(joints) is None or "unitree" not in types[known]:
+            numbers = ", ".join(f"{at[joint]} is {joint}" for joint in found.joints)
+            found.doubts.append(f"messages number the joints; is this their order? {numbers}")
+    if order is not None and at:
+        _order(found, look, order, types[order], at, clock)
+    return found
 
 
-def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[str, _Place]:
+def _tells(kind: str) -> bool:
+    return kind in ORDERS or kind == TRAJECTORY
+
+
+def _index(look: Look, topic: str, kind: str, joints: Sequence[str]) -> dict[str, int]:
+    """Return the index of each joint in messages that tell the robot what to do; empty if they name none."""
+    if kind in ORDERS:
+        return motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
+    names = look.joint_names(topic)
+    return {joint: names.index(joint) for joint in joints if joint in names}
+
+
+def _order(found: _Found, look: Look, topic: str, kind: str, at: Mapping[str, int], clock: Clock) -> None:
+    """Add what a topic of commands holds, and how the positions follow."""
+    fields = dict(ORDERS.get(kind, {}))
+    if kind == TRAJECTORY:
+        there = look.fields(topic)
+        for name, words in TRAJECTORY_FIELDS.items():
+            word, part = next(w for w in words if w in there), "velocities" if name == "dq" else "positions"
+            unit = "rad/s" if name == "dq" else "rad"
+            fields[name] = f"{word}.{part}[{{index}}]", Meaning(name, unit)
+        fields = {name: told for name, told in fields.items() if name in TRAJECTORY_FIELDS}
+    paths = [path.replace("{index}", str(k)) for path, _ in fields.values() for k in at.values()]
+    stamps, values = look.series(topic, [(path, None) for path in paths], clock)
+    rows = {name: values[:, k * len(at) : (k + 1) * len(at)] for k, name in enumerate(fields)}
+    if kind in ORDERS and "current" in found.places:
+        said = 'instead of torques by the gains, with [drive] torque_constant = "free"'
+        found.spare["current"] = found.places.pop("current").told(said)
+    for name, (path, meaning) in fields.items():
+        if name in GAINS:
+            found.gains[name] = rows[name]
+        elif name not in found.places:
+            x = [column[np.isfinite(column)] for column in rows[name].T]
+            found.places[name] = replace(numbered(topic, path, at), values=x, meaning=meaning)
+    found.known = True
+    q = found.places.get("q")
+    if q is None:
+        return
+    fields_of = [{**q.keys, **q.own.get(joint, {})} for joint in at]
+    if len({keys["topic"] for keys in fields_of}) > 1:
+        return
+    places = [
+        (keys["field"].replace("{index}", str(at[joint])), joint if "joint" in keys else None)
+        for keys, joint in zip(fields_of, at, strict=True)
+    ]
+    when, seen = look.series(fields_of[0]["topic"], places, clock)
+    start = when[:1]
+    at_s, told_s = (1e-9 * (ns - start).astype(np.float64) for ns in (when, stamps))
+    told = follow(at_s, seen, told_s, rows["command"])
+    if told is not None:
+        found.places["command"] = told.of(found.places["command"], list(at))
+
+
+def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[str, Place]:
     """Return the places in joint states; ``of`` is the topic of each joint that has one."""
     best, effort = next(iter(of.values())), effort_meaning(joints)
     meanings = {"position": Meaning("q"), "velocity": Meaning("dq"), "effort": effort}
@@ -417,7 +601,7 @@ def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[st
             for topic in dict.fromkeys(of.values())
             for joint, told in look.numbers(topic, [j for j in of if of[j] == topic], at).items()
         }
-        places[meaning.quantity or "torque"] = _Place(
+        places[meaning.quantity or "torque"] = Place(
             {"topic": best, "joint": "{joint}", "field": at},
             [found[joint][0] for joint in joints if joint in found],
             replace(meaning, unit=meaning.unit or {"position": "rad", "velocity": "rad/s"}[at]),

@@ -132,7 +132,7 @@ def test_a_draft_says_which_joints_the_log_lacks(leg, tmp_path, capsys):
     assert 'joints = ["hip", "knee"]' in out
     assert "joint tail is in no column; if it does not move, name it by --lock" in out
     (tmp_path / "draft.toml").write_text(
-        out.replace('# gain_of = "torque"', f'gain_of = "torque"\nposition_gain = {KP}')
+        out.replace('position_gain = "free"', f"position_gain = {KP}").replace('velocity_gain = "free"\n', "")
     )
     locked = mocobot.serial.read_model(tmp_path / "more.xml", lock=["tail=0"])
     (log,) = mocobot.serial.read_logs(leg / "log.csv", locked, map=tmp_path / "draft.toml")
