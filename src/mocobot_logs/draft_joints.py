@@ -88,6 +88,8 @@ _TURNS = 4.0 * np.pi
 """Largest range of a turning joint in radians; a larger one counts as degrees."""
 _METRES = 20.0
 """Largest range of a sliding joint in metres; a larger one counts as millimetres."""
+_NO_POSITION = 1e6
+"""Positions beyond it are none: Unitree's PosStopF is 2.146e9."""
 _ROWS = 20_000
 
 
@@ -572,6 +574,9 @@ def _order(found: _Found, look: Look, topic: str, kind: str, at: Mapping[str, in
             x = [column[np.isfinite(column)] for column in rows[name].T]
             found.places[name] = replace(numbered(topic, path, at), values=x, meaning=meaning)
     found.known = True
+    if np.nanmax(np.abs(rows["command"]), initial=0.0) > _NO_POSITION:
+        said = "2.146e9 says that no position is commanded: cut the log to where positions are"
+        found.places["command"] = found.places["command"].told("", said)
     q = found.places.get("q")
     if q is None:
         return
