@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -100,7 +101,11 @@ _WEAK = {"joint", "state"}
 
 
 def draft_joint_map(
-    path: Path, joints: Sequence[str], slides: Sequence[bool], episode: int | None = None
+    path: Path,
+    joints: Sequence[str],
+    slides: Sequence[bool],
+    episode: int | None = None,
+    rest: Sequence[float] | None = None,
 ) -> Draft:
     """Draft the map of a log of one robot's joints.
 
@@ -109,6 +114,7 @@ def draft_joint_map(
         joints: names of the model's joints.
         slides: whether each joint slides.
         episode: episode of a LeRobot dataset; may be None if it holds only one.
+        rest: position at which each joint may be locked [rad or m]; None: zeros.
 
     Raises:
         InputError: there is no such log, or it is damaged.
@@ -118,15 +124,14 @@ def draft_joint_map(
     if kind == "bag":
         found, where = _in_bag(path, joints), "message"
     else:
-        found, where = (
-            _in_columns(path, kind, joints, episode),
-            "column; if it does not move, name it by --lock",
-        )
+        found, where = _in_columns(path, kind, joints, episode), "column"
     lost = [f"joint {joint}" for joint in found.lost]
     slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint in found.joints]
     doubts = [*found.doubts, *(f"{joint} is in no {where}" for joint in lost)]
-    if len(lost) > 1:
-        doubts.append(f"all of them: {' '.join(f'--lock {joint}=0' for joint in found.lost)}")
+    if lost and found.joints:
+        at = dict(zip(joints, rest or [0.0] * len(joints), strict=True))
+        locks = " ".join(f"--lock {shlex.quote(f'{joint}={at[joint]:.4g}')}" for joint in found.lost)
+        doubts.append(f"joints that do not move are locked where they are: {locks}")
     lines, missing = _sections(found, slides, doubts)
     head += [f"joints = {json.dumps(list(found.joints), ensure_ascii=False)}", ""]
     text = "\n".join([*head, *found.time, "[channels]", *lines, *unused_lines(found.unused)]) + "\n"

@@ -101,6 +101,7 @@ class JointLog:
         motor: motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log
             has positions on both sides of some drive.
         notes: sentences on irregularities and how they were handled.
+        asked: whether ``torque`` is what the command asks for, not measured, shape (J,); None if no joint's is.
     """
 
     name: str
@@ -120,6 +121,17 @@ class JointLog:
     enabled: NDArray[np.bool_] | None = None
     motor: Array | None = None
     notes: tuple[str, ...] = ()
+    asked: NDArray[np.bool_] | None = None
+
+    @property
+    def by_command(self) -> bool:
+        """Whether commands alone tell what the drives do: no torque, current or duty was measured."""
+        measured = self.torque is not None and np.isfinite(self.torque[:, ~self._asked]).any()
+        return self.command is not None and self.drive.duty is None and not measured
+
+    @property
+    def _asked(self) -> NDArray[np.bool_]:
+        return np.zeros(len(self.joints), dtype=bool) if self.asked is None else self.asked
 
     @property
     def period_s(self) -> float:
