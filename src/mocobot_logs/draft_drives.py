@@ -89,11 +89,11 @@ def motors_of(joints: Sequence[str]) -> dict[str, int] | None:
     return None
 
 
-def numbered(topic: str, path: str, at: Mapping[str, int]) -> Place:
-    """Return the place of an element per joint; ``at`` has the index of each joint in the map's order."""
-    if list(at.values()) == list(range(len(at))):
+def numbered(topic: str, path: str, at: Mapping[str, int], joints: Sequence[str]) -> Place:
+    """Return the place of the elements ``at`` their indices, of joints in the map's order."""
+    if [at.get(joint) for joint in joints] == list(range(len(joints))):
         return Place({"topic": topic, "field": path})
-    own = {joint: {"field": path.replace("{index}", str(k))} for joint, k in at.items()}
+    own = {joint: {"field": path.replace("{index}", str(at[joint]))} for joint in joints if joint in at}
     return Place({"topic": topic}, own=own)
 
 

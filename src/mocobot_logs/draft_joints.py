@@ -48,6 +48,7 @@ from mocobot_logs.joints.joint_map import (
 )
 from mocobot_logs.joints.read import unwrapped
 from mocobot_logs.presets import (
+    COMMANDING,
     ORDERS,
     TRAJECTORY,
     TRAJECTORY_FIELDS,
@@ -56,7 +57,7 @@ from mocobot_logs.presets import (
     column_meaning,
     effort_meaning,
 )
-from mocobot_logs.table.table import Table, Wanted
+from mocobot_logs.table.table import Block, Table, Wanted
 from mocobot_logs.table.text import BrokenRowsError
 from mocobot_logs.units import COUNTS, FACTORS, TIME_UNITS
 
@@ -184,21 +185,21 @@ def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | No
     for name in GAINS:
         if name in places:
             gain = places.pop(name)
-            found.gains[name] = _rows(table, _columns(table, gain.keys["column"], joints), clock)[1]
+            found.gains[name] = _rows(table, _columns(gain, joints), clock)[1]
             found.gain_of = "firmware" if "p_gain" in gain.keys["column"].lower() else "torque"
     q, command = places.get("q"), places.get("command")
-    if q is not None and "command" in places and "column" in clock:
-        at, rows = _rows(table, _columns(table, q.keys["column"], joints), clock)
-        best = None
-        for other in (command, *command.others) if command else ():
-            told = follow(at, rows, *_rows(table, _columns(table, other.keys["column"], joints), clock))
-            if told is not None and (best is None or told.left < best[0].left):
-                best = told, other
-        if best is not None:
-            places["command"] = best[0].of(best[1], joints)
+    if q is not None and command is not None and "column" in clock:
+        at, rows = _rows(table, _columns(q, joints), clock)
+        tried = [
+            (follow(at, rows, *_rows(table, _columns(c, joints), clock)), c)
+            for c in (command, *command.others)
+        ]
+        if any(each for each, _ in tried):
+            best, chosen = min(((each, c) for each, c in tried if each), key=lambda pair: pair[0].left)
+            places["command"] = best.of(chosen, joints)
     found.known = command is not None and command.meaning is not None
     if kind == "lerobot" and q is not None and all(x is not None for x in q.values):
-        columns = _columns(table, q.keys["column"], joints)
+        columns = _columns(q, joints)
         where = {place: name for name, place in table.aliases.items()}
         named = [where.get(_place_in(table, column), column) for column in columns]
         names = [name.removeprefix("observation.state.").removesuffix(".pos") for name in named]
@@ -211,21 +212,18 @@ def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | No
     return found
 
 
-def _columns(table: Table, template: str, joints: Sequence[str]) -> list[str]:
-    """Return the columns of a template."""
-    fills = [{"joint": joint, "number": f"{k + 1}", "index": f"{k}"} for k, joint in enumerate(joints)]
-    return [re.sub(r"\{(joint|number|index)\}", lambda at: fill[at[1]], template) for fill in fills]  # noqa: B023
+def _columns(place: Place, joints: Sequence[str]) -> list[str]:
+    """Return the columns of a place."""
+    told = [{"{joint}": joint, "{number}": f"{k + 1}", "{index}": f"{k}"} for k, joint in enumerate(joints)]
+    return [re.sub(r"\{\w+\}", lambda at, own=own: own[at[0]], place.keys["column"]) for own in told]
 
 
 def _rows(table: Table, columns: Sequence[str], clock: Mapping[str, str]) -> tuple[Array, Array]:
     """Return times after the first row [s], shape (q,), and the first rows of columns, NaN where there is no value."""
     places = [_place_in(table, column) for column in columns]
-    below = [clock[key] for key in ("nanosec",) if key in clock]
-    wanted = Wanted(
-        tuple(dict.fromkeys([*(name for name, _ in places), *below])),
-        (clock["column"],),
-        TIME_UNITS.get(clock["unit"]),
-    )
+    below = [clock["nanosec"]] if "nanosec" in clock else []
+    names = tuple(dict.fromkeys([*(name for name, _ in places), *below]))
+    wanted = Wanted(names, (clock["column"],), TIME_UNITS.get(clock["unit"]))
     block = next(table.blocks(wanted, lambda _: None), None)
     if block is None:
         return np.empty(0), np.empty((0, len(columns)))
@@ -233,10 +231,7 @@ def _rows(table: Table, columns: Sequence[str], clock: Mapping[str, str]) -> tup
     time: Array = 1e-9 * (ns - ns[:1]).astype(np.float64)
     for name in below:
         time = time + 1e-9 * np.asarray(block.columns[name], float).ravel()[:_ROWS]
-    values = [
-        np.asarray(block.columns[name], float)[(slice(_ROWS), *index)].ravel() for name, index in places
-    ]
-    return time, np.column_stack(values)
+    return time, np.column_stack([_numbers(block, *place) for place in places])
 
 
 def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
@@ -359,12 +354,8 @@ def in_table(
             if x is not None and not len(x) and not alone
         }
         whole = all(x is not None and bool((x == np.rint(x)).all()) for x in values)
-        return Place(
-            {"column": template},
-            values,
-            None if meaning and meaning.whole and not whole else meaning,
-            lacks=lacks,
-        )
+        meaning = None if meaning and meaning.whole and not whole else meaning
+        return Place({"column": template}, values, meaning, lacks=lacks)
 
     places = {}
     for quantity, each in found.items():
@@ -484,8 +475,12 @@ def _first_values(table: Table, columns: Sequence[str]) -> list[Array | None]:
         return [None] if len(columns) == 1 else [_first_values(table, [column])[0] for column in columns]
     if block is None:
         return [None] * len(columns)
-    found = [np.asarray(block.columns[name], float)[(slice(_ROWS), *index)].ravel() for name, index in places]
+    found = [_numbers(block, *place) for place in places]
     return [values[np.isfinite(values)] for values in found]
+
+
+def _numbers(block: Block, name: str, index: tuple[int, ...]) -> Array:
+    return np.asarray(block.columns[name], float)[(slice(_ROWS), *index)].ravel()
 
 
 def _place_in(table: Table, column: str) -> tuple[str, tuple[int, ...]]:
@@ -513,47 +508,43 @@ def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
     of: dict[str, str] = {}  # the topic of each joint: that with most joints of the model
     for topic in sorted(named, key=lambda topic: -len(named[topic])):
         of = {joint: topic for joint in joints if joint in named[topic]} | of
-    orders = {topic: _index(look, topic, types[topic], joints) for topic in types if _tells(types[topic])}
+    orders = {topic: _index(look, topic, kind, joints) for topic, kind in types.items() if kind in COMMANDING}
     order = max(orders, key=lambda topic: len(orders[topic]), default=None)
-    known = next((topic for topic in types if types[topic] in TYPES), None)
-    at = orders[order] if order is not None else {}
-    if not of and known is not None:
-        at = at or motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
+    at, seat = orders[order] if order is not None else {}, dict[str, int]()
+    known = None if of else next((topic for topic in types if types[topic] in TYPES), None)
+    if known is not None:
+        seat = _seats(joints)
     elif not of and order is not None and types[order] == TRAJECTORY:
         known = order
-    has = {joint for joint in joints if joint in (of or (at if known else joints))}
-    found = _Found(
-        [j for j in sorted(at, key=at.__getitem__) if j in has] if at else [j for j in joints if j in has],
-        [joint for joint in joints if joint not in has], {}, [], [], [],
-    )  # fmt: skip
-    used = {*of.values(), *([known] if known and not of else []), *([order] if order else [])}
-    found.unused = [topic for topic in types if topic not in used]
-    clock = "header" if all(map(look.is_stamped, used)) else "log"
-    found.time = [] if clock == "header" else ["[time]", 'clock = "log"  # no header stamps', ""]
-    at = {joint: at[joint] for joint in found.joints if joint in at}
+    has = [joint for joint in joints if joint in (of or (at if known == order and order else joints))]
+    has.sort(key=lambda joint: (seat or at).get(joint, len(joints)))
+    used = {*of.values(), *filter(None, (known, order))}
+    clock: Clock = "header" if all(map(look.is_stamped, used)) else "log"
+    time = [] if clock == "header" else ["[time]", 'clock = "log"  # no header stamps', ""]
+    lost = [joint for joint in joints if joint not in has]
+    found = _Found(has, lost, {}, time, [topic for topic in types if topic not in used], [])
     if of:
-        found.places = _states(look, found.joints, {joint: of[joint] for joint in of if joint in has})
-    elif known is not None and types[known] in TYPES:
-        for quantity, (field_path, meaning) in TYPES[types[known]].items():
-            found.places[quantity] = replace(numbered(known, field_path, at), meaning=meaning)
+        found.places = _states(look, has, {joint: of[joint] for joint in of if joint in has})
+    elif known is not None and known != order:
+        for quantity, (path_there, meaning) in TYPES[types[known]].items():
+            found.places[quantity] = replace(numbered(known, path_there, seat, has), meaning=meaning)
         if motors_of(joints) is None or "unitree" not in types[known]:
-            numbers = ", ".join(f"{at[joint]} is {joint}" for joint in found.joints)
+            numbers = ", ".join(f"{seat[joint]} is {joint}" for joint in has)
             found.doubts.append(f"messages number the joints; is this their order? {numbers}")
     if order is not None and at:
         _order(found, look, order, types[order], at, clock)
     return found
 
 
-def _tells(kind: str) -> bool:
-    return kind in ORDERS or kind == TRAJECTORY
+def _seats(joints: Sequence[str]) -> dict[str, int]:
+    """Return the place of each joint in messages that number them; those of the model if nobody knows."""
+    return motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
 
 
 def _index(look: Look, topic: str, kind: str, joints: Sequence[str]) -> dict[str, int]:
     """Return the index of each joint in messages that tell the robot what to do; empty if they name none."""
-    if kind in ORDERS:
-        return motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
-    names = look.joint_names(topic)
-    return {joint: names.index(joint) for joint in joints if joint in names}
+    names = look.joint_names(topic) if kind == TRAJECTORY else ()
+    return {joint: names.index(joint) for joint in joints if joint in names} if names else _seats(joints)
 
 
 def _order(found: _Found, look: Look, topic: str, kind: str, at: Mapping[str, int], clock: Clock) -> None:
@@ -561,43 +552,43 @@ def _order(found: _Found, look: Look, topic: str, kind: str, at: Mapping[str, in
     fields = dict(ORDERS.get(kind, {}))
     if kind == TRAJECTORY:
         there = look.fields(topic)
-        for name, words in TRAJECTORY_FIELDS.items():
-            word, part = next(w for w in words if w in there), "velocities" if name == "dq" else "positions"
-            unit = "rad/s" if name == "dq" else "rad"
+        for name, (unit, part, words) in TRAJECTORY_FIELDS.items():
+            word = next(word for word in words if word in there)
             fields[name] = f"{word}.{part}[{{index}}]", Meaning(name, unit)
-        fields = {name: told for name, told in fields.items() if name in TRAJECTORY_FIELDS}
-    paths = [path.replace("{index}", str(k)) for path, _ in fields.values() for k in at.values()]
+    told = [joint for joint in found.joints if joint in at]
+    paths = [path.replace("{index}", str(at[joint])) for path, _ in fields.values() for joint in told]
     stamps, values = look.series(topic, [(path, None) for path in paths], clock)
-    rows = {name: values[:, k * len(at) : (k + 1) * len(at)] for k, name in enumerate(fields)}
+    columns = [found.joints.index(joint) for joint in told]
     if kind in ORDERS and "current" in found.places:
         said = 'instead of torques by the gains, with [drive] torque_constant = "free"'
         found.spare["current"] = found.places.pop("current").told(said)
-    for name, (path, meaning) in fields.items():
+    rows: dict[str, Array] = {}
+    for k, (name, (path, meaning)) in enumerate(fields.items()):
+        rows[name] = np.full((len(stamps), len(found.joints)), np.nan)
+        rows[name][:, columns] = values[:, k * len(told) : (k + 1) * len(told)]
         if name in GAINS:
             found.gains[name] = rows[name]
         elif name not in found.places:
             x = [column[np.isfinite(column)] for column in rows[name].T]
-            found.places[name] = replace(numbered(topic, path, at), values=x, meaning=meaning)
+            lacks = {joint: f"{topic} does not name it" for joint in found.joints if joint not in at}
+            place = numbered(topic, path, at, found.joints)
+            found.places[name] = replace(place, values=x, meaning=meaning, lacks=lacks)
     found.known = True
     if np.nanmax(np.abs(rows["command"]), initial=0.0) > _NO_POSITION:
         said = "2.146e9 says that no position is commanded: cut the log to where positions are"
         found.places["command"] = found.places["command"].told("", said)
-    q = found.places.get("q")
-    if q is None:
-        return
-    fields_of = [{**q.keys, **q.own.get(joint, {})} for joint in at]
-    if len({keys["topic"] for keys in fields_of}) > 1:
-        return
-    places = [
-        (keys["field"].replace("{index}", str(at[joint])), joint if "joint" in keys else None)
-        for keys, joint in zip(fields_of, at, strict=True)
-    ]
-    when, seen = look.series(fields_of[0]["topic"], places, clock)
-    start = when[:1]
-    at_s, told_s = (1e-9 * (ns - start).astype(np.float64) for ns in (when, stamps))
-    told = follow(at_s, seen, told_s, rows["command"])
-    if told is not None:
-        found.places["command"] = told.of(found.places["command"], list(at))
+    keys = [{**found.places["q"].keys, **found.places["q"].own.get(joint, {})} for joint in told]
+    if len({each["topic"] for each in keys}) == 1:
+        index = {joint: f"{k}" for k, joint in enumerate(found.joints)}
+        places = [
+            (each["field"].replace("{index}", index[joint]), joint if "joint" in each else None)
+            for each, joint in zip(keys, told, strict=True)
+        ]
+        when, seen = look.series(keys[0]["topic"], places, clock)
+        at_s, told_s = (1e-9 * (ns - when[:1]).astype(np.float64) for ns in (when, stamps))
+        follows = follow(at_s, seen, told_s, rows["command"][:, columns])
+        if follows is not None:
+            found.places["command"] = follows.of(found.places["command"], told)
 
 
 def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[str, Place]:

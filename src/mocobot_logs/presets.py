@@ -116,11 +116,12 @@ ORDERS: Mapping[str, Mapping[str, tuple[str, Meaning]]] = {
 """The same of message types that tell the robot what to do."""
 TRAJECTORY = "control_msgs/msg/JointTrajectoryControllerState"
 TRAJECTORY_FIELDS = {
-    "q": ("feedback", "actual"),
-    "dq": ("feedback", "actual"),
-    "command": ("reference", "desired"),
+    "q": ("rad", "positions", ("feedback", "actual")),
+    "dq": ("rad/s", "velocities", ("feedback", "actual")),
+    "command": ("rad", "positions", ("reference", "desired")),
 }
-"""Fields of that message, new and old name."""
+"""Unit, array, and new and old name of the field of that message by quantity."""
+COMMANDING = (*ORDERS, TRAJECTORY)
 
 
 def column_meaning(name: str) -> Meaning | None:

@@ -22,7 +22,7 @@ Sources: mujocolab.github.io/mjlab (mjlab.actuator), isaac-sim.github.io/IsaacLa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +55,11 @@ UNITS: Mapping[str, tuple[str, str]] = {
     "delay": ("s", "s"),
 }
 """Units of hinges and of slides."""
-_PASSIVE = {"armature": "armature", "coulomb_friction": "frictionloss", "viscous_damping": "viscous_damping"}
-_LOOP = {"stiffness": "stiffness", "damping": "damping", "effort_limit": "effort_limit"}
-_MOTOR = {"saturation_effort": "saturation_effort", "velocity_limit": "velocity_limit"}
-MJLAB = {**_PASSIVE, **_LOOP}
+_MOTOR = {"saturation_effort": ("saturation_effort",), "velocity_limit": ("velocity_limit",)}
+MJLAB = {
+    "armature": ("armature",), "coulomb_friction": ("frictionloss",), "viscous_damping": ("viscous_damping",),
+    "stiffness": ("stiffness",), "damping": ("damping",), "effort_limit": ("effort_limit",),
+}  # fmt: skip
 _ISAAC = {
     "armature": ("armature",), "coulomb_friction": ("friction", "dynamic_friction"),
     "viscous_damping": ("viscous_friction",), "stiffness": ("stiffness",), "damping": ("damping",),
@@ -77,6 +78,11 @@ BEFORE_3_0 = {
     "joint_effort_limit": "effort_limit_sim", "joint_velocity_limit": "velocity_limit_sim",
     "actuator_effort_limit": "effort_limit", "actuator_velocity_limit": "velocity_limit",
 }  # fmt: skip
+_OF_MAP = {
+    "stiffness": ("position_gain", 0), "damping": ("velocity_gain", 1), "effort_limit": ("limit", None),
+    "delay": ("delay_s", None),
+}  # fmt: skip
+"""Attributes of a drive by quantity, and columns of ``gain_within``."""
 NORMAL_95 = 1.959964
 
 
@@ -127,9 +133,8 @@ def to_dict(
             if np.isfinite(mean) and factor == 1.0:
                 joints[name][quantity] = _entry(mean, 0.0, [mean, mean], "given", unit, source)
                 continue
-            prior = (
-                _prior(p) if p is not None else [mean / factor, mean * factor] if factor < np.inf else None
-            )
+            around = [mean / factor, mean * factor] if factor < np.inf else None
+            prior = around if p is None else _prior(p)
             lost.append({"joint": name, "quantity": quantity, "unit": unit, "prior_range": prior})
     at = [k for k, *_ in fitted]
     rows = [[name, quantity] for _, name, quantity in fitted]
@@ -169,24 +174,13 @@ def _prior(p: Parameter) -> list[float]:
 
 def _given(found: ArmCalibration, drives: Sequence[Drive], j: int, quantity: str) -> tuple[float, float, str]:
     """Return what map or model say of a quantity that was not fitted: value, factor within which it is, and source."""
-    gains = [(d.position_gain, d.velocity_gain) for d in drives if d.gain_of == "torque"]
-    for k, name in enumerate(("stiffness", "damping")):
-        if quantity == name and len(gains) == len(drives) and drives:
-            return _same(np.array([gain[k][j] for gain in gains]), max(d.gain_within[j, k] for d in drives))
-    if quantity == "delay" and drives:
-        return _same(np.array([d.delay_s[j] for d in drives]), 1.0)
-    if quantity == "effort_limit":
-        limits = [d.limit[j] if d.gain_of == "torque" else np.nan for d in drives] or [np.nan]
-        if np.isfinite(limits).all():
-            return _same(np.array(limits), 1.0)
-        limit = float(found.model.torque_limit[j])
-        return (limit, 1.0, "model") if np.isfinite(limit) else (np.nan, np.inf, "")
-    return np.nan, np.inf, ""
-
-
-def _same(values: Array, factor: float) -> tuple[float, float, str]:
-    alike = bool(np.isfinite(values).all() and np.ptp(values) == 0.0)
-    return (float(values[0]), float(factor), "map") if alike else (np.nan, np.inf, "")
+    key, gain = _OF_MAP.get(quantity, ("", None))
+    told = [float(getattr(d, key)[j]) for d in drives if key and (d.gain_of == "torque" or key == "delay_s")]
+    if told and len(told) == len(drives) and np.isfinite(told).all():
+        factor = 1.0 if gain is None else max(float(d.gain_within[j, gain]) for d in drives)
+        return (told[0], factor, "map") if len(set(told)) == 1 else (np.nan, np.inf, "")
+    limit = float(found.model.torque_limit[j]) if quantity == "effort_limit" else np.inf
+    return (limit, 1.0, "model") if np.isfinite(limit) else (np.nan, np.inf, "")
 
 
 def _configurations(joints: Mapping[str, Mapping[str, Any]], timestep_s: float) -> dict[str, Any]:
@@ -212,13 +206,6 @@ def _configurations(joints: Mapping[str, Mapping[str, Any]], timestep_s: float) 
     return {"mjlab": mjlab, "isaaclab": isaac, "missing": missing}
 
 
-def _keys(names: Mapping[str, str | tuple[str, ...]], means: Mapping[str, float]) -> dict[str, float]:
+def _keys(names: Mapping[str, Sequence[str]], means: Mapping[str, float]) -> dict[str, float]:
     """Return the keys of a configuration with the means that are known."""
-
-    def each() -> Iterator[tuple[str, float]]:
-        for quantity, keys in names.items():
-            if quantity in means:
-                for key in (keys,) if isinstance(keys, str) else keys:
-                    yield key, means[quantity]
-
-    return dict(each())
+    return {key: means[quantity] for quantity, keys in names.items() if quantity in means for key in keys}

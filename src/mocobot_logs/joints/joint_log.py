@@ -126,12 +126,9 @@ class JointLog:
     @property
     def by_command(self) -> bool:
         """Whether commands alone tell what the drives do: no torque, current or duty was measured."""
-        measured = self.torque is not None and np.isfinite(self.torque[:, ~self._asked]).any()
+        asked = np.zeros(len(self.joints), dtype=bool) if self.asked is None else self.asked
+        measured = self.torque is not None and np.isfinite(self.torque[:, ~asked]).any()
         return self.command is not None and self.drive.duty is None and not measured
-
-    @property
-    def _asked(self) -> NDArray[np.bool_]:
-        return np.zeros(len(self.joints), dtype=bool) if self.asked is None else self.asked
 
     @property
     def period_s(self) -> float:
