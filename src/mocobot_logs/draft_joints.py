@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,8 +26,17 @@ from mocobot_logs.draft import (
     time_lines,
     unused_lines,
 )
+from mocobot_logs.draft_drives import (
+    Place,
+    follow,
+    gain_lines,
+    lerobot_places,
+    motors_of,
+    numbered,
+    zero_lines,
+)
 from mocobot_logs.draft_names import TOKEN, UNITS, Robots
-from mocobot_logs.formats import log_kind
+from mocobot_logs.formats import Kind, log_kind
 from mocobot_logs.joints.joint_map import (
     COMMANDS,
     DUTIES,
@@ -37,13 +47,22 @@ from mocobot_logs.joints.joint_map import (
     units_of,
 )
 from mocobot_logs.joints.read import unwrapped
-from mocobot_logs.presets import TYPES, Meaning, column_meaning, effort_meaning
-from mocobot_logs.table.table import Table, Wanted
+from mocobot_logs.presets import (
+    COMMANDING,
+    ORDERS,
+    TRAJECTORY,
+    TRAJECTORY_FIELDS,
+    TYPES,
+    Meaning,
+    column_meaning,
+    effort_meaning,
+)
+from mocobot_logs.table.table import Block, Table, Wanted
 from mocobot_logs.table.text import BrokenRowsError
-from mocobot_logs.units import COUNTS, FACTORS
+from mocobot_logs.units import COUNTS, FACTORS, TIME_UNITS
 
 if TYPE_CHECKING:
-    from mocobot_logs.bag.read import Look
+    from mocobot_logs.bag.read import Clock, Look
 
 WORDS: dict[str, set[str]] = {
     "enabled": {"enable", "enabled"},
@@ -65,44 +84,29 @@ _AT_MOTOR = {
     "torque": "motor_torque",
     "command": "motor_command",
 }
+GAINS = ("position_gain", "velocity_gain")
+"""Keys of [control] that columns may tell."""
 _TURNS = 4.0 * np.pi
 """Largest range of a turning joint in radians; a larger one counts as degrees."""
 _METRES = 20.0
 """Largest range of a sliding joint in metres; a larger one counts as millimetres."""
+_NO_POSITION = 1e6
+"""Positions beyond it are none: Unitree's PosStopF is 2.146e9."""
 _ROWS = 20_000
 
 
+_ADDED = ("command_velocity", "feedforward")
+"""Quantities of no use if they are zero throughout."""
 _WEAK = {"joint", "state"}
 """Words that identify a quantity only if no other column does."""
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Location of one quantity of all joints.
-
-    Attributes:
-        keys: keys of a map with placeholders.
-        values: first finite values of each joint, one for all if the quantity is shared; None if they cannot be read.
-        meaning: unit and comment, where the name is well known.
-        own: keys of single joints that differ.
-        lacks: why a joint has no value.
-    """
-
-    keys: Mapping[str, str]
-    values: Sequence[Array | None] = ()
-    meaning: Meaning | None = None
-    own: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    lacks: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def every(self) -> Array | None:
-        """All values, None if they cannot be read."""
-        known = [values for values in self.values if values is not None]
-        return np.concatenate(known) if known else None
-
-
 def draft_joint_map(
-    path: Path, joints: Sequence[str], slides: Sequence[bool], episode: int | None = None
+    path: Path,
+    joints: Sequence[str],
+    slides: Sequence[bool],
+    episode: int | None = None,
+    rest: Sequence[float] | None = None,
 ) -> Draft:
     """Draft the map of a log of one robot's joints.
 
@@ -111,30 +115,123 @@ def draft_joint_map(
         joints: names of the model's joints.
         slides: whether each joint slides.
         episode: episode of a LeRobot dataset; may be None if it holds only one.
+        rest: position at which each joint may be locked [rad or m]; None: zeros.
 
     Raises:
         InputError: there is no such log, or it is damaged.
     """
     head = [*head_lines(path, "docs/serial/guide.md says what may stand here."), "version = 1"]
-    kind, lacking = log_kind(path), []
+    kind = log_kind(path)
     if kind == "bag":
-        places, time, unused, doubts, lost = _in_bag(path, joints)
+        found, where = _in_bag(path, joints), "message"
     else:
-        table, candidates, csv = opened_table(path, kind, episode)
-        time, doubts, lost = [*time_lines(table, candidates, Robots((), "")), *csv], [], []
-        clock = tomllib.loads("\n".join(time)).get("time", {})
-        lacking = _unlogged(table, joints)
-        if lacking:
-            slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint not in lacking]
-            joints = [joint for joint in joints if joint not in lacking]
-            lost = [f"joint {joint}" for joint in lacking]
-        places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
-    where = "message" if kind == "bag" else "column; if it does not move, name it by --lock"
-    found = _sections(places, slides, [*doubts, *(f"{joint} is in no {where}" for joint in lost)])
-    lines, missing = found
-    head += [f"joints = {json.dumps(list(joints), ensure_ascii=False)}", ""]
-    text = "\n".join([*head, *time, "[channels]", *lines, *unused_lines(unused)]) + "\n"
+        found, where = _in_columns(path, kind, joints, episode), "column"
+    lost = [f"joint {joint}" for joint in found.lost]
+    slides = [slide for joint, slide in zip(joints, slides, strict=True) if joint in found.joints]
+    doubts = [*found.doubts, *(f"{joint} is in no {where}" for joint in lost)]
+    if lost and found.joints:
+        at = dict(zip(joints, rest or [0.0] * len(joints), strict=True))
+        locks = " ".join(f"--lock {shlex.quote(f'{joint}={at[joint]:.4g}')}" for joint in found.lost)
+        doubts.append(f"joints that do not move are locked where they are: {locks}")
+    lines, missing = _sections(found, slides, doubts)
+    head += [f"joints = {json.dumps(list(found.joints), ensure_ascii=False)}", ""]
+    text = "\n".join([*head, *found.time, "[channels]", *lines, *unused_lines(found.unused)]) + "\n"
     return Draft(text, text.count(DOUBTFUL), (*missing, *lost))
+
+
+@dataclass(eq=False)
+class _Found:
+    """What a log holds of a robot.
+
+    Attributes:
+        joints: joints of the model that it holds, in its order.
+        lost: joints of the model that it does not hold.
+        places: places by quantity.
+        time: lines of [time] and [csv].
+        unused: names of what is not used.
+        doubts: what the user must check.
+        gains: gains of all rows by key of [control], shape (q, J) each.
+        gain_of: what the gains make.
+        known: whether the command is known to be a position.
+        free: whether zeros and signs are the user's choice.
+        spare: places that the map may hold instead, by quantity.
+    """
+
+    joints: Sequence[str]
+    lost: Sequence[str]
+    places: dict[str, Place]
+    time: list[str]
+    unused: list[str]
+    doubts: list[str]
+    gains: dict[str, Array] = field(default_factory=dict)
+    gain_of: str = "torque"
+    known: bool = False
+    free: bool = False
+    spare: dict[str, Place] = field(default_factory=dict)
+
+
+def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | None) -> _Found:
+    """Return what a table holds."""
+    table, candidates, csv = opened_table(path, kind, episode)
+    time = [*time_lines(table, candidates, Robots((), "")), *csv]
+    clock = tomllib.loads("\n".join(time)).get("time", {})
+    lacking = _unlogged(table, joints)
+    joints = [joint for joint in joints if joint not in lacking]
+    motors = motors_of(joints)
+    if motors and any(re.search(r"motor_(state|cmd)", name) for name in table.shapes):
+        joints = sorted(joints, key=lambda joint: motors[joint])
+    places, unused = in_table(table, joints, {clock.get("column"), clock.get("nanosec")})
+    found = _Found(joints, lacking, places, time, unused, [])
+    for name in GAINS:
+        if name in places:
+            gain = places.pop(name)
+            found.gains[name] = _rows(table, _columns(gain, joints), clock)[1]
+            found.gain_of = "firmware" if "p_gain" in gain.keys["column"].lower() else "torque"
+    q, command = places.get("q"), places.get("command")
+    if q is not None and command is not None and "column" in clock:
+        at, rows = _rows(table, _columns(q, joints), clock)
+        tried = [
+            (follow(at, rows, *_rows(table, _columns(c, joints), clock)), c)
+            for c in (command, *command.others)
+        ]
+        if any(each for each, _ in tried):
+            best, chosen = min(((each, c) for each, c in tried if each), key=lambda pair: pair[0].left)
+            places["command"] = best.of(chosen, joints)
+    found.known = command is not None and command.meaning is not None
+    if kind == "lerobot" and q is not None and all(x is not None for x in q.values):
+        columns = _columns(q, joints)
+        where = {place: name for name, place in table.aliases.items()}
+        named = [where.get(_place_in(table, column), column) for column in columns]
+        names = [name.removeprefix("observation.state.").removesuffix(".pos") for name in named]
+        found.places, doubts = lerobot_places(path, places, joints, names)
+        found.doubts += doubts
+        found.known = True
+        if found.places != places:
+            found.gain_of, found.free = "duty", True
+    found.free |= any(place.meaning is not None and place.meaning.whole for place in (q, command) if place)
+    return found
+
+
+def _columns(place: Place, joints: Sequence[str]) -> list[str]:
+    """Return the columns of a place."""
+    told = [{"{joint}": joint, "{number}": f"{k + 1}", "{index}": f"{k}"} for k, joint in enumerate(joints)]
+    return [re.sub(r"\{\w+\}", lambda at, own=own: own[at[0]], place.keys["column"]) for own in told]
+
+
+def _rows(table: Table, columns: Sequence[str], clock: Mapping[str, str]) -> tuple[Array, Array]:
+    """Return times after the first row [s], shape (q,), and the first rows of columns, NaN where there is no value."""
+    places = [_place_in(table, column) for column in columns]
+    below = [clock["nanosec"]] if "nanosec" in clock else []
+    names = tuple(dict.fromkeys([*(name for name, _ in places), *below]))
+    wanted = Wanted(names, (clock["column"],), TIME_UNITS.get(clock["unit"]))
+    block = next(table.blocks(wanted, lambda _: None), None)
+    if block is None:
+        return np.empty(0), np.empty((0, len(columns)))
+    ns = block.clocks[clock["column"]][0][:_ROWS]
+    time: Array = 1e-9 * (ns - ns[:1]).astype(np.float64)
+    for name in below:
+        time = time + 1e-9 * np.asarray(block.columns[name], float).ravel()[:_ROWS]
+    return time, np.column_stack([_numbers(block, *place) for place in places])
 
 
 def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
@@ -144,12 +241,13 @@ def _unlogged(table: Table, joints: Sequence[str]) -> list[str]:
     return lost if len(lost) < len(joints) else []
 
 
-def _sections(
-    places: Mapping[str, _Place], slides: Sequence[bool], doubts: list[str]
-) -> tuple[list[str], list[str]]:
+def _sections(found: _Found, slides: Sequence[bool], doubts: list[str]) -> tuple[list[str], list[str]]:
     """Return the lines from [channels] on, and what is missing; ``doubts`` are further doubts."""
+    places: Mapping[str, Place] = found.places
     absent = {
-        name: place for name, place in places.items() if place.every is not None and not len(place.every)
+        name: place
+        for name, place in places.items()
+        if place.every is not None and not (place.every.any() if name in _ADDED else len(place.every))
     }
     places = {name: place for name, place in places.items() if name not in absent}
     # One torque, velocity, command and duty of a joint are used.
@@ -159,13 +257,15 @@ def _sections(
         for name in [each for each in group if each in places][1:]
     }
     spare = [f"# or {_line(name, places[name], slides)}" for name in places if name in others]
+    spare += [f"# or {_line(name, place, slides)}" for name, place in found.spare.items()]
     places = {name: place for name, place in places.items() if name not in others}
     missing = [] if set(POSITIONS) & set(places) else ["a position"]
     if not {*EFFORTS, *COMMANDS, *DUTIES} & set(places):
         missing.append("a torque, a current, a command or a duty")
     lines = [*(_line(name, place, slides) for name, place in places.items()), *spare]
     for name, place in absent.items():
-        reasons = "; ".join(dict.fromkeys(place.lacks.values())) or "its columns have no value"
+        empty = "it is zero throughout" if name in _ADDED else "its columns have no value"
+        reasons = "; ".join(dict.fromkeys(place.lacks.values())) or empty
         lines.append(f"# no {name}: {printable(reasons)}")
     for name in set(POSITIONS) & set(places):
         doubts += [f"{name} of {joint}: {why}" for joint, why in places[name].lacks.items()]
@@ -173,16 +273,19 @@ def _sections(
     lines += [f"# {DOUBTFUL}nothing was found that is {what}" for what in missing]
     lines += [f"# {DOUBTFUL}{printable(doubt)}" for doubt in doubts]
     tail = _own_lines(places)
-    if command := places.get("command") or places.get("motor_command"):
-        doubt = "" if command.meaning else f"  # {DOUBTFUL}or velocity, or torque?"
+    if {*COMMANDS} & set(places):
+        doubt = "" if found.known else f"  # {DOUBTFUL}or velocity, or torque?"
         tail += ["", "[control]", f'command = "position"{doubt}']
-        if not {*EFFORTS, *DUTIES} & set(places):
-            what = "no torque is logged; the loop's gains tell it, where they are known:"
+        if found.gains:
+            tail += [f'gain_of = "{found.gain_of}"', *gain_lines(found.gains, found.joints)]
+        elif not {*EFFORTS, *DUTIES} & set(places):
+            what = (
+                'no torque is logged; which gains has the loop, of torque or of duty? unknown ones are "free"'
+            )
             tail += [
                 f"# {DOUBTFUL}{what}",
-                '# gain_of = "torque"',
-                "# position_gain = ...",
-                "# velocity_gain = ...",
+                f'gain_of = "{found.gain_of}"',
+                *(f'{name} = "free"' for name in GAINS),
             ]
     motors = {"motor_position", "motor_velocity", "motor_torque"} & set(places)
     if motors:
@@ -195,10 +298,12 @@ def _sections(
         tail += [f'torque_constant = "free"  # {what}']
     elif motors:
         tail += ["# [drive]", "# gear = [ ... ]"]
+    if found.free:
+        tail += [*([] if "[drive]" in tail else ["", "[drive]"]), *zero_lines()]
     return [*lines, *tail], missing
 
 
-def _own_lines(places: Mapping[str, _Place]) -> list[str]:
+def _own_lines(places: Mapping[str, Place]) -> list[str]:
     """Return tables of the joints that lack a quantity, or have it elsewhere."""
     tables: dict[str, list[str]] = {}
     for name, place in places.items():
@@ -215,7 +320,7 @@ def _own_lines(places: Mapping[str, _Place]) -> list[str]:
 
 def in_table(
     table: Table, joints: Sequence[str], time: set[str | None]
-) -> tuple[dict[str, _Place], list[str]]:
+) -> tuple[dict[str, Place], list[str]]:
     """Return places by quantity, and the unused columns; ``time`` are the columns of time."""
     names = [name for name in dict.fromkeys([*table.aliases, *table.shapes]) if name not in time]
     templates: dict[str, dict[int, str]] = {}
@@ -232,21 +337,31 @@ def in_table(
         if not shared and len(of) < len(joints):
             continue
         quantity, rank, meaning = quantity_in(template)
-        if quantity is not None and QUANTITIES[quantity].shared == (
-            shared or quantity in ("supply", "enabled")
+        if quantity in GAINS and not shared:
+            found.setdefault(quantity, []).append((rank, template, None))
+        elif quantity in QUANTITIES and QUANTITIES[quantity].shared == (
+            shared or (quantity in ("supply", "enabled") and "{" not in template)
         ):
             found.setdefault(quantity, []).append((rank, template, meaning))
-    places = {}
-    for quantity, each in found.items():
-        _, template, meaning = min(each, key=lambda told: told[0])
+
+    def placed(quantity: str, template: str, meaning: Meaning | None) -> Place:
         columns = [templates[template][j] for j in sorted(templates[template])]
         values = _first_values(table, columns)
+        alone = quantity in QUANTITIES and QUANTITIES[quantity].shared
         lacks = {
             joint: f"{column} has no value"
             for joint, column, x in zip(joints, columns, values, strict=False)
-            if x is not None and not len(x) and not QUANTITIES[quantity].shared
+            if x is not None and not len(x) and not alone
         }
-        places[quantity] = _Place({"column": template}, values, meaning, lacks=lacks)
+        whole = all(x is not None and bool((x == np.rint(x)).all()) for x in values)
+        meaning = None if meaning and meaning.whole and not whole else meaning
+        return Place({"column": template}, values, meaning, lacks=lacks)
+
+    places = {}
+    for quantity, each in found.items():
+        first, *others = sorted(each, key=lambda told: told[0])
+        more = [placed(quantity, *told[1:]) for told in others] if quantity == "command" else []
+        places[quantity] = replace(placed(quantity, *first[1:]), others=tuple(more))
     used = {name for quantity in places for name in _columns_of(places[quantity].keys["column"], templates)}
     return places, [name for name in names if name not in used and name in table.shapes]
 
@@ -292,8 +407,8 @@ def quantity_in(name: str) -> tuple[str | None, int, Meaning | None]:
     return None, 0, None
 
 
-def _line(name: str, place: _Place, slides: Sequence[bool]) -> str:
-    kind, motor, doubts = QUANTITIES[name].kind, QUANTITIES[name].motor, []
+def _line(name: str, place: Place, slides: Sequence[bool]) -> str:
+    kind, motor, doubts = QUANTITIES[name].kind, QUANTITIES[name].motor, [*place.doubts]
     values = place.every
     slide = all(slides) and not motor
     if any(slides) and not all(slides) and kind in ("position", "velocity", "effort"):
@@ -303,27 +418,30 @@ def _line(name: str, place: _Place, slides: Sequence[bool]) -> str:
         unit = _unit_in(place.keys.get("column", ""), kind, slide=slide)
     if place.meaning is not None and place.meaning.doubtful:
         doubts, said = [*doubts, said], ""
-    more = ""
+    more = f", {place.meaning.more}" if place.meaning is not None and place.meaning.more else ""
+    largest = 0.0 if values is None or not len(values) else float(np.nanmax(np.abs(values)))
+    bits = ", bits = 16" if kind == "duty" and largest > 32767 else ""
     if unit is None:
         unit = units_of(kind, slides=slide)[0]
         if values is not None and kind != "flag":
             doubts.append("unit?")
-        largest = 0.0 if values is None or not len(values) else float(np.nanmax(np.abs(values)))
         if kind == "position" and not slide and not motor and largest > _TURNS:
             unit = "deg"
         if kind == "position" and slide and largest > _METRES:
             unit = "mm"
         if kind == "duty" and largest > 1.0:
-            unit, more = COUNTS, ", full_scale = 1.0" + (", bits = 16" if largest > 32767 else "")
+            unit, more = COUNTS, ", full_scale = 1.0"
             doubts.append("full scale?")
-    if unit == COUNTS and kind == "position":
+    if unit == COUNTS and kind == "position" and not more:
         more, doubts = ", counts_per_turn = 1.0", [*doubts, "counts per turn?"]
     unit_text = "" if kind == "flag" else f', unit = "{unit}"'
     extent = "" if values is None or not len(values) else f"{np.min(values):.4g} to {np.max(values):.4g}"
     if kind == "position" and not slide and unit in FACTORS["angle"] and _wraps(place, unit):
         extent += ", told within one turn: full turns are taken out"
     extent = "; ".join(filter(None, (extent, said)))
-    return f"{name} = {{ {', '.join(pairs_of(place.keys))}{unit_text}{more} }}{comment_of(doubts, extent)}"
+    return (
+        f"{name} = {{ {', '.join(pairs_of(place.keys))}{unit_text}{more}{bits} }}{comment_of(doubts, extent)}"
+    )
 
 
 def _unit_in(column: str, kind: str, *, slide: bool) -> str | None:
@@ -337,7 +455,7 @@ def _unit_in(column: str, kind: str, *, slide: bool) -> str | None:
     return next((each for each in reversed(said) if each in allowed), None)
 
 
-def _wraps(place: _Place, unit: str) -> bool:
+def _wraps(place: Place, unit: str) -> bool:
     """Return whether some joint's position starts again after a turn."""
     scale = FACTORS["angle"][unit]
     return any(x is not None and unwrapped(scale * x[:, None], [""])[1] for x in place.values)
@@ -357,8 +475,12 @@ def _first_values(table: Table, columns: Sequence[str]) -> list[Array | None]:
         return [None] if len(columns) == 1 else [_first_values(table, [column])[0] for column in columns]
     if block is None:
         return [None] * len(columns)
-    found = [np.asarray(block.columns[name], float)[(slice(_ROWS), *index)].ravel() for name, index in places]
+    found = [_numbers(block, *place) for place in places]
     return [values[np.isfinite(values)] for values in found]
+
+
+def _numbers(block: Block, name: str, index: tuple[int, ...]) -> Array:
+    return np.asarray(block.columns[name], float)[(slice(_ROWS), *index)].ravel()
 
 
 def _place_in(table: Table, column: str) -> tuple[str, tuple[int, ...]]:
@@ -373,10 +495,8 @@ def _place_in(table: Table, column: str) -> tuple[str, tuple[int, ...]]:
 # Bags.
 
 
-def _in_bag(
-    path: Path, joints: Sequence[str]
-) -> tuple[dict[str, _Place], list[str], list[str], list[str], list[str]]:
-    """Return places by quantity, the lines of [time], unused topics, doubts, and joints that no message names."""
+def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
+    """Return what a bag holds."""
     from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
     from mocobot_logs.bag.files import BagFiles
     from mocobot_logs.bag.read import Look
@@ -388,25 +508,90 @@ def _in_bag(
     of: dict[str, str] = {}  # the topic of each joint: that with most joints of the model
     for topic in sorted(named, key=lambda topic: -len(named[topic])):
         of = {joint: topic for joint in joints if joint in named[topic]} | of
-    known = next((topic for topic in types if types[topic] in TYPES), None)
-    doubts: list[str] = []
-    if of or known is None:
-        places, used = _states(look, joints, of) if of else {}, set(of.values())
-    else:
-        fields = TYPES[types[known]].items()
-        places = {
-            quantity: _Place({"topic": known, "field": path}, (), meaning)
-            for quantity, (path, meaning) in fields
-        }
-        order = ", ".join(f"{k} is {joint}" for k, joint in enumerate(joints))
-        used, of = {known}, dict.fromkeys(joints, known)
-        doubts = [f"messages number the joints; is this their order? {order}"]
-    time = [] if all(map(look.is_stamped, used)) else ["[time]", 'clock = "log"  # no header stamps', ""]
-    lost = [f"joint {joint}" for joint in joints if joint not in of] if of else []
-    return places, time, [topic for topic in types if topic not in used], doubts, lost
+    orders = {topic: _index(look, topic, kind, joints) for topic, kind in types.items() if kind in COMMANDING}
+    order = max(orders, key=lambda topic: len(orders[topic]), default=None)
+    at, seat = orders[order] if order is not None else {}, dict[str, int]()
+    known = None if of else next((topic for topic in types if types[topic] in TYPES), None)
+    if known is not None:
+        seat = _seats(joints)
+    elif not of and order is not None and types[order] == TRAJECTORY:
+        known = order
+    has = [joint for joint in joints if joint in (of or (at if known == order and order else joints))]
+    has.sort(key=lambda joint: (seat or at).get(joint, len(joints)))
+    used = {*of.values(), *filter(None, (known, order))}
+    clock: Clock = "header" if all(map(look.is_stamped, used)) else "log"
+    time = [] if clock == "header" else ["[time]", 'clock = "log"  # no header stamps', ""]
+    lost = [joint for joint in joints if joint not in has]
+    found = _Found(has, lost, {}, time, [topic for topic in types if topic not in used], [])
+    if of:
+        found.places = _states(look, has, {joint: of[joint] for joint in of if joint in has})
+    elif known is not None and known != order:
+        for quantity, (path_there, meaning) in TYPES[types[known]].items():
+            found.places[quantity] = replace(numbered(known, path_there, seat, has), meaning=meaning)
+        if motors_of(joints) is None or "unitree" not in types[known]:
+            numbers = ", ".join(f"{seat[joint]} is {joint}" for joint in has)
+            found.doubts.append(f"messages number the joints; is this their order? {numbers}")
+    if order is not None and at:
+        _order(found, look, order, types[order], at, clock)
+    return found
 
 
-def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[str, _Place]:
+def _seats(joints: Sequence[str]) -> dict[str, int]:
+    """Return the place of each joint in messages that number them; those of the model if nobody knows."""
+    return motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
+
+
+def _index(look: Look, topic: str, kind: str, joints: Sequence[str]) -> dict[str, int]:
+    """Return the index of each joint in messages that tell the robot what to do; empty if they name none."""
+    names = look.joint_names(topic) if kind == TRAJECTORY else ()
+    return {joint: names.index(joint) for joint in joints if joint in names} if names else _seats(joints)
+
+
+def _order(found: _Found, look: Look, topic: str, kind: str, at: Mapping[str, int], clock: Clock) -> None:
+    """Add what a topic of commands holds, and how the positions follow."""
+    fields = dict(ORDERS.get(kind, {}))
+    if kind == TRAJECTORY:
+        there = look.fields(topic)
+        for name, (unit, part, words) in TRAJECTORY_FIELDS.items():
+            word = next(word for word in words if word in there)
+            fields[name] = f"{word}.{part}[{{index}}]", Meaning(name, unit)
+    told = [joint for joint in found.joints if joint in at]
+    paths = [path.replace("{index}", str(at[joint])) for path, _ in fields.values() for joint in told]
+    stamps, values = look.series(topic, [(path, None) for path in paths], clock)
+    columns = [found.joints.index(joint) for joint in told]
+    if kind in ORDERS and "current" in found.places:
+        said = 'instead of torques by the gains, with [drive] torque_constant = "free"'
+        found.spare["current"] = found.places.pop("current").told(said)
+    rows: dict[str, Array] = {}
+    for k, (name, (path, meaning)) in enumerate(fields.items()):
+        rows[name] = np.full((len(stamps), len(found.joints)), np.nan)
+        rows[name][:, columns] = values[:, k * len(told) : (k + 1) * len(told)]
+        if name in GAINS:
+            found.gains[name] = rows[name]
+        elif name not in found.places:
+            x = [column[np.isfinite(column)] for column in rows[name].T]
+            lacks = {joint: f"{topic} does not name it" for joint in found.joints if joint not in at}
+            place = numbered(topic, path, at, found.joints)
+            found.places[name] = replace(place, values=x, meaning=meaning, lacks=lacks)
+    found.known = True
+    if np.nanmax(np.abs(rows["command"]), initial=0.0) > _NO_POSITION:
+        said = "2.146e9 says that no position is commanded: cut the log to where positions are"
+        found.places["command"] = found.places["command"].told("", said)
+    keys = [{**found.places["q"].keys, **found.places["q"].own.get(joint, {})} for joint in told]
+    if len({each["topic"] for each in keys}) == 1:
+        index = {joint: f"{k}" for k, joint in enumerate(found.joints)}
+        places = [
+            (each["field"].replace("{index}", index[joint]), joint if "joint" in each else None)
+            for each, joint in zip(keys, told, strict=True)
+        ]
+        when, seen = look.series(keys[0]["topic"], places, clock)
+        at_s, told_s = (1e-9 * (ns - when[:1]).astype(np.float64) for ns in (when, stamps))
+        follows = follow(at_s, seen, told_s, rows["command"][:, columns])
+        if follows is not None:
+            found.places["command"] = follows.of(found.places["command"], told)
+
+
+def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[str, Place]:
     """Return the places in joint states; ``of`` is the topic of each joint that has one."""
     best, effort = next(iter(of.values())), effort_meaning(joints)
     meanings = {"position": Meaning("q"), "velocity": Meaning("dq"), "effort": effort}
@@ -417,7 +602,7 @@ def _states(look: Look, joints: Sequence[str], of: Mapping[str, str]) -> dict[st
             for topic in dict.fromkeys(of.values())
             for joint, told in look.numbers(topic, [j for j in of if of[j] == topic], at).items()
         }
-        places[meaning.quantity or "torque"] = _Place(
+        places[meaning.quantity or "torque"] = Place(
             {"topic": best, "joint": "{joint}", "field": at},
             [found[joint][0] for joint in joints if joint in found],
             replace(meaning, unit=meaning.unit or {"position": "rad", "velocity": "rad/s"}[at]),

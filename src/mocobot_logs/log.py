@@ -146,7 +146,16 @@ def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp] | slice
 
 
 _EFFORTS = ("tau", "force_", "torque", "link_torque", "motor_torque", "current")
-_UNMEASURED = ("ref_", "command", "motor_command", "feedforward", "duty", "motor_voltage", "supply", "enabled")
+_UNMEASURED = (
+    "ref_",
+    "command",
+    "motor_command",
+    "feedforward",
+    "duty",
+    "motor_voltage",
+    "supply",
+    "enabled",
+)
 """Prefixes of channel names, for teams and joints: measured efforts, and channels that are no measurements."""
 
 

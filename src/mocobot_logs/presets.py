@@ -8,8 +8,14 @@ Sources:
 - Franka. ``tau_J``: "Measured link-side joint torque sensor signals. Unit: [Nm]" (libfranka, franka/robot_state.h).
   ``effort`` of its joint states, and ``measured_joint_state.effort`` of ``FrankaRobotState``, are ``tau_J``
   (franka_ros2).
-- Unitree. ``tau_est`` of unitree_go/msg/MotorState and unitree_hg/msg/MotorState: "estimated torque" (unitree_ros2),
-  whose scale is stated nowhere.
+- Dynamixel X series. Counts and units are those of the control tables (emanual.robotis.com/docs/en/dxl/x): 4,096
+  counts a turn, 2,048 in the middle, 0.113 % of duty (885 is full), 0.229 rpm, 0.1 V; current in 2.69 mA, or 1 mA of
+  XL330 and XC330.
+- Trajectory controllers of ros2_control. ``JointTrajectoryControllerState`` (github.com/ros-controls/control_msgs):
+  ``reference`` and ``feedback``, before ``desired`` and ``actual``.
+- Unitree. ``motor_cmd`` has q, dq, tau, kp and kd of the law kp (q - position) + kd (dq - velocity) + tau. ``tau_est``
+  of unitree_go/msg/MotorState and unitree_hg/msg/MotorState: "estimated torque" (unitree_ros2), whose scale is stated
+  nowhere.
 """
 
 import re
@@ -26,17 +32,22 @@ class Meaning:
         unit: unit of a map, or None if the name does not tell.
         said: comment for the map.
         doubtful: whether the user must check it.
+        more: further keys of the map.
+        whole: whether it holds for whole numbers alone.
     """
 
     quantity: str | None
     unit: str | None = None
     said: str = ""
     doubtful: bool = False
+    more: str = ""
+    whole: bool = False
 
 
 _NONE = Meaning(None)
 _ESTIMATE = Meaning("current", "A", "an estimate of unknown scale, read as a current whose constant is free")
 _LINK = Meaning("link_torque", "Nm", "measured behind the gear, gravity included")
+_TURN = "counts_per_turn = 4096, offset = -2048"
 _COLUMNS: tuple[tuple[str, Meaning], ...] = (
     ("actual_current_as_torque", Meaning("torque", "Nm", "UR: torques by the controller's constants")),
     ("actual_current", Meaning("current", "A", "UR: motor currents")),
@@ -50,6 +61,18 @@ _COLUMNS: tuple[tuple[str, Meaning], ...] = (
     ("motor_state_q", Meaning("q", "rad")),
     ("motor_state_dq", Meaning("dq", "rad/s")),
     ("tau_est", _ESTIMATE),
+    ("motor_cmd_q", Meaning("command", "rad")),
+    ("motor_cmd_dq", Meaning("command_velocity", "rad/s")),
+    ("motor_cmd_tau", Meaning("feedforward", "Nm")),
+    ("motor_cmd_kp|position_p_gain", Meaning("position_gain")),
+    ("motor_cmd_kd", Meaning("velocity_gain")),
+    (r"position_[di]_gain|velocity_[pi]_gain|feedforward_\w+_gain|present_temperature", _NONE),
+    ("present_position", Meaning("q", "counts", "Dynamixel: 2048 is the middle", more=_TURN, whole=True)),
+    ("goal_position", Meaning("command", "counts", "Dynamixel: 2048 is the middle", more=_TURN, whole=True)),
+    ("present_pwm", Meaning("duty", "counts", "Dynamixel: 885 is full", more="full_scale = 885", whole=True)),
+    ("present_velocity", Meaning("dq", "0.229 rpm", "Dynamixel", whole=True)),
+    ("present_current", Meaning("current", "2.69 mA", 'of XL330 and XC330 it is "mA"', doubtful=True, whole=True)),
+    ("present_input_voltage", Meaning("supply", "0.1 V", "Dynamixel", whole=True)),
     (r"\w*(tcp|tool|wrench|external)(_\w+)?|(\w+_)?(ddq|qdd|temp|temperature)", _NONE),
 )  # fmt: skip
 """Meanings by pattern of a name in lower case, without placeholders; the last words of a name count."""
@@ -79,6 +102,26 @@ TYPES: Mapping[str, Mapping[str, tuple[str, Meaning]]] = {
     },
 }
 """Fields of message types that are no joint states, by quantity."""
+_LOW_CMD = {
+    "command": ("motor_cmd[{index}].q", Meaning("command", "rad")),
+    "command_velocity": ("motor_cmd[{index}].dq", Meaning("command_velocity", "rad/s")),
+    "feedforward": ("motor_cmd[{index}].tau", Meaning("feedforward", "Nm")),
+    "position_gain": ("motor_cmd[{index}].kp", Meaning(None)),
+    "velocity_gain": ("motor_cmd[{index}].kd", Meaning(None)),
+}
+ORDERS: Mapping[str, Mapping[str, tuple[str, Meaning]]] = {
+    "unitree_go/msg/LowCmd": _LOW_CMD,
+    "unitree_hg/msg/LowCmd": _LOW_CMD,
+}
+"""The same of message types that tell the robot what to do."""
+TRAJECTORY = "control_msgs/msg/JointTrajectoryControllerState"
+TRAJECTORY_FIELDS = {
+    "q": ("rad", "positions", ("feedback", "actual")),
+    "dq": ("rad/s", "velocities", ("feedback", "actual")),
+    "command": ("rad", "positions", ("reference", "desired")),
+}
+"""Unit, array, and new and old name of the field of that message by quantity."""
+COMMANDING = (*ORDERS, TRAJECTORY)
 
 
 def column_meaning(name: str) -> Meaning | None:

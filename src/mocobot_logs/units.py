@@ -10,20 +10,26 @@ FACTORS: dict[str, dict[str, float]] = {
     "angle": {"rad": 1.0, "deg": math.pi / 180.0, "turn": 2.0 * math.pi},
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "angular velocity": {
-        "rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "turn/s": 2.0 * math.pi
+        "rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "turn/s": 2.0 * math.pi,
+        "0.229 rpm": 0.229 * math.pi / 30.0,
     },
     "speed": {"m/s": 1.0, "mm/s": 1e-3},
     "torque": {"Nm": 1.0, "N m": 1.0, "mNm": 1e-3, "mN m": 1e-3, "Nmm": 1e-3, "N mm": 1e-3, "kNm": 1e3},
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
-    "current": {"A": 1.0, "mA": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3, "2.69 mA": 2.69e-3},
     "duty": {"1": 1.0, "%": 0.01, "permille": 0.001},
-    "voltage": {"V": 1.0, "mV": 1e-3},
+    "voltage": {"V": 1.0, "mV": 1e-3, "0.1 V": 0.1},
     "flag": {"1": 1.0},
 }  # fmt: skip
+"""Sizes by dimension; units of 0.229 rpm, 2.69 mA and 0.1 V are those of Dynamixel servos."""
 COUNTS = "counts"
 """Counts of an encoder need ``counts_per_turn`` (per metre for a slide), those of a duty ``full_scale``."""
 RATED = {"%": 0.01, "permille": 0.001, "V": 1.0}
-"""Units that are shares of a ``rated`` torque, force or current."""
+"""Units that are shares of a ``rated`` torque, force or current; ``%`` of a position, too."""
+_RATED = {
+    **dict.fromkeys(("torque", "force", "current"), tuple(RATED)),
+    **dict.fromkeys(("angle", "length"), ("%",)),
+}
 NUMBERED = ("counts_per_turn", "full_scale", "rated")
 """Keys for numbers that belong to a unit."""
 TIME_UNITS: dict[str, int] = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
@@ -35,8 +41,7 @@ DATES = "iso"
 def units_of(dimension: str) -> tuple[str, ...]:
     """Return every unit of a dimension, a key of ``FACTORS``."""
     counted = (COUNTS,) if dimension in ("angle", "length", "duty") else ()
-    rated = tuple(RATED) if dimension in ("torque", "force", "current") else ()
-    return (*FACTORS[dimension], *counted, *rated)
+    return (*FACTORS[dimension], *counted, *_RATED.get(dimension, ()))
 
 
 def si_factor(fields: Fields, dimension: str, allowed: Sequence[str], noun: str) -> float:
@@ -57,7 +62,7 @@ def si_factor(fields: Fields, dimension: str, allowed: Sequence[str], noun: str)
     needed = None
     if unit == COUNTS:
         needed = "full_scale" if dimension == "duty" else "counts_per_turn"
-    elif unit in RATED and dimension in ("torque", "force", "current"):
+    elif unit in _RATED.get(dimension, ()):
         needed = "rated"
     for key in NUMBERED:
         if key in fields and key != needed:

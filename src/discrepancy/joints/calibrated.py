@@ -29,6 +29,7 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 
+from discrepancy.joints import actuators
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
 from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
 from discrepancy.joints.effects import numbered
@@ -38,6 +39,7 @@ from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.statistics import measured, rms
 from estimator.strict import Fields
+from mocobot_logs.joints.joint_log import Drive
 from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import put, take_along
@@ -329,8 +331,8 @@ def write_as_found(found: ArmCalibration, folder: Path) -> None:
     mujoco.MjModel.from_xml_path(str(folder / MODEL))
 
 
-def write_into(found: ArmCalibration, folder: Path, **more: Any) -> None:
-    """Write JSON, text, table and model into an existing folder.
+def write_into(found: ArmCalibration, folder: Path, drives: Sequence[Drive] = (), **more: Any) -> None:
+    """Write JSON, text, table and model into an existing folder, and the actuators if ``drives`` are given.
 
     Raises:
         InputError: a file cannot be written, or MuJoCo refuses the model.
@@ -344,6 +346,8 @@ def write_into(found: ArmCalibration, folder: Path, **more: Any) -> None:
     write_text(folder / TABLE, "\n".join([head, *rows]) + "\n")
     write_json(folder / NAME, to_dict(found) | more)
     write_text(folder / REPORT, to_text(found) + "\n")
+    if drives:
+        actuators.write(found, drives, folder)
 
 
 def _cell(text: str) -> str:

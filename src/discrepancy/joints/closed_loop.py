@@ -54,7 +54,7 @@ def commanded(log: JointLog) -> bool:
     """Whether positions and commands are all that a log tells of its drives, in torque per error."""
     drive = log.drive
     known = log.command is not None and np.isfinite(log.command).any(axis=0).all()
-    return bool(known and log.asked and drive.command == "position" and drive.gain_of == "torque")
+    return bool(known and log.by_command and drive.command == "position" and drive.gain_of == "torque")
 
 
 @dataclass(eq=False)

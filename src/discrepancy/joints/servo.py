@@ -337,6 +337,10 @@ def servo_of(
         return f"joint {name}: {said}, and the loop that is simulated is a position's"
     if log.command is None or not np.isfinite(log.command[:, j]).any():
         return f"joint {name}: no command is logged"
+    if any(
+        x is not None and np.nan_to_num(x[:, j]).any() for x in (drive.feedforward, drive.command_velocity)
+    ):
+        return f"joint {name}: it is told a torque or a velocity beside its position, which is not simulated"
     gain, damping, limit = (float(x[j]) for x in (drive.position_gain, drive.velocity_gain, drive.limit))
     damping = 0.0 if np.isnan(damping) else damping
     limit = np.inf if np.isnan(limit) else limit

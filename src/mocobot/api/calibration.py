@@ -1,7 +1,8 @@
 """Calibrate the robots of a team from recordings of the payloads that they carry, or a single robot from joint logs.
 
 Folder of a single robot: as_found.xml with its assets, parameters.csv, calibration.json (see
-``discrepancy.joints.calibrated``), report.txt and torques.png, what is left of torques. Folder of a team:
+``discrepancy.joints.calibrated``), report.txt, torques.png, what is left of torques, and for robots that are known by
+their commands actuators.json (see ``discrepancy.joints.actuators``). Folder of a team:
 
 calibration.json           see ``estimator.calibrate.json``
 report.txt                 text that the command prints
@@ -37,6 +38,7 @@ from mocobot.checks import CALIBRATION
 from mocobot.option_types import made
 from mocobot.options import CalibrateOptions
 from mocobot.results import Folder, public
+from mocobot_logs.joints.joint_log import Drive
 
 if TYPE_CHECKING:
     from mocobot.api.joints import GivenLogs, GivenModel
@@ -117,9 +119,11 @@ class JointCalibration(Folder):
 
     Attributes:
         found: parameters with standard errors, and torques predicted for logs that were not fitted.
+        drives: drives of logs whose torques no sensor measured; empty for others.
     """
 
     found: ArmCalibration
+    drives: tuple[Drive, ...] = ()
     result = "calibration"
 
     def __str__(self) -> str:
@@ -146,7 +150,7 @@ class JointCalibration(Folder):
         Raises:
             InputError: a file cannot be written, or MuJoCo refuses the model.
         """
-        calibrated.write_into(self.found, folder, **more)
+        calibrated.write_into(self.found, folder, self.drives, **more)
         if pictures and draws_plots():
             from mocobot_report.plots_calibration import save_torques
 
@@ -208,8 +212,10 @@ def calibrate(
 
         robot = read_model(model, lock=chosen.lock, base=chosen.base)
         say("reading")
+        read_from = read_logs(logs, robot, map=chosen.map, episode=chosen.episode)
+        drives = tuple(log.drive for log in read_from if log.by_command)
         return JointCalibration(
-            calibrate_arm(robot, read_logs(logs, robot, map=chosen.map, episode=chosen.episode), say)
+            calibrate_arm(robot, read_from, say), drives if len(drives) == len(read_from) else ()
         )
     prior = chosen.prior
     assumed = prior if isinstance(prior, Prior) else Prior() if prior is None else read_prior(prior)

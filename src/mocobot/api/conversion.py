@@ -201,7 +201,8 @@ def map(
     from mocobot_logs.draft_joints import draft_joint_map
 
     robot = read_model(model, lock=chosen.lock, base=chosen.base)
-    made_of = draft_joint_map(Path(log), robot.joints, [bool(s) for s in robot.slides], chosen.episode)
+    rest = [0.0 if a < 0.0 < b else 0.5 * (a + b) for a, b in zip(robot.lower, robot.upper, strict=True)]
+    made_of = draft_joint_map(Path(log), robot.joints, [bool(s) for s in robot.slides], chosen.episode, rest)
     return MapDraft(made_of.text, _count(len(robot.joints), "joint"), made_of.doubtful, made_of.missing)
 
 

@@ -197,6 +197,8 @@ MATCHING = 0.9
 """Smallest share of common stamps at which two topics count as stamped together."""
 ENOUGH = 10_000
 """Number of messages after which a field or joint that none of them had counts as missing; saves reading long bags."""
+LOOKED = 100_000
+"""Number of messages that a draft looks at."""
 STAMPS = 1000
 """Number of stamps per topic that are read before the bag itself."""
 _ENOUGH_BLOCKS = 64
@@ -294,18 +296,22 @@ class Look:
             found[joint] = x[np.isfinite(x)], f"{why} in the first {reader.count} messages"
         return found
 
-    def series(self, topic: str, fields: Sequence[str], clock: Clock) -> tuple[Stamps, Array]:
-        """Return stamps [ns], shape (q,), and numbers, shape (q, C), of fields in all messages of a topic.
+    def series(
+        self, topic: str, places: Sequence[tuple[str, str | None]], clock: Clock
+    ) -> tuple[Stamps, Array]:
+        """Return stamps [ns], shape (q,), and numbers, shape (q, C), in a topic's first messages, NaN where lacking.
 
-        A number that a message lacks is NaN.
+        ``places`` are fields, each with the joint whose number it is, or None.
         """
         kind = message_type(self._files.topics[topic], self._bag)
-        reader = CdrReader(kind, [Selector(field) for field in fields], clock == "header")
-        stamps, values = [np.empty(0, np.int64)], [np.empty((0, len(fields)))]
+        reader = CdrReader(kind, [Selector(*place) for place in places], clock == "header")
+        stamps, values = [np.empty(0, np.int64)], [np.empty((0, len(places)))]
         for block in self._files.blocks((topic,), lambda _: None) if self._files.has_messages(topic) else ():
             stamp, numbers = reader.read(block[topic])
             stamps.append(stamp if clock == "header" else block[topic].log_ns)
             values.append(numbers)
+            if reader.count > LOOKED:
+                break
         return np.concatenate(stamps), np.concatenate(values)
 
     def joint_names(self, topic: str) -> tuple[str, ...]:

@@ -40,8 +40,7 @@ def with_asked_torques(log: JointLog) -> JointLog:
     rough = drive.gain_within[told].max(initial=1.0)
     if drive.command == "position" and rough > 1.0:
         note += f" The gains are known within a factor of {rough:g}, and so are these torques."
-    by_loop = drive.command == "position" and bool(told.all())
-    return replace(log, torque=np.where(told, asked, torque), asked=by_loop, notes=(*log.notes, note))
+    return replace(log, torque=np.where(told, asked, torque), notes=(*log.notes, note), asked=told)
 
 
 def _by_loop(log: JointLog) -> Array:

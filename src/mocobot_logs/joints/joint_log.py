@@ -100,8 +100,8 @@ class JointLog:
         enabled: whether the drives are switched on, shape (Q,); None if the log does not say.
         motor: motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log
             has positions on both sides of some drive.
-        asked: whether all torques are what position loops with known gains ask for, and none is measured.
         notes: sentences on irregularities and how they were handled.
+        asked: whether ``torque`` is what the command asks for, not measured, shape (J,); None if no joint's is.
     """
 
     name: str
@@ -120,8 +120,15 @@ class JointLog:
     start_s: float = 0.0
     enabled: NDArray[np.bool_] | None = None
     motor: Array | None = None
-    asked: bool = False
     notes: tuple[str, ...] = ()
+    asked: NDArray[np.bool_] | None = None
+
+    @property
+    def by_command(self) -> bool:
+        """Whether commands alone tell what the drives do: no torque, current or duty was measured."""
+        asked = np.zeros(len(self.joints), dtype=bool) if self.asked is None else self.asked
+        measured = self.torque is not None and np.isfinite(self.torque[:, ~asked]).any()
+        return self.command is not None and self.drive.duty is None and not measured
 
     @property
     def period_s(self) -> float:

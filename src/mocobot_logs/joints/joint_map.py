@@ -435,6 +435,10 @@ def _gain(value: Any) -> float | None:
     return np.inf if value == "free" else _positive(value)
 
 
+def _damping(value: Any) -> float | None:
+    return np.inf if value == "free" else _not_negative(value)
+
+
 def _factor(value: Any) -> float | None:
     number = _number(value)
     return number if number is not None and number >= 1 else None
@@ -449,7 +453,12 @@ _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
     "gear": (1.0, _nonzero, "a number of motor turns per joint turn, not 0"),
     "zero": (0.0, _number, "a finite number"),
     "torque_constant": (1.0, _constant, 'a positive number of newton metres per ampere, or "free"'),
-    **dict.fromkeys(_GAIN[:2], (_UNKNOWN, _gain, 'a positive number, or "free" where the loop has an unknown one')),
+    "position_gain": (_UNKNOWN, _gain, 'a positive number, or "free" where the loop has an unknown one'),
+    "velocity_gain": (
+        _UNKNOWN,
+        _damping,
+        'a number, not negative, or "free" where the loop has an unknown one',
+    ),
     "limit": (_UNKNOWN, _positive, "a positive number"),
     "gain_known_within": (1.0, _factor, "a factor of at least 1, such as 2 for half to twice the gain"),
     "delay_s": (_UNKNOWN, _not_negative, "a number of seconds, not negative"),

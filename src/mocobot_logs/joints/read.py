@@ -151,7 +151,8 @@ def _with_commands(samples: Samples, held: NDArray[np.bool_]) -> Samples:
     values = samples.values.copy()
     values[:, held] = np.take_along_axis(values[:, held], np.maximum(last, 0), axis=0)
     alone = np.isnan(values[:, ~held]).all(axis=1)
-    return rows_of(replace(samples, values=values), (last >= 0).all(axis=1) & ~alone)
+    keep = np.flatnonzero((last >= 0).all(axis=1) & ~alone)
+    return rows_of(replace(samples, values=values), keep)
 
 
 def empty_channels(values: Array, log_map: JointMap) -> list[tuple[str, str]]:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+import scipy.optimize
+import scipy.stats
 
 import mocobot
 from command import refused, run
+from discrepancy.joints.actuators import quantity_of, to_dict
+from discrepancy.joints.calibration import Parameter
 from estimator.errors import InputError
 
 KP, KD, LIMIT_NM, RATE_HZ, STEP_S = 20.0, 1.5, 23.7, 500.0, 2e-4
@@ -130,12 +136,137 @@ def test_a_draft_says_which_joints_the_log_lacks(leg, tmp_path, capsys):
     code, out, _ = run(capsys, "map", leg / "log.csv", "--model", tmp_path / "more.xml")
     assert code == 0
     assert 'joints = ["hip", "knee"]' in out
-    assert "joint tail is in no column; if it does not move, name it by --lock" in out
+    assert "joint tail is in no column\n" in out
+    assert "joints that do not move are locked where they are: --lock tail=0\n" in out
     (tmp_path / "draft.toml").write_text(
-        out.replace('# gain_of = "torque"', f'gain_of = "torque"\nposition_gain = {KP}')
+        out.replace('position_gain = "free"', f"position_gain = {KP}").replace('velocity_gain = "free"\n', "")
     )
     locked = mocobot.serial.read_model(tmp_path / "more.xml", lock=["tail=0"])
     (log,) = mocobot.serial.read_logs(leg / "log.csv", locked, map=tmp_path / "draft.toml")
     assert log.torque is not None
     with pytest.raises(InputError, match="--lock"):
         mocobot.serial.read_logs(leg / "log.csv", tmp_path / "more.xml", map=tmp_path / "draft.toml")
+
+
+# Actuators for policies.
+
+MJLAB = {
+    "target_names_expr", "armature", "velocity_limit", "frictionloss", "viscous_damping", "delay_min_lag",
+    "delay_max_lag", "stiffness", "damping", "effort_limit", "saturation_effort",
+}  # fmt: skip
+"""Keys of mjlab's IdealPdActuatorCfg and DcMotorActuatorCfg (mujocolab.github.io/mjlab, mjlab.actuator)."""
+ISAAC = {
+    "joint_names_expr", "actuator_effort_limit", "actuator_velocity_limit", "joint_effort_limit",
+    "joint_velocity_limit", "stiffness", "damping", "armature", "friction", "dynamic_friction", "viscous_friction",
+    "saturation_effort",
+}  # fmt: skip
+"""Keys of Isaac Lab's ImplicitActuatorCfg and DCMotorCfg (isaac-sim.github.io/IsaacLab/release/3.0.0)."""
+
+
+def test_actuators_are_those_of_the_calibration_and_of_the_model(leg, tmp_path, capsys):
+    code, _, err = run(
+        capsys, "calibrate", leg / "log.csv", "--model", leg / "leg.xml", "--out", tmp_path / "out"
+    )
+    assert code == 0, err
+    found = json.loads((tmp_path / "out" / "actuators.json").read_text())
+    fitted = {
+        (p["place"], p["parameter"]): p
+        for p in json.loads((tmp_path / "out" / "calibration.json").read_text())["parameters"]
+    }
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "as_found.xml"))
+    lost = {(one["joint"], one["quantity"]): one for one in found["not_determined"]}
+    for j, joint in enumerate(("hip", "knee")):
+        own = found["joints"][joint]
+        for quantity, name, in_mujoco, key, isaac in (
+            ("armature", "armature_kgm2", model.dof_armature[j], "armature", "armature"),
+            ("coulomb_friction", "coulomb_Nm", model.dof_frictionloss[j], "frictionloss", "friction"),
+            ("viscous_damping", "viscous_Nms_per_rad", model.dof_damping[j], "viscous_damping", "viscous_friction"),
+        ):  # fmt: skip
+            p = fitted[joint, name]
+            assert (quantity in own) == p["determined"] == ((joint, quantity) not in lost)
+            if p["determined"]:
+                assert (own[quantity]["mean"], own[quantity]["standard_error"]) == (p["value"], p["se"])
+                assert own[quantity]["source"] == "logs"
+                assert own[quantity]["mean"] == pytest.approx(in_mujoco, rel=1e-5)  # six digits
+                assert found["mjlab"]["ideal_pd"][joint][key] == p["value"]
+                assert found["isaaclab"]["implicit"][joint][isaac] == p["value"]
+            else:
+                assert lost[joint, quantity]["prior_range"] == [
+                    0.0,
+                    pytest.approx(p["model"] + 2 * p["prior_se"]),
+                ]
+                assert key not in found["mjlab"]["ideal_pd"][joint]
+        given = {quantity: own[quantity]["mean"] for quantity in ("stiffness", "damping", "effort_limit")}
+        assert given == {"stiffness": KP, "damping": KD, "effort_limit": LIMIT_NM}
+        assert {own[quantity]["source"] for quantity in given} == {"map"}
+        assert found["isaaclab"]["implicit"][joint]["joint_effort_limit"] == LIMIT_NM
+        assert lost[joint, "velocity_limit"]["prior_range"] is None
+        assert found["missing"][joint] == ["saturation_effort", "velocity_limit"]
+        assert set(found["mjlab"]["ideal_pd"][joint]) <= MJLAB
+        assert set(found["isaaclab"]["implicit"][joint]) <= ISAAC
+    assert any(
+        quantity in own for own in found["joints"].values() for quantity in ("armature", "coulomb_friction")
+    )
+    assert found["mjlab"]["dc_motor"] == found["isaaclab"]["dc_motor"] == {}
+
+
+def test_ranges_covariance_and_a_motor(leg):
+    """Moments of the log-normal are those of the posterior; rows are named; what is free is not told."""
+    calibration = mocobot.calibrate(leg / "log.csv", leg / "leg.xml")
+    (drive, *_) = calibration.drives
+    more = [
+        Parameter("hip", name, value, value, se, 10.0 * value, determined=True)
+        for name, value, se in (
+            ("position_gain_Nm_per_rad", 21.0, 2.0), ("stall_Nm", 30.0, 1.0), ("no_load_rad_per_s", 25.0, 0.5),
+        )
+    ]  # fmt: skip
+    parameters = [
+        replace(p, determined=True, value=0.3, se=0.1) if p.name == "coulomb_Nm"
+        else replace(p, determined=True, value=0.0, se=0.02) if p.name == "viscous_Nms_per_rad"
+        else replace(p, determined=True, value=0.004, se=0.0007) if p.name == "delay_s" else p
+        for p in (*calibration.found.parameters, *more)
+    ]  # fmt: skip
+    found = replace(calibration.found, parameters=tuple(parameters))
+    root = np.random.default_rng(0).normal(size=(len(parameters), len(parameters)))
+    covariance = root @ root.T
+    free = replace(drive, gain_within=np.array([[np.inf, np.inf], [2.0, 1.0]]))
+    told = to_dict(found, [free], covariance)
+    own = told["joints"]["hip"]
+    assert own["stiffness"]["mean"] == 21.0
+    sigma = scipy.optimize.brentq(
+        lambda s: scipy.stats.lognorm(s).std() / scipy.stats.lognorm(s).mean() - 1 / 3, 0.1, 1
+    )
+    law = scipy.stats.lognorm(sigma, scale=0.3 / scipy.stats.lognorm(sigma).mean())
+    assert own["coulomb_friction"]["range"] == pytest.approx(law.ppf([0.025, 0.975]), rel=1e-6)
+    assert own["viscous_damping"]["range"] == [0.0, 0.04]
+    assert own["delay"]["range"] == pytest.approx([0.0026, 0.0054])
+    assert told["mjlab"]["ideal_pd"]["hip"]["delay_min_lag"] == 1  # steps of 2 ms
+    assert told["mjlab"]["ideal_pd"]["hip"]["delay_max_lag"] == 3
+    rows = told["covariance"]["rows"]
+    at = [
+        next(k for k, p in enumerate(parameters) if p.place == j and quantity_of(p.name) == q)
+        for j, q in rows
+    ]
+    np.testing.assert_array_equal(told["covariance"]["matrix"], covariance[np.ix_(at, at)])
+    assert ["hip", "stiffness"] in rows
+    assert told["mjlab"]["dc_motor"]["hip"]["saturation_effort"] == 30.0
+    assert told["isaaclab"]["dc_motor"]["hip"]["actuator_velocity_limit"] == 25.0
+    assert set(told["mjlab"]["dc_motor"]["hip"]) <= MJLAB
+    assert set(told["isaaclab"]["dc_motor"]["hip"]) <= ISAAC
+    lost = {(one["joint"], one["quantity"]): one["prior_range"] for one in told["not_determined"]}
+    assert lost["hip", "damping"] is None
+    assert lost["knee", "stiffness"] == [KP / 2, KP * 2]
+    assert "stiffness" not in told["mjlab"]["ideal_pd"]["knee"]
+    assert "stiffness" in told["missing"]["knee"]
+
+
+def test_logs_with_torques_make_no_actuators(leg, tmp_path):
+    columns = np.genfromtxt(leg / "log.csv", delimiter=",", names=True)
+    both = np.column_stack([*(columns[n] for n in columns.dtype.names), np.full(len(columns), 3.0)])
+    np.savetxt(tmp_path / "log.csv", both, delimiter=",", comments="", header=f"{HEADER},hip torque")
+    own = '[joint.hip.channels]\ntorque = { column = "hip torque", unit = "Nm" }\n[control]'
+    (tmp_path / "log.toml").write_text(MAP.replace("[control]", own), encoding="utf-8")
+    (log,) = mocobot.serial.read_logs(tmp_path / "log.csv", leg / "leg.xml")
+    assert not log.by_command
+    assert log.asked is not None
+    assert log.asked.tolist() == [False, True]
