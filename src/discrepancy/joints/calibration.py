@@ -17,7 +17,7 @@ from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import floor_of
 from discrepancy.joints.causes import parameter_name
 from discrepancy.joints.diagnose import in_parts
-from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links
+from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links, welded
 from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import mount_of
@@ -167,7 +167,7 @@ def calibrate_arm(
     """
     say("smoothing the logs")
     trials = trials_of(model, logs)
-    fit = _Fit(model, trials)
+    fit = Fit(model, trials)
     for k in range(ROUNDS):
         say(f"fitting all parameters, step {k + 1}")
         if fit.step() < SETTLED:
@@ -196,7 +196,7 @@ class _Scalar:
     in_model: bool = True
 
 
-class _Fit:
+class Fit:
     """The fit around its current values."""
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
@@ -582,7 +582,7 @@ class _Fit:
         for t in parts:
             others = [k for k in parts if k != t] or [t]
             values = self.solved(others)[0] - self.at
-            sides = self._left(t, nothing, free=False), self._plain(t, others), self._left(t, values)
+            sides = self.left(t, nothing, free=False), self._plain(t, others), self.left(t, values)
             rows = self.rows[t]
             variance = self.variance if self.problem.sensors is None else self.problem.sensors
             noise = np.sqrt(np.sum(rows * variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
@@ -591,7 +591,7 @@ class _Fit:
             out.append(HeldOut(self.trials.names[t], plain, least, best, self._wide(noise), torque))
         return tuple(out)
 
-    def _left(self, t: int, values: Array, *, free: bool = True) -> Array:
+    def left(self, t: int, values: Array, *, free: bool = True) -> Array:
         """Residual torque of a part at given values; friction at rest, which nobody predicts, is fitted if ``free``."""
         x = np.zeros(len(self.active))
         x[self.fit] = values
@@ -616,8 +616,7 @@ class _Fit:
         values = np.linalg.lstsq(A / size, y, rcond=BASE)[0] / size
         x = np.zeros(len(self.active))
         x[at] = values
-        free = self._left(t, x[self.fit])
-        return free
+        return self.left(t, x[self.fit])
 
     def _wide(self, sizes: Array) -> Array:
         out = np.zeros(len(self.model.joints))
@@ -636,14 +635,9 @@ class _Fit:
         for motor in self.trials.motors:
             yield motor.sentence(self.model.joints[motor.joint])
         for b in dict.fromkeys(map(int, self.given.joint_body)):
-            if not any(self._welded(b, k) for k in self.links):
+            if not any(welded(self.given, k, b) for k in self.links):
                 name = self.model.model.body(b).name
                 yield f"Link {name} has no mass in the model, so its inertial parameters are not fitted."
-
-    def _welded(self, root: int, body: int) -> bool:
-        while body != root and body not in self.given.joint_body:
-            body = int(self.given.parent[body])
-        return body == root
 
 
 def _errors(slope: Array, covariance: Array) -> Array:

@@ -88,3 +88,10 @@ def fitted_links(tree: Tree) -> list[int]:
         groups.setdefault(int(root[b]), []).append(b)
     each = (max(own, key=lambda b: tree.mass[b]) for own in groups.values())
     return [b for b in each if tree.mass[b] > LEAST_KG]
+
+
+def welded(tree: Tree, body: int, root: int) -> bool:
+    """Whether a body is another, or is fixed to it from there on."""
+    while body != root and body not in tree.joint_body:
+        body = int(tree.parent[body])
+    return body == root
