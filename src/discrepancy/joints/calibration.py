@@ -167,15 +167,22 @@ def calibrate_arm(
     """
     say("smoothing the logs")
     trials = trials_of(model, logs)
-    fit = Fit(model, trials)
+    fit, moved, unsettled = Fit(model, trials), np.inf, []
     for k in range(ROUNDS):
         say(f"fitting all parameters, step {k + 1}")
-        if fit.step() < SETTLED:
+        moved = fit.step()
+        if moved < SETTLED:
             break
+    else:
+        unsettled = [
+            f"The fit has not settled: the last of its {ROUNDS} steps still moved a value by {moved:.3g} standard "
+            f"errors, where less than {SETTLED:g} is settled."
+        ]
     say("predicting each part from the others")
     held = fit.held_out()
     names = tuple(dict.fromkeys(log.name for log in logs))
-    notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs), *fit.notes()]
+    notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs)]
+    notes = [*unsettled, *notes, *fit.notes()]
     return ArmCalibration(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -227,3 +228,16 @@ def test_the_prior_has_the_slope_and_curvature_of_its_divergence(tmp_path):
     assert prior.slopes(prior.given)[0] == pytest.approx(0.0, abs=1e-9)
     mass, *_ = central(prior.given)
     assert prior.slopes(np.append([-mass], prior.given[1:]))[0] == np.inf
+
+
+@pytest.mark.parametrize("rounds", [1, 8])
+def test_a_fit_that_has_not_settled_says_how_far_it_still_moves(tmp_path, monkeypatch, log, rounds):
+    monkeypatch.setattr("discrepancy.joints.calibration.ROUNDS", rounds)
+    found = calibrate_arm(arm_model(tmp_path), [cropped(log, 8.0)])
+    said = [note for note in found.notes if "has not settled" in note]
+    assert len(said) == (rounds == 1)
+    for note in said:
+        steps = re.findall(r"last of its 1 steps still moved a value by (\S+) standard errors", note)
+        largest = max(abs(p.value - p.model) / p.se for p in found.parameters if p.place in found.model.joints)
+        assert float(steps[0]) >= 0.95 * largest  # the first step comes from the given model
+        assert note in " ".join(to_text(found).split())
