@@ -398,7 +398,8 @@ class Fit:
         """Values of ``x`` and their covariance from some parts.
 
         Friction that deviates from its law is a nuisance for all other values. Coulomb and viscous friction are then
-        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error.
+        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error, also at
+        a bound.
         """
         H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
         information, start = self.basis.T @ H @ self.basis, np.linalg.pinv(self.basis) @ self.x
@@ -412,7 +413,7 @@ class Fit:
         H, g = self._reduced(self.plain, parts, self.rests)
         at = self.rubbing
         least = self.least[at]
-        nearest, free = x[at], np.ones(len(at), dtype=bool)
+        lawful, nearest, free = x[at], x[at], np.ones(len(at), dtype=bool)
         while free.any():
             k = at[free]
             rest = np.setdiff1d(np.arange(len(x)), k)
@@ -424,7 +425,7 @@ class Fit:
                 break
             nearest[beyond], x[at[beyond]] = least[beyond], least[beyond]
             free &= ~beyond
-        covariance[at, at] += (nearest - x[at]) ** 2
+        covariance[at, at] += (nearest - lawful) ** 2
         x[at] = nearest
         return x, covariance
 

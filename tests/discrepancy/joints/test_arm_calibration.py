@@ -241,3 +241,17 @@ def test_a_fit_that_has_not_settled_says_how_far_it_still_moves(tmp_path, monkey
         largest = max(abs(p.value - p.model) / p.se for p in found.parameters if p.place in found.model.joints)
         assert float(steps[0]) >= 0.95 * largest  # the first step comes from the given model
         assert note in " ".join(to_text(found).split())
+
+
+def falling(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
+    """Dry friction that falls by 1 N m as a joint gets faster."""
+    return 0.3 + np.exp(-np.abs(v))
+
+
+def test_viscous_friction_at_its_bound_is_as_uncertain_as_its_law(tmp_path):
+    """Friction falls with speed, so the nearest law has no viscous friction though the arm has."""
+    found = calibrate_arm(arm_model(tmp_path), [arm_log(rubs(0.0, 0.2), 3, None, falling)])
+    for joint in ("turn", "shoulder", "elbow"):
+        x, se = value(found, joint, "viscous_Nms_per_rad")
+        assert x == 0.0
+        assert 0.2 < 3.0 * se
