@@ -398,14 +398,13 @@ class Fit:
         """Values of ``x`` and their covariance from some parts.
 
         Friction that deviates from its law is a nuisance for all other values. Coulomb and viscous friction are then
-        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error, also at
-        a bound.
+        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error, also
+        at a bound.
         """
         H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
         information, start = self.basis.T @ H @ self.basis, np.linalg.pinv(self.basis) @ self.x
-        x = self.basis @ self._mode(
-            information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start
-        )
+        y = self._mode(information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start)
+        x = np.maximum(self.basis @ y, self.least)  # rounding may end below a bound
         # For errors, the prior counts with its curvature at the given model, and less, so that it does not make them.
         weak = self.curvature.copy()
         weak[: self.first, : self.first] /= PLAIN**2
