@@ -143,15 +143,18 @@ class JointCalibration(Folder):
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> list[str]:
         """Write all files that the docstring of this module lists into an existing folder.
 
+        Returns:
+            One sentence per effect that ``as_found.xml`` cannot hold.
+
         Raises:
             InputError: a file cannot be written, or MuJoCo refuses the model.
         """
-        calibrated.write_into(self.found, folder, **more)
+        as_given = calibrated.write_into(self.found, folder, **more)
         if pictures and draws_plots():
             from mocobot_report.plots_calibration import save_torques
 
             save_torques(calibrated.from_dict(self.to_dict(), ""), folder / "torques.png")
-        return []
+        return as_given
 
 
 @overload
