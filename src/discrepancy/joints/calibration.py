@@ -53,6 +53,9 @@ MOST_STEPS, LEAST_DROP = 200, 1e-6
 BASE, DEPENDENT = 1e-4, 1e-2
 """Singular values over the largest below which columns count as dependent in least squares, and in the combinations
 that are told. Chosen."""
+TIE = 1e-3
+"""Relative lead of a column over the next in the choice of combinations. Chosen: more than fitted lengths change it, less
+than the columns of other joints differ."""
 RATIO = 0.05
 """Largest difference between a drive's coupling and the ratios 1 and -1 that the columns of coupled drives have."""
 
@@ -565,7 +568,9 @@ class Fit:
         seen = np.flatnonzero(size * typical > BASE * np.max(size * typical))
         eigen, turn = np.linalg.eigh(G[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
         root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
-        _, R, order = qr(root, mode="economic", pivoting=True)  # pyright: ignore[reportAssignmentType]
+        # Where columns are alike, rounding would choose, so the first gets a lead.
+        order = qr(root * (1.0 - TIE * np.arange(len(seen))), mode="economic", pivoting=True)[-1]
+        R = np.linalg.qr(root[:, order])[1]
         rank = int(np.sum(np.abs(np.diag(R)) > DEPENDENT * abs(R[0, 0])))
         beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
         names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
