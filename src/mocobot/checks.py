@@ -126,6 +126,8 @@ def check_estimate(options: opt.Estimate) -> None:
 
 def check_calibrate(options: opt.Calibrate) -> None:
     """Check the options and files of ``calibrate`` before a recording is read."""
+    if not options.rec and options.model is not None:
+        raise InputError("no log is given; name the logs of the robot's joints first, --model after them")
     if not options.rec:
         raise InputError("no recording with a payload is given; name them first, those of --free after it")
     options.check_for(options.model, options.free)

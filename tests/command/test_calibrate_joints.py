@@ -61,6 +61,11 @@ def test_options_of_a_team_are_refused(tmp_path, capsys, log, options):
     assert f"{options[0]} is of a team's robots" in said
 
 
+def test_a_model_without_logs_is_refused(capsys, tmp_path, log):
+    said = refused(capsys, "calibrate", "--model", tmp_path / "arm.xml")
+    assert said == "mocobot: no log is given; name the logs of the robot's joints first, --model after them"
+
+
 def test_lock_without_a_model_is_refused(capsys, tmp_path, log):
     assert "name the model with --model" in refused(capsys, "calibrate", log, "--lock", "elbow=0")
 

@@ -54,8 +54,8 @@ BASE, DEPENDENT = 1e-4, 1e-2
 """Singular values over the largest below which columns count as dependent in least squares, and in the combinations
 that are told. Chosen."""
 TIE = 1e-3
-"""Relative lead of a column over the next in the choice of combinations. Chosen: more than fitted lengths change it, less
-than the columns of other joints differ."""
+"""Relative lead of a column over the next in the choice of combinations. Chosen: more than fitted lengths change it,
+less than the columns of other joints differ."""
 RATIO = 0.05
 """Largest difference between a drive's coupling and the ratios 1 and -1 that the columns of coupled drives have."""
 
