@@ -57,7 +57,7 @@ def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None
 
 
 def _joints_of_bag(path: Path) -> tuple[list[str], bool]:
-    """Return the joints of the joint state with most of them, else those of a Franka; and whether messages name them."""
+    """Return the joints of the largest joint state, else those of a Franka, and whether messages name them."""
     from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
     from mocobot_logs.bag.files import BagFiles
     from mocobot_logs.bag.read import Look
