@@ -252,11 +252,8 @@ def check_paper(options: opt.Paper) -> None:
     if options.out and _is_interrupted(options.out):
         check_place(options.out)
     elif options.out:
-
-        def is_ours(folder: Path) -> bool:
-            return (folder / SCORES).is_file()
-
-        check_folder(options.out, [], is_ours, "an earlier experiment", force=options.force)
+        has_scores: Callable[[Path], bool] = lambda folder: (folder / SCORES).is_file()  # noqa: E731
+        check_folder(options.out, [], has_scores, "an earlier experiment", force=options.force)
 
 
 def _is_interrupted(folder: Path) -> bool:

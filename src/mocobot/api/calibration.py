@@ -243,17 +243,6 @@ def read_calibration(path: Path | str) -> Calibration:
     return public(Calibration, calibration_of(path))
 
 
-def write_calibration(path: Path, calibration: Below, made_with: Mapping[str, Any] | None = None) -> None:
-    """Write a calibration as JSON, optionally with provenance; a failure leaves no partial file.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    write_json(
-        path, calibration_to_dict(calibration) | ({"provenance": dict(made_with)} if made_with else {})
-    )
-
-
 def _labels(given: Mapping[str, str] | Iterable[str], logs: Sequence[Given]) -> dict[str, str]:
     """Map recording names to payload labels, from a mapping or from texts ``REC=LABEL``."""
     if isinstance(given, Mapping):
