@@ -18,7 +18,7 @@ from discrepancy.evidence.search import floor_of
 from discrepancy.joints.causes import parameter_name
 from discrepancy.joints.diagnose import in_parts
 from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links, welded
-from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
+from discrepancy.joints.mechanics import Tree, inertial_parameters, moments_matrix, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import mount_of
 from discrepancy.joints.problem import LENGTH_M, MOMENTS, Given, JointProblem, joint_problem
@@ -497,9 +497,7 @@ class Fit:
         mass, com, inertia = (a.copy() for a in (self.given.mass, self.given.com, self.given.inertia))
         for k, b in enumerate(self.links):
             own = central(x[10 * k : 10 * k + 10])
-            mass[b], com[b] = own[0], own[1:4]
-            xx, yy, zz, xy, xz, yz = own[4:]
-            inertia[b] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+            mass[b], com[b], inertia[b] = own[0], own[1:4], moments_matrix(own[4:])
         tables = {name: getattr(self.given, name).copy() for name in ("coulomb", "viscous", "armature")}
         for s, value in zip(self.scalars, x[n:], strict=True):
             table = s.name.split("_", 1)[0]
