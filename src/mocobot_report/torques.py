@@ -108,14 +108,9 @@ def _shares(
         told = [Num(without_percent(percent(float(share)))) for share in shares[group.name]]
         rows.append([f"{group.name} [{spelled(unit)}]", *sizes, *told])
     head = [
-        "rms",
-        "measured",
-        "before",
-        "after",
-        *(f"{name} [%]" for name in named),
-        f"{within.label} [%]",
+        "rms", "measured", "before", "after", *(f"{name} [%]" for name in named), f"{within.label} [%]",
         "left [%]",
-    ]
+    ]  # fmt: skip
     return {"shares": chart, "head": head, "rows": rows}
 
 
