@@ -23,7 +23,7 @@ import numpy as np
 import tyro
 from scipy.spatial.transform import Rotation
 
-from discrepancy.joints.calibration import CENTRAL, ArmCalibration, _Fit, calibrate_arm
+from discrepancy.joints.calibration import CENTRAL, ArmCalibration, Fit, calibrate_arm
 from discrepancy.joints.mechanics import horizontal, inertial_parameters
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.trials import trials_of
@@ -153,14 +153,14 @@ def at_truth(true: arm.Healthy, log: JointLog, truth: Truth, folder: Path) -> li
     true.spec.compile()
     path.write_text(true.spec.to_xml(), encoding="utf-8")
     model = load_model(path)
-    fit = _Fit(model, trials_of(model, [log]))
+    fit = Fit(model, trials_of(model, [log]))
     at = fit.given_x.copy()
     for i, s in enumerate(fit.scalars):
         known = s.place == "base" or s.name.startswith("position")  # they are in the true model
         at[10 * len(fit.bodies) + i] = 0.0 if known else truth[s.place, s.name] - s.model
     fit.jump(at)
     fit.prepare()
-    return [np.sqrt(np.mean(fit._left(t, at - fit.at) ** 2, axis=0)) for t in range(len(fit.normals))]
+    return [np.sqrt(np.mean(fit.left(t, at - fit.at) ** 2, axis=0)) for t in range(len(fit.normals))]
 
 
 def main(options: Options) -> None:

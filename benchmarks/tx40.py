@@ -166,7 +166,7 @@ def left(outcome: Outcome, model: SerialModel, last: Signals) -> np.ndarray:
 def as_found_left(found: ArmCalibration, last: Signals) -> np.ndarray:
     """What a calibration leaves of the last third, by MuJoCo's inverse dynamics of ``as_found.xml`` and friction."""
     of = {(p.place, p.name): p.value for p in found.parameters}
-    names, model = found.model.joints, as_found(found).compile()
+    names, model = found.model.joints, as_found(found)[0].compile()
     out = inverse_torque(model, last.q, last.dq, last.ddq)  # with the dampers and rotors of tendons
     side = [direction(last.dq[:, j], 1.0 / last.rate_hz, last.slow[j]) for j in range(len(names))]
     for j, n in enumerate(names):

@@ -55,3 +55,8 @@ def inertia_matrix(parameters: Array) -> Array:
 def inertia_parameters(inertia: Array) -> Array:
     """Return the six parameters of (20) of a symmetric matrix, shape (3, 3) -> (6,)."""
     return np.array([inertia[k] for k in ORDER])
+
+
+def point_inertia(r: Array) -> Array:
+    """Return the inertia about the origin of 1 kg at a point ``r`` [m], shape (3,) -> (3, 3)."""
+    return np.asarray(r @ r * np.eye(3) - np.outer(r, r))

@@ -29,7 +29,6 @@ from estimator.arrays import Array
 from estimator.estimate.grasps import pair_rotation
 from estimator.estimate.uncertainty import StepReport, judge, window_covariance, window_normals, windows
 from estimator.filtering import differentiate
-from estimator.recording.model import Recording
 from estimator.statistics import rms
 
 # With q_1(t) and q_i(s) the filtered angular velocities by the stamps of either robot, the residuals are
@@ -343,13 +342,6 @@ def _relative_to_first(middle_s: float, others: Sequence[_Clock]) -> ClockEstima
         reports=tuple(clock.report for clock in clocks if clock.report is not None),
         why_not=tuple(clock.why_not for clock in clocks),
     )
-
-
-def recorded_clocks(recording: Recording, max_offset_s: float = MAX_OFFSET_S) -> ClockEstimate:
-    """Estimate the clocks of a recording, whose robots share one time column; see ``estimate_clocks``."""
-    theta = [recording.joints(i)[1] for i in range(recording.metadata.robots)]
-    starts = np.full(len(theta), recording.time[0])
-    return estimate_clocks(theta, starts, recording.metadata.rate_hz, max_offset_s)
 
 
 class _Clock(NamedTuple):

@@ -13,22 +13,7 @@ from mocobot_sim.base.drive import (
 from mocobot_sim.trial.trajectories import Leg, PlanarMotion, carried, compose, plan, relative, yaw_of
 
 __all__ = [
-    "WHEELS",
-    "BaseDesign",
-    "BaseDrive",
-    "DriveLog",
-    "FollowingDrive",
-    "Leg",
-    "MecanumKinematics",
-    "PlanarMotion",
-    "Snapshots",
-    "base_design",
-    "build_solo",
-    "carried",
-    "compile_solo",
-    "compose",
-    "drive_solo",
-    "plan",
-    "relative",
-    "yaw_of",
-]
+    "WHEELS", "BaseDesign", "BaseDrive", "DriveLog", "FollowingDrive", "Leg", "MecanumKinematics",
+    "PlanarMotion", "Snapshots", "base_design", "build_solo", "carried", "compile_solo", "compose",
+    "drive_solo", "plan", "relative", "yaw_of",
+]  # fmt: skip

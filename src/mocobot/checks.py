@@ -126,6 +126,8 @@ def check_estimate(options: opt.Estimate) -> None:
 
 def check_calibrate(options: opt.Calibrate) -> None:
     """Check the options and files of ``calibrate`` before a recording is read."""
+    if not options.rec and options.model is not None:
+        raise InputError("no log is given; name the logs of the robot's joints first, --model after them")
     if not options.rec:
         raise InputError("no recording with a payload is given; name them first, those of --free after it")
     options.check_for(options.model, options.free)
@@ -250,11 +252,8 @@ def check_paper(options: opt.Paper) -> None:
     if options.out and _is_interrupted(options.out):
         check_place(options.out)
     elif options.out:
-
-        def is_ours(folder: Path) -> bool:
-            return (folder / SCORES).is_file()
-
-        check_folder(options.out, [], is_ours, "an earlier experiment", force=options.force)
+        has_scores: Callable[[Path], bool] = lambda folder: (folder / SCORES).is_file()  # noqa: E731
+        check_folder(options.out, [], has_scores, "an earlier experiment", force=options.force)
 
 
 def _is_interrupted(folder: Path) -> bool:

@@ -1,10 +1,10 @@
 """Types of options that several commands share, the base classes of options, and their checks."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 import tyro
 
@@ -78,6 +78,9 @@ SLOWEST_HZ, FASTEST_HZ, LONGEST_GAP_S = 20.0, 2000.0, 10.0
 class Options:
     """Base class of all options."""
 
+    OF_TEAMS: ClassVar[tuple[str, ...]] = ()
+    """Options that a single robot does not have."""
+
     def check(self) -> None:
         """Raise InputError if options exclude each other or a number is out of range."""
 
@@ -97,10 +100,10 @@ def made(kind: type[Made], options: Made | None, given: Mapping[str, Any]) -> Ma
     return found
 
 
-def refuse_teams(options: Any, names: Iterable[str]) -> None:
+def refuse_teams(options: Any) -> None:
     """Raise InputError if an option that only applies to a team is set while a single robot's model is given."""
     default = {field.name: field.default for field in fields(options)}
-    for name in names:
+    for name in options.OF_TEAMS:
         if getattr(options, name) != default[name]:
             raise InputError(f"{name} is of a team's robots; with a model there is none")
 

@@ -95,6 +95,8 @@ class Estimate(Files, EstimateOptions):
 class CalibrateOptions(PartOptions):
     """Options of the calibration of a team's robots, or of a single robot."""
 
+    OF_TEAMS = ("prior", "payload_of", "known_mass", "parallel_flanges", "tilt", "arm_masses")
+
     map: LogMap = None
     episode: Episode = None
     prior: Annotated[AnyPath | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
@@ -114,9 +116,7 @@ class CalibrateOptions(PartOptions):
         """Raise InputError for an option that does not apply to a team, or to a single robot."""
         self.check_part(model)
         if model is not None:
-            refuse_teams(
-                self, ("prior", "payload_of", "known_mass", "parallel_flanges", "tilt", "arm_masses")
-            )
+            refuse_teams(self)
             if free:
                 raise InputError("free is of a team's robots; with a model there is none")
 
@@ -124,6 +124,8 @@ class CalibrateOptions(PartOptions):
 @dataclass(frozen=True, kw_only=True)
 class Calibrate(Files, CalibrateOptions):
     """Estimate how robots differ from their model: a team that carries payloads, or with --model a single robot."""
+
+    OF_TEAMS = (*CalibrateOptions.OF_TEAMS, "free")
 
     rec: Logs
     """Recordings (Parquet) of one team that carries payloads, or logs in any format that ``convert`` reads; with
@@ -143,6 +145,8 @@ class Calibrate(Files, CalibrateOptions):
 @dataclass(frozen=True, kw_only=True)
 class DiagnoseOptions(PartOptions):
     """Options of the diagnosis of a team or of a single robot."""
+
+    OF_TEAMS = ("calibration", "scheduler", "laws", "odds", "whole", "jobs")
 
     map: LogMap = None
     episode: Episode = None
@@ -174,7 +178,7 @@ class DiagnoseOptions(PartOptions):
         """Raise InputError for an option that does not apply to a team, or to a single robot."""
         self.check_part(model)
         if model is not None:
-            refuse_teams(self, ("calibration", "scheduler", "laws", "odds", "whole", "jobs"))
+            refuse_teams(self)
         elif reference:
             raise InputError("reference goes with a model: a healthy log of the same robot")
         causes = TEAM if model is None else JOINTS
@@ -388,6 +392,8 @@ class Map(Files, MapOptions):
 class InspectOptions(PartOptions):
     """Options of the inspection of a log."""
 
+    OF_TEAMS = ("design", "calibration")
+
     map: LogMap = None
     design: Annotated[AnyPath | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Design parameters of the robots, used if the log has none; if omitted, those of the Omnid."""
@@ -398,7 +404,7 @@ class InspectOptions(PartOptions):
         """Raise InputError for an option that does not apply to a team, or to a single robot."""
         self.check_part(model)
         if model is not None:
-            refuse_teams(self, ("design", "calibration"))
+            refuse_teams(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -549,6 +555,8 @@ class Simulate(SimulateOptions):
 class ReplayOptions(PartOptions):
     """Options of a replay."""
 
+    OF_TEAMS = ("estimate", "calibration", "payload", "truth")
+
     map: LogMap = None
     episode: Episode = None
     estimate: Annotated[AnyPath | None, tyro.conf.arg(metavar="EST.json")] = None
@@ -569,7 +577,7 @@ class ReplayOptions(PartOptions):
         if path is not None and self.web:
             raise InputError("out and web are both given; choose a file or a browser")
         if model is not None:
-            refuse_teams(self, ("estimate", "calibration", "payload", "truth"))
+            refuse_teams(self)
         elif self.map is not None or self.episode is not None:
             name = "map" if self.map is not None else "episode"
             raise InputError(

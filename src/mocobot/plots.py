@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
@@ -47,7 +46,6 @@ def save_campaign(summary: Json, folder: Path) -> list[Path]:
 
 def _picture(path: Path, size: tuple[float, float], draw: Callable[[Axes], None]) -> Path:
     figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
     axis = figure.subplots()
     draw(axis)
     for side in ("top", "right"):
@@ -152,9 +150,10 @@ FARTHEST = 30.0
 def save_comparison(found: Any, path: Path) -> None:
     """Draw one row per number, with a band of two standard errors; changed groups have another colour."""
     rows = [(group, k) for group in found.groups for k in range(len(group.entries))]
-    figure = Figure(figsize=(9.0, 1.4 + 0.22 * len(rows)), layout="constrained")
-    FigureCanvasAgg(figure)
-    axis = figure.subplots()
+    _picture(path, (9.0, 1.4 + 0.22 * len(rows)), lambda axis: _compared(axis, found, rows))
+
+
+def _compared(axis: Axes, found: Any, rows: list[tuple[Any, int]]) -> None:
     axis.axvspan(-2.0, 2.0, color=LIGHT["band"], lw=0)
     axis.axvline(0.0, color=LIGHT["line"], lw=1.0)
     changed, reach = found.changed_groups, 4.0
@@ -171,6 +170,3 @@ def save_comparison(found: Any, path: Path) -> None:
     note = "band: two standard errors; orange: changed; arrow: farther off"
     axis.set_xlabel(f"(B - A) over its standard error; {note}", fontsize=9)
     axis.set_title(f"A: {found.a}\nB: {found.b}", loc="left", fontsize=9)
-    for side in ("top", "right"):
-        axis.spines[side].set_visible(False)
-    figure.savefig(path, dpi=110)

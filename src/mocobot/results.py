@@ -28,12 +28,14 @@ from typing import Any, ClassVar, TypeVar
 
 from estimator.files import file_facts, holds, whole_folder
 from mocobot.checks import check_folder
+from mocobot.option_types import Options
 from mocobot_sim.scene.models import models_dir
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
 """Libraries that can affect the numbers of a result."""
 NO_MATTER = ("out", "json", "pictures", "force", "strict", "jobs", "scheduler", "rec")
-"""Options that the provenance omits, because the result does not depend on them; recordings are listed as files."""
+"""Options that the provenance omits, because the result does not depend on them; recordings are listed as files. It
+also omits those of teams where a result is of a single robot."""
 FORMAT, VERSION, NAME = "mocobot-provenance", 1, "provenance.json"
 SOURCES = ("src", "models", "pyproject.toml")
 CODE = ("discrepancy", "estimator", "mocobot", "mocobot_logs", "mocobot_sim")
@@ -87,6 +89,10 @@ def provenance(command: str, options: Any, inputs: Sequence[Path] = ()) -> dict[
         InputError: an input cannot be read.
     """
     values = options if isinstance(options, Mapping) else asdict(options)
+    omitted = {
+        *NO_MATTER,
+        *(options.OF_TEAMS if values.get("model") and isinstance(options, Options) else ()),
+    }
     system = (platform.system(), platform.machine(), *platform.libc_ver())
     return {
         "mocobot": version_of("mocobot"),
@@ -95,7 +101,7 @@ def provenance(command: str, options: Any, inputs: Sequence[Path] = ()) -> dict[
         "platform": " ".join(part for part in system if part),
         "packages": {name: found for name in PACKAGES if (found := version_of(name)) is not None},
         "command": command,
-        "options": {name: _plain(value) for name, value in values.items() if name not in NO_MATTER},
+        "options": {name: _plain(value) for name, value in values.items() if name not in omitted},
         "files": [file_facts(file) for path in inputs for file in _files(path)],
     }
 

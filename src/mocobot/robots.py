@@ -9,13 +9,6 @@ from mocobot_sim.scene.scene import build_free_team
 from mocobot_sim.trial.simulate import draw_units
 
 __all__ = [
-    "AsBuilt",
-    "CalibrationSpread",
-    "ControlGains",
-    "OmnidDesign",
-    "build_free_team",
-    "draw_units",
-    "forward_kinematics",
-    "inverse_kinematics",
-    "omnid_design",
-]
+    "AsBuilt", "CalibrationSpread", "ControlGains", "OmnidDesign", "build_free_team", "draw_units",
+    "forward_kinematics", "inverse_kinematics", "omnid_design",
+]  # fmt: skip

@@ -16,15 +16,9 @@ from mocobot_logs.joints.joint_log import JointLog
 from mocobot_sim.serial.example import write_example
 
 __all__ = [
-    "JointInspection",
-    "JointLog",
-    "SerialModel",
-    "diagnose",
-    "inspect",
-    "read_logs",
-    "read_model",
+    "JointInspection", "JointLog", "SerialModel", "diagnose", "inspect", "read_logs", "read_model",
     "write_example",
-]
+]  # fmt: skip
 
 
 def inspect(log: Path | str, model: GivenModel, **options: Any) -> JointInspection:

@@ -96,15 +96,15 @@ def _stamps(t: Timing) -> Iterator[str]:
     if t.gaps:
         share = 100 * t.missing / (t.samples + t.missing)
         yield (
-            f"{t.missing} samples ({share:.2g} %) are missing in {_count(t.gaps, 'gap')}, the longest of "
+            f"{t.missing} samples ({share:.2g} %) are missing in {counted(t.gaps, 'gap')}, the longest of "
             f"{t.longest_gap_s:.3g} s from {t.longest_gap_at_s:.2f} s on"
         )
     if t.duplicates:
-        yield f"a stamp is repeated {_count(t.duplicates, 'time')}"
+        yield f"a stamp is repeated {counted(t.duplicates, 'time')}"
     if t.backwards:
         most = ", at most" * (t.backwards > 1)
         yield (
-            f"time runs backwards {_count(t.backwards, 'time')}{most} by {t.farthest_back_s:.3g} s after "
+            f"time runs backwards {counted(t.backwards, 'time')}{most} by {t.farthest_back_s:.3g} s after "
             f"{t.farthest_back_at_s:.2f} s"
         )
     if t.jitter_rms_s * t.rate_hz > JITTERY:
@@ -119,7 +119,8 @@ def _stamps(t: Timing) -> Iterator[str]:
         )
 
 
-def _count(number: int, what: str) -> str:
+def counted(number: int, what: str) -> str:
+    """Return a number with its noun, such as ``1 gap`` or ``2 gaps``."""
     return f"{number} {what}{'s' * (number != 1)}"
 
 

@@ -56,6 +56,7 @@ import numpy as np
 from estimator.clocks import ClockEstimate
 from mocobot_inspect.channels import UNITS, Channel
 from mocobot_inspect.findings import (
+    counted,
     evidence,
     findings,
     is_left_out,
@@ -104,10 +105,6 @@ def format_inspection(found: Inspection | JointInspection) -> str:
     return "\n".join([*lines, ready_line(found)])
 
 
-def _plural(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
-
-
 def _channel_row(name: str, width: int, channels: Sequence[Channel], unit: str) -> str:
     """Format a channel's extremes, coarsest step and largest noise over some robots."""
     low = min((c.lowest for c in channels if c.lowest is not None), default=None)
@@ -127,7 +124,7 @@ def _channel_heading(width: int) -> str:
 
 def _team_lines(found: Inspection) -> Iterator[str]:
     channels = f"{len(found.channel_names)} channels each"
-    yield f"[[Log {found.name}]]  {_plural(found.robots, 'robot')}, {found.level} level, {channels}"
+    yield f"[[Log {found.name}]]  {counted(found.robots, 'robot')}, {found.level} level, {channels}"
     if found.assumed_design:
         yield "    the log does not say what the robots' numbers are: those of the Omnid are assumed"
     if found.units is not None:
@@ -232,13 +229,13 @@ def _hidden_words(mistakes: Sequence[Mistake]) -> list[str]:
 
 
 def _joint_lines(found: JointInspection) -> Iterator[str]:
-    t, joints = found.timing, _plural(len(found.robot.joints), "joint")
+    t, joints = found.timing, counted(len(found.robot.joints), "joint")
     yield f"[[Log {found.name}]]  {joints}, {len(found.channels)} columns by map {found.log_map.name}"
     yield from (f"    {note}" for note in found.robot.notes)
     yield "[[Stamps]]"
     yield (
         f"    {t.samples} samples, {t.duration_s:.3f} s, {'-' if t.rate_hz is None else f'{t.rate_hz:.6g}'} Hz; jitter "
-        f"{1e3 * t.jitter_rms_s:.3g} ms rms, {1e3 * t.jitter_max_s:.3g} ms at most; {_plural(t.gaps, 'gap')}"
+        f"{1e3 * t.jitter_rms_s:.3g} ms rms, {1e3 * t.jitter_max_s:.3g} ms at most; {counted(t.gaps, 'gap')}"
     )
     for log in found.logs:
         part = "" if len(found.logs) == 1 else f"from {log.start_s:.3f} s on, {log.time[-1]:.3f} s: "
@@ -383,7 +380,7 @@ def _joint_ready(found: JointInspection) -> str:
     count = 0
     if log.torque is not None:
         count = int(np.sum(np.isfinite(log.torque).any(axis=0) & found.moves))
-    good = [f"a diagnosis from torques of {_plural(count, 'joint')}"] if count else []
+    good = [f"a diagnosis from torques of {counted(count, 'joint')}"] if count else []
     if (log.command is not None or log.drive.duty is not None) and found.moves.any():
         what = "commands" if log.command is not None else "duties"
         good.append(f"one from {what}" if good else f"a diagnosis from {what}")

@@ -11,6 +11,8 @@ from mocobot_logs.draft import DOUBTFUL, Draft, draft_of, opened_table
 from mocobot_logs.draft_joints import MOTOR, WORDS, draft_joint_map, in_table, quantity_in
 from mocobot_logs.draft_names import TOKEN, UNITS
 from mocobot_logs.formats import log_kind
+from mocobot_logs.joints.joint_map import COMMANDS, DUTIES, EFFORTS, POSITIONS
+from mocobot_logs.presets import arm_joints
 from mocobot_logs.table.table import Table
 
 _MEASURED = {"act", "actual", "feedback", "meas", "measured", "present"}
@@ -39,27 +41,34 @@ def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None
     if not team.missing:
         return team, None
     kind = log_kind(path)
-    joints = _joints_of_bag(path) if kind == "bag" else _joints_of_table(opened_table(path, kind, episode)[0])
+    named = False
+    if kind == "bag":
+        joints, named = _joints_of_bag(path)
+    else:
+        joints = _joints_of_table(opened_table(path, kind, episode)[0])
     if not joints:
         return team, None
     drafted = draft_joint_map(path, joints, [False] * len(joints), episode)
-    if kind != "bag":  # a joint state has the model's names
+    if not named:
         said = f"# {DOUBTFUL}named after the log; the model's names must stand here, and --model ROBOT fills them in"
         text = drafted.text.replace("\njoints = ", f"\n{said}\njoints = ", 1)
         drafted = replace(drafted, text=text, doubtful=drafted.doubtful + 1)
     return drafted, len(joints)
 
 
-def _joints_of_bag(path: Path) -> list[str]:
-    """Return the joints of the joint state with most of them."""
+def _joints_of_bag(path: Path) -> tuple[list[str], bool]:
+    """Return the joints of the largest joint state, else those of a Franka, and whether messages name them."""
     from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
     from mocobot_logs.bag.files import BagFiles
     from mocobot_logs.bag.read import Look
 
     files = BagFiles(path)
     look = Look(str(path), files)
-    topics = [topic for topic, told in files.topics.items() if type_name(told) == JOINT_STATE]
-    return max((list(look.joints(topic)) for topic in topics), key=len, default=[])
+    types = {topic: type_name(told) for topic, told in files.topics.items()}
+    told = max(
+        (list(look.joints(topic)) for topic in types if types[topic] == JOINT_STATE), key=len, default=[]
+    )
+    return (told, True) if told else (_numbered(max(map(arm_joints, types.values()), default=0)), False)
 
 
 def _joints_of_table(table: Table) -> list[str]:
@@ -74,7 +83,7 @@ def _joints_of_table(table: Table) -> list[str]:
             quantities.setdefault(joint, set()).add(quantity_in(name)[0] or "")
     named = [joint for joint, known in quantities.items() if _is_driven(known)]
     if all(map(str.isdigit, named)):
-        named = [f"joint_{k + 1}" for k in range(len(named))]
+        named = _numbered(len(named))
     for each in (named, *_joints_of_arrays(table), ["joint_1"]):
         if each and _is_driven(set(in_table(table, each, {table.time_column})[0])):
             return each
@@ -83,13 +92,16 @@ def _joints_of_table(table: Table) -> list[str]:
 
 def _joints_of_arrays(table: Table) -> Iterator[list[str]]:
     for name, shape in table.shapes.items():
-        if len(shape) == 1 and shape[0] > 1 and quantity_in(name)[0] in ("q", "motor_position"):
-            yield [f"joint_{k + 1}" for k in range(shape[0])]
+        if len(shape) == 1 and shape[0] > 1 and quantity_in(name)[0] in POSITIONS:
+            yield _numbered(shape[0])
+
+
+def _numbered(joints: int) -> list[str]:
+    return [f"joint_{k + 1}" for k in range(joints)]
 
 
 def _is_driven(quantities: set[str]) -> bool:
-    efforts = {"torque", "motor_torque", "current", "command", "motor_command", "duty"}
-    return bool(quantities & {"q", "motor_position"} and quantities & efforts)
+    return bool(quantities & {*POSITIONS} and quantities & {*EFFORTS, *COMMANDS, *DUTIES})
 
 
 def _left(name: str) -> list[tuple[int, re.Match[str]]]:

@@ -9,6 +9,7 @@ interpolated by a quintic spline. For a sine sampled at 100 Hz its relative erro
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -80,7 +81,8 @@ def to_recording(
             another's, or they share fewer than 16 samples. Or a wrist position cannot be reached, design or trial is
             missing, or a payload is named although the robots hold nothing.
     """
-    metadata = _metadata(resampled, design, trial, payload, source)
+    stated = {"design": design, "trial": trial, "payload": payload, "source": source}
+    metadata = _metadata(resampled, {key: value for key, value in stated.items() if value is not None})
     if metadata.trial == FREE:
         why = "the robots hold nothing, so they do not move together"
         estimate = unknown_clocks(resampled.robots, float(resampled.start_s[0]), why)
@@ -146,16 +148,8 @@ def to_recording(
     return recording, ClockReport(estimate, correct, float(time_s[0]), lost_s, tuple(untouched))
 
 
-def _metadata(
-    resampled: Resampled,
-    design: OmnidDesign | None,
-    trial: str | None,
-    payload: str | None,
-    source: str | None,
-) -> RecordingMetadata:
+def _metadata(resampled: Resampled, given: dict[str, Any]) -> RecordingMetadata:
     known = resampled.metadata
-    given = {"design": design, "trial": trial, "payload": payload, "source": source}
-    given = {key: value for key, value in given.items() if value is not None}
     fixed = {"robots": resampled.robots, "rate_hz": resampled.rate_hz, "level": resampled.level}
     if known is not None:
         # A calibration of one design does not apply to another.

@@ -124,6 +124,11 @@ TRAJECTORY_FIELDS = {
 COMMANDING = (*ORDERS, TRAJECTORY)
 
 
+def arm_joints(message: str) -> int:
+    """Return the number of joints that a message type of ``TYPES`` is of, 0 if it does not tell."""
+    return 7 if message in TYPES and message.startswith("franka_") else 0
+
+
 def column_meaning(name: str) -> Meaning | None:
     """Return the meaning of a column's name with placeholders, None if no well-known robot has such a name."""
     words = re.sub(r"[^a-z0-9]+", "_", re.sub(r"\{\w+\}", "_", name).lower()).strip("_")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from discrepancy.joints.calibrated import Told
@@ -31,7 +30,6 @@ def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
         folder / "shares.png": _shares(calibration),
     }
     for path, figure in figures.items():
-        FigureCanvasAgg(figure)
         figure.savefig(path, dpi=110)
     return list(figures)
 
@@ -93,7 +91,6 @@ def _recordings(calibration: Calibration) -> Figure:
 def save_torques(told: Told, path: Path) -> None:
     """Draw the torque that is left of every joint."""
     figure = Figure(figsize=(9.0, 0.38 * len(told.names) + 1.5), layout="constrained")
-    FigureCanvasAgg(figure)
     axis = figure.subplots()
     _rows(axis, told.names, "rms torque left", {key: dict(enumerate(told.rms(key.group))) for key in LEFT})
     figure.legend(loc="outside upper right", ncols=4, frameon=False, fontsize=9)

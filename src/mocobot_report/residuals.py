@@ -31,6 +31,7 @@ from mocobot_report.charts import (
 from mocobot_report.folder import Diagnosed
 from mocobot_report.numbers import percent, plain, spelled
 from mocobot_report.tables import Entry, value
+from mocobot_report.torques import rms_of
 
 Values = Mapping[str, Any]
 BAND = Key("", "±2 standard deviations of clean data", "band", "band")
@@ -150,16 +151,11 @@ def _rms(
     for group in grouped:
         unit, scale = units[group.unit]
         for k, (column, component) in enumerate(zip(group.columns, group.components, strict=True)):
-            physical = [value(scale * _root(traces, kind, column)) for kind in kinds]
-            white = [value(_root(traces, kind, column)) for kind in ("white_before", "white_after")]
+            physical = [value(scale * rms_of(traces, kind, column)) for kind in kinds]
+            white = [value(rms_of(traces, kind, column)) for kind in ("white_before", "white_after")]
             names = [group.name if k == 0 else "", component if len(group.columns) > 1 else ""]
             rows.append([*names, spelled(unit), *physical, *white])
     return rows
-
-
-def _root(traces: Sequence[Trace], kind: str, column: int) -> float:
-    """Return the rms of one channel over all trials."""
-    return float(np.sqrt(np.mean(np.concatenate([getattr(t, kind)[:, column] for t in traces]) ** 2)))
 
 
 def _dependence(

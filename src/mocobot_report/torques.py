@@ -8,6 +8,7 @@ import numpy as np
 from discrepancy.result.read import name_of
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
+from estimator.statistics import rms
 from mocobot_report.charts import (
     Chart,
     Key,
@@ -102,19 +103,14 @@ def _shares(
     for group in grouped:
         unit, scale = units[group.unit]
         sizes = [
-            value(scale * _rms(traces, kind, group.columns[0])) for kind in ("measured", "before", "after")
+            value(scale * rms_of(traces, kind, group.columns[0])) for kind in ("measured", "before", "after")
         ]
         told = [Num(without_percent(percent(float(share)))) for share in shares[group.name]]
         rows.append([f"{group.name} [{spelled(unit)}]", *sizes, *told])
     head = [
-        "rms",
-        "measured",
-        "before",
-        "after",
-        *(f"{name} [%]" for name in named),
-        f"{within.label} [%]",
+        "rms", "measured", "before", "after", *(f"{name} [%]" for name in named), f"{within.label} [%]",
         "left [%]",
-    ]
+    ]  # fmt: skip
     return {"shares": chart, "head": head, "rows": rows}
 
 
@@ -129,5 +125,6 @@ def _in_turn(traces: Sequence[Trace], column: int) -> Array:
     return np.append(-np.diff(squares), squares[-1]) / (squares[0] or 1.0)
 
 
-def _rms(traces: Sequence[Trace], kind: str, column: int) -> float:
-    return float(np.sqrt(np.mean(np.concatenate([getattr(trace, kind)[:, column] for trace in traces]) ** 2)))
+def rms_of(traces: Sequence[Trace], kind: str, column: int) -> float:
+    """Return the rms of one channel over all trials."""
+    return rms(np.concatenate([getattr(trace, kind)[:, column] for trace in traces]))

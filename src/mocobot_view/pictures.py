@@ -426,24 +426,6 @@ def estimate_view(
     return _one(estimate_shot(recording, estimate, truth, payload, time_s, width / height), width, height)
 
 
-def diagnosis_view(
-    recording: Recording,
-    estimate: PayloadEstimate,
-    causes: Sequence[NamedCause],
-    width: int = WIDTH,
-    height: int = HEIGHT,
-    *,
-    payload: str | Path | None = None,
-    time_s: float | None = None,
-) -> Picture | str:
-    """Render an estimated team with the causes of a diagnosis in red; see ``diagnosis_shot``.
-
-    Returns:
-        Picture of shape (height, width, 3), or one sentence that explains why there is none.
-    """
-    return _one(diagnosis_shot(recording, estimate, causes, payload, time_s, width / height), width, height)
-
-
 def _one(shot: Shot, width: int, height: int) -> Picture | str:
     made = render_shots([shot], width, height)
     return made if isinstance(made, str) else made[0]

@@ -19,10 +19,10 @@ from discrepancy.team.estimates import errors, seen_by
 from estimator.arm.unit import COUNT
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.json import calibration_to_dict
-from estimator.files import LIST
+from estimator.files import LIST, write_json
 from estimator.recording.parquet import read_recording, write_recording
 from invented_calibration import invented_calibration
-from mocobot.api.calibration import Calibration, read_calibration, write_calibration
+from mocobot.api.calibration import Calibration, read_calibration
 from mocobot.api.watch import payload_line as _payload
 from mocobot.cli import main
 from mocobot_report.page import write_report
@@ -168,8 +168,8 @@ def folder(tmp_path_factory) -> Path:
         recording = replace(uncalibrated(seed=seed, without=DEFAULT)[0].recording, name=name)
         recordings.append(recording)
         write_recording(recording, folder / f"{name}.parquet")
-    write_calibration(folder / "calibration.json", calibrate(recordings))
-    write_calibration(folder / "two_robots.json", invented_calibration(2))
+    write_json(folder / "calibration.json", calibration_to_dict(calibrate(recordings)))
+    write_json(folder / "two_robots.json", calibration_to_dict(invented_calibration(2)))
     return folder
 
 

@@ -36,6 +36,7 @@ def test_the_folder_holds_model_table_numbers_and_report(tmp_path, capsys, log):
     assert model.dof_frictionloss == pytest.approx([1.5, 2.0, 1.0], rel=0.1)
     stated = json.loads((tmp_path / "found" / "calibration.json").read_text())
     assert [file["name"] for file in stated["provenance"]["files"]] == ["arm.xml", "log.toml", "log.csv"]
+    assert set(stated["provenance"]["options"]) == {"model", "map", "episode", "lock", "base", "max_unpacked"}
 
 
 def test_a_model_as_found_is_a_model_for_the_next_command(tmp_path, capsys, log):
@@ -59,6 +60,11 @@ def test_a_model_as_found_is_a_model_for_the_next_command(tmp_path, capsys, log)
 def test_options_of_a_team_are_refused(tmp_path, capsys, log, options):
     said = refused(capsys, "calibrate", log, "--model", tmp_path / "arm.xml", *options)
     assert f"{options[0]} is of a team's robots" in said
+
+
+def test_a_model_without_logs_is_refused(capsys, tmp_path, log):
+    said = refused(capsys, "calibrate", "--model", tmp_path / "arm.xml")
+    assert said == "mocobot: no log is given; name the logs of the robot's joints first, --model after them"
 
 
 def test_lock_without_a_model_is_refused(capsys, tmp_path, log):

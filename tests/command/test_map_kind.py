@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import mocobot
 from command import run
 from joint_logs import write_csv
-from made_arm import JOINTS, made, write_model
+from made_arm import JOINTS, chain, made, write_model
 
 TIME = np.arange(400) / 100.0
 NAMES = {
@@ -106,3 +106,36 @@ def test_the_joint_states_of_a_bag_get_a_map_of_joints(tmp_path, capsys):
     assert "3 joints" in err
     assert tomllib.loads(out)["joints"] == list(JOINTS)
     assert "named after the log" not in out
+
+
+FRANKA = "std_msgs/Header header\nfloat64[7] q\nfloat64[7] q_d\nfloat64[7] dq\nfloat64[7] tau_J\nfloat64[7] dtau_J\n"
+
+
+def test_the_state_of_a_franka_gets_a_map_of_joints(tmp_path, capsys):
+    types, kind = get_typestore(Stores.ROS2_HUMBLE), "franka_msgs/msg/FrankaState"
+    types.register(get_types_from_msg(FRANKA, kind))
+    stamp, header = types.types["builtin_interfaces/msg/Time"], types.types["std_msgs/msg/Header"]
+    q, torque = np.sin(TIME[:, None] + np.arange(7.0)), np.cos(TIME[:, None] + np.arange(7.0))
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        topic = bag.add_connection("/franka/state", kind, typestore=types)
+        for k, at in enumerate(TIME):
+            head = header(stamp=stamp(sec=k // 100, nanosec=k % 100 * 10_000_000), frame_id="")
+            said = types.types[kind](head, q[k], 0 * q[k], q[k], torque[k], 0 * q[k])
+            bag.write(topic, round(1e9 * at), bytes(types.serialize_cdr(said, kind)))
+    code, _, err = run(capsys, "map", tmp_path / "bag", "--out", tmp_path / "log.toml")
+    assert code == 0
+    assert "7 joints" in err
+    (tmp_path / "arm.xml").write_text(chain(7).replace('"joint', '"joint_'), encoding="utf-8")
+    (read,) = mocobot.serial.read_logs(tmp_path / "bag", tmp_path / "arm.xml", map=tmp_path / "log.toml")
+    np.testing.assert_array_equal(read.q, q)
+    np.testing.assert_array_equal(read.torque, torque)
+    assert read.drive.link_side.all()
+
+
+def test_arrays_of_a_franka_get_a_map_of_joints(tmp_path, capsys):
+    q = np.sin(TIME[:, None] + np.arange(7.0))
+    np.savez(tmp_path / "log.npz", time=TIME, q=q, dq=q, tau_J=q, tau_J_d=q)
+    code, out, err = run(capsys, "map", tmp_path / "log.npz")
+    assert code == 0
+    assert "7 joints" in err
+    assert tomllib.loads(out)["channels"]["link_torque"] == {"column": "tau_J[{index}]", "unit": "Nm"}

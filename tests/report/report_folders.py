@@ -11,11 +11,12 @@ import numpy as np
 
 from diagnosed import small_diagnosis
 from discrepancy.result.traces import Channel, Trace, save_traces
+from estimator.calibrate.json import calibration_to_dict
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
+from estimator.files import write_json
 from estimator.recording.parquet import write_recording
 from invented_calibration import invented_calibration
-from mocobot.api.calibration import write_calibration
 from mocobot.results import provenance
 from mocobot_sim.paper.experiment import SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.scoring import ENCODER_FRAMES, MOMENTS, SPRING_SCALE, published_errors
@@ -182,9 +183,8 @@ def calibration_folder(folder: Path, findings: tuple[str, ...] = ()) -> Path:
     made = replace(
         made, payloads=(replace(made.payloads[0], label=NASTY),), trials=trials, findings=findings, open=said
     )
-    write_calibration(
-        folder / "calibration.json", made, provenance("calibrate", {"tilt": False, "known_mass": []})
-    )
+    made_with = provenance("calibrate", {"tilt": False, "known_mass": []})
+    write_json(folder / "calibration.json", calibration_to_dict(made) | {"provenance": made_with})
     return folder
 
 

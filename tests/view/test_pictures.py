@@ -42,7 +42,6 @@ from mocobot_view.pictures import (
     FOVY,
     MeasuredTeam,
     diagnosis_shot,
-    diagnosis_view,
     estimate_shot,
     estimate_view,
     measured_team,
@@ -469,7 +468,6 @@ def test_views_are_pictures_or_one_sentence(placed_a: Placed, monkeypatch: pytes
         return [
             team_view("b", 160, 100),
             estimate_view(recording, estimate, 160, 100, truth=truth_of(placed_a), time_s=1.0),
-            diagnosis_view(recording, estimate, [FRICTION], 160, 100),
         ]
 
     for view in views():

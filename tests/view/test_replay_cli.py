@@ -98,7 +98,7 @@ def test_existing_targets_are_replaced_whole(
     assert replay(capsys, folder / "rec.parquet", "--save", target, "--force")[0] == 0
     assert len(Replayed(target).entities()) > 50
 
-    def broken(stream: Any, *_: object) -> None:
+    def broken(stream: Any, **_: object) -> None:
         stream.log("half", __import__("rerun").TextLog("of it"))
         raise OSError(28, "No space left on device")
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -31,7 +31,8 @@ import numpy as np
 
 from discrepancy.joints import actuators
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
-from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words
+from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words, titled
+from discrepancy.joints.causes import WORDS as CAUSES
 from discrepancy.joints.effects import numbered
 from discrepancy.joints.problem import MOMENTS
 from estimator.arrays import Array
@@ -43,7 +44,7 @@ from mocobot_logs.joints.joint_log import Drive
 from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import put, take_along
-from mocobot_sim.serial.mjcf import keep_inertials, set_inertial, with_effects
+from mocobot_sim.serial.mjcf import keep_inertials, real_inertia, set_inertial, with_effects
 
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
@@ -299,8 +300,8 @@ def effects_of(found: ArmCalibration) -> list[RobotEffect]:
     return [*out, RobotEffect("gravity_direction", None, None, gravity, "")]
 
 
-def as_found(found: ArmCalibration) -> mujoco.MjSpec:
-    """The given model with the found numbers.
+def as_found(found: ArmCalibration) -> tuple[mujoco.MjSpec, list[str]]:
+    """The given model with the found numbers, and a sentence on each effect that it cannot hold.
 
     Raises:
         InputError: MuJoCo refuses it.
@@ -309,19 +310,26 @@ def as_found(found: ArmCalibration) -> mujoco.MjSpec:
     keep_inertials(spec, spec.compile())
     for b in found.links:
         body = spec.body(found.model.model.body(b).name)
-        set_inertial(body, float(found.tree.mass[b]), found.tree.com[b], found.tree.inertia[b])
-    with_effects(spec, numbered(effects_of(found), found.model))
-    return spec
+        set_inertial(body, float(found.tree.mass[b]), found.tree.com[b], real_inertia(found.tree.inertia[b]))
+    effects = effects_of(found)
+    inside = with_effects(spec, numbered(effects, found.model))[1]
+    joints = found.model.joints
+    return spec, [
+        f"{MODEL} leaves {titled(CAUSES[e.cause].title, joint_in_words(e.joint, joints[e.joint - 1]))} as given: MJCF "
+        f"cannot hold what {TABLE} has"
+        for e, held in zip(effects, inside, strict=True)
+        if e.joint and not held
+    ]
 
 
-def write_as_found(found: ArmCalibration, folder: Path) -> None:
-    """Write ``as_found.xml`` and the files that it refers to into an existing folder.
+def write_as_found(found: ArmCalibration, folder: Path) -> list[str]:
+    """Write ``as_found.xml`` and the files that it refers to into an existing folder; return what it cannot hold.
 
     Raises:
         InputError: MuJoCo refuses the model, it refers to files outside its folder, or a file cannot be written.
     """
     check_named(found.model.path, assets=False)
-    spec = as_found(found)
+    spec, as_given = as_found(found)
     taken = take_along(spec)
     try:
         put(taken, spec, folder)
@@ -329,15 +337,19 @@ def write_as_found(found: ArmCalibration, folder: Path) -> None:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     write_text(folder / MODEL, spec.to_xml())
     mujoco.MjModel.from_xml_path(str(folder / MODEL))
+    return as_given
 
 
-def write_into(found: ArmCalibration, folder: Path, drives: Sequence[Drive] = (), **more: Any) -> None:
+def write_into(found: ArmCalibration, folder: Path, drives: Sequence[Drive] = (), **more: Any) -> list[str]:
     """Write JSON, text, table and model into an existing folder, and the actuators if ``drives`` are given.
+
+    Returns what the model cannot hold.
 
     Raises:
         InputError: a file cannot be written, or MuJoCo refuses the model.
     """
-    write_as_found(found, folder)
+    as_given = write_as_found(found, folder)
+    found = replace(found, notes=(*found.notes, *(f"{said}." for said in as_given)))
     head = "place,parameter,model,found,se,determined"
     rows = [
         f"{_cell(p.place)},{p.name},{p.model:.9g},{p.value:.9g},{p.se:.3g},{'yes' if p.determined else 'no'}"
@@ -348,6 +360,7 @@ def write_into(found: ArmCalibration, folder: Path, drives: Sequence[Drive] = ()
     write_text(folder / REPORT, to_text(found) + "\n")
     if drives:
         actuators.write(found, drives, folder)
+    return as_given
 
 
 def _cell(text: str) -> str:

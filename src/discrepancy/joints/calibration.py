@@ -18,8 +18,8 @@ from discrepancy.evidence.search import floor_of
 from discrepancy.joints.causes import parameter_name
 from discrepancy.joints.closed_loop import ClosedLoop, commanded
 from discrepancy.joints.diagnose import in_parts
-from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links
-from discrepancy.joints.mechanics import Tree, inertial_parameters, rigid_torque, torque_of
+from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links, welded
+from discrepancy.joints.mechanics import Tree, inertial_parameters, moments_matrix, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import mount_of
 from discrepancy.joints.problem import LENGTH_M, MOMENTS, REST, Given, JointProblem, joint_problem
@@ -54,6 +54,9 @@ MOST_STEPS, LEAST_DROP = 200, 1e-6
 BASE, DEPENDENT = 1e-4, 1e-2
 """Singular values over the largest below which columns count as dependent in least squares, and in the combinations
 that are told. Chosen."""
+TIE = 1e-3
+"""Relative lead of a column over the next in the choice of combinations. Chosen: more than fitted lengths change it,
+less than the columns of other joints differ."""
 RATIO = 0.05
 """Largest difference between a drive's coupling and the ratios 1 and -1 that the columns of coupled drives have."""
 
@@ -169,15 +172,22 @@ def calibrate_arm(
     say("smoothing the logs")
     trials = trials_of(model, logs)
     loops = [ClosedLoop.of(s) for s in trials.runs] if all(map(commanded, logs)) else []
-    fit = _Fit(model, trials, loops)
+    fit, moved, unsettled = Fit(model, trials, loops), np.inf, []
     for k in range(ROUNDS):
         say(f"fitting all parameters, step {k + 1}")
-        if fit.step() < SETTLED:
+        moved = fit.step()
+        if moved < SETTLED:
             break
+    else:
+        unsettled = [
+            f"The fit has not settled: the last of its {ROUNDS} steps still moved a value by {moved:.3g} standard "
+            f"errors, where less than {SETTLED:g} is settled."
+        ]
     say("predicting each part from the others")
     held = fit.held_out()
     names = tuple(dict.fromkeys(log.name for log in logs))
-    notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs), *fit.notes()]
+    notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs)]
+    notes = [*unsettled, *notes, *fit.notes()]
     return ArmCalibration(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
@@ -198,7 +208,7 @@ class _Scalar:
     in_model: bool = True
 
 
-class _Fit:
+class Fit:
     """The fit around its current values."""
 
     def __init__(self, model: SerialModel, trials: Trials, loops: Sequence[ClosedLoop] = ()) -> None:
@@ -428,13 +438,13 @@ class _Fit:
         """Values of ``x`` and their covariance from some parts.
 
         Friction that deviates from its law is a nuisance for all other values. Coulomb and viscous friction are then
-        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error.
+        the law nearest to it: the fit without deviations. Its difference from that with them counts as an error, also
+        at a bound.
         """
         H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
         information, start = self.basis.T @ H @ self.basis, np.linalg.pinv(self.basis) @ self.x
-        x = self.basis @ self._mode(
-            information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start
-        )
+        y = self._mode(information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start)
+        x = np.maximum(self.basis @ y, self.least)  # rounding may end below a bound
         # For errors, the prior counts with its curvature at the given model, and less, so that it does not make them.
         weak = self.curvature.copy()
         weak[: self.first, : self.first] /= PLAIN**2
@@ -442,7 +452,7 @@ class _Fit:
         H, g = self._reduced(self.plain, parts, self.rests)
         at = self.rubbing
         least = self.least[at]
-        nearest, free = x[at], np.ones(len(at), dtype=bool)
+        lawful, nearest, free = x[at], x[at], np.ones(len(at), dtype=bool)
         while free.any():
             k = at[free]
             rest = np.setdiff1d(np.arange(len(x)), k)
@@ -454,7 +464,7 @@ class _Fit:
                 break
             nearest[beyond], x[at[beyond]] = least[beyond], least[beyond]
             free &= ~beyond
-        covariance[at, at] += (nearest - x[at]) ** 2
+        covariance[at, at] += (nearest - lawful) ** 2
         x[at] = nearest
         return x, covariance
 
@@ -524,9 +534,7 @@ class _Fit:
         mass, com, inertia = (a.copy() for a in (self.given.mass, self.given.com, self.given.inertia))
         for k, b in enumerate(self.links):
             own = central(x[10 * k : 10 * k + 10])
-            mass[b], com[b] = own[0], own[1:4]
-            xx, yy, zz, xy, xz, yz = own[4:]
-            inertia[b] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+            mass[b], com[b], inertia[b] = own[0], own[1:4], moments_matrix(own[4:])
         tables = {name: getattr(self.given, name).copy() for name in ("coulomb", "viscous", "armature")}
         for s, value in zip(self.scalars, x[n:], strict=True):
             table = s.name.split("_", 1)[0]
@@ -595,7 +603,9 @@ class _Fit:
         seen = np.flatnonzero(size * typical > BASE * np.max(size * typical))
         eigen, turn = np.linalg.eigh(G[np.ix_(seen, seen)] / np.outer(size[seen], size[seen]))
         root = np.sqrt(np.maximum(eigen, 0.0))[:, None] * turn.T
-        _, R, order = qr(root, mode="economic", pivoting=True)  # pyright: ignore[reportAssignmentType]
+        # Where columns are alike, rounding would choose, so the first gets a lead.
+        order = qr(root * (1.0 - TIE * np.arange(len(seen))), mode="economic", pivoting=True)[-1]
+        R = np.linalg.qr(root[:, order])[1]
         rank = int(np.sum(np.abs(np.diag(R)) > DEPENDENT * abs(R[0, 0])))
         beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
         names = [(self.model.model.body(b).name, m) for b in self.links for m in MOMENTS]
@@ -619,7 +629,7 @@ class _Fit:
         for t in parts:
             others = [k for k in parts if k != t] or [t]
             values = self.solved(others)[0] - self.at
-            sides = self._left(t, nothing, free=False), self._plain(t, others), self._left(t, values)
+            sides = self.left(t, nothing, free=False), self._plain(t, others), self.left(t, values)
             rows = self.rows[t]
             variance = self.variance if self.problem.sensors is None else self.problem.sensors
             noise = np.sqrt(np.sum(rows * variance, axis=1) / rows.sum(axis=1)) * self.series[t].unit
@@ -628,7 +638,7 @@ class _Fit:
             out.append(HeldOut(self.trials.names[t], plain, least, best, self._wide(noise), torque))
         return tuple(out)
 
-    def _left(self, t: int, values: Array, *, free: bool = True) -> Array:
+    def left(self, t: int, values: Array, *, free: bool = True) -> Array:
         """Residual torque of a part at given values; friction at rest, which nobody predicts, is fitted if ``free``."""
         x = np.zeros(len(self.active))
         x[self.fit] = values
@@ -653,8 +663,7 @@ class _Fit:
         values = np.linalg.lstsq(A / size, y, rcond=BASE)[0] / size
         x = np.zeros(len(self.active))
         x[at] = values
-        free = self._left(t, x[self.fit])
-        return free
+        return self.left(t, x[self.fit])
 
     def _wide(self, sizes: Array) -> Array:
         out = np.zeros(len(self.model.joints))
@@ -673,14 +682,9 @@ class _Fit:
         for motor in self.trials.motors:
             yield motor.sentence(self.model.joints[motor.joint])
         for b in dict.fromkeys(map(int, self.given.joint_body)):
-            if not any(self._welded(b, k) for k in self.links):
+            if not any(welded(self.given, k, b) for k in self.links):
                 name = self.model.model.body(b).name
                 yield f"Link {name} has no mass in the model, so its inertial parameters are not fitted."
-
-    def _welded(self, root: int, body: int) -> bool:
-        while body != root and body not in self.given.joint_body:
-            body = int(self.given.parent[body])
-        return body == root
 
 
 def _errors(slope: Array, covariance: Array) -> Array:

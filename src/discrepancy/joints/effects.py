@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from discrepancy.evidence.findings import Finding, Member
 from discrepancy.evidence.posterior import Group
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, parameter_name, titled
+from discrepancy.joints.link_prior import central
 from discrepancy.joints.mechanics import Tree, horizontal
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import angle_between, gravity_at, ways
@@ -88,11 +89,7 @@ def axes_of_tilt(gravity: Array) -> Array:
 def load_of(moments: Array) -> Array:
     """Mass, centre of mass and central inertia (xx, yy, zz, xy, xz, yz) from ten parameters about the link frame."""
     m = moments[0] if abs(moments[0]) > LEAST_KG else LEAST_KG
-    c = moments[1:4] / m
-    about = c @ c * np.eye(3) - np.outer(c, c)
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    inertia = [moments[4 + k] - m * about[i, j] for k, (i, j) in enumerate(pairs)]
-    return np.array([moments[0], *c, *inertia])
+    return np.append(moments[0], central(np.append(m, moments[1:]))[1:])
 
 
 def absolute(problem: JointProblem, group: Group) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.joints.mechanics import Tree, inertial_parameters
+from discrepancy.joints.mechanics import Tree, inertial_parameters, moments_matrix
 from discrepancy.joints.problem import MOMENTS
-from estimator.arrays import Array
+from estimator.arrays import Array, point_inertia
 from mocobot_sim.serial.mjcf import real_inertia
 
 BODY = 0.3
@@ -53,8 +53,7 @@ def _positive(P: Array) -> bool:
 
 def pseudo_inertia(p: Array) -> Array:
     """Pseudo-inertia (4, 4) from ten inertial parameters about the frame's origin."""
-    xx, yy, zz, xy, xz, yz = p[4:]
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    inertia = moments_matrix(p[4:])
     out = np.zeros((4, 4))
     out[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     out[:3, 3] = out[3, :3] = p[1:4]
@@ -69,7 +68,7 @@ _PSEUDO = np.array([pseudo_inertia(e) for e in np.eye(10)])
 def central(p: Array) -> Array:
     """Mass, centre of mass and central inertia (xx, yy, zz, xy, xz, yz) of ten parameters about the frame's origin."""
     c = p[1:4] / p[0]
-    about = p[0] * (c @ c * np.eye(3) - np.outer(c, c))
+    about = p[0] * point_inertia(c)
     moved = np.array([*np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
     return np.array([p[0], *c, *(p[4:] - moved)])
 
@@ -88,3 +87,10 @@ def fitted_links(tree: Tree) -> list[int]:
         groups.setdefault(int(root[b]), []).append(b)
     each = (max(own, key=lambda b: tree.mass[b]) for own in groups.values())
     return [b for b in each if tree.mass[b] > LEAST_KG]
+
+
+def welded(tree: Tree, body: int, root: int) -> bool:
+    """Whether a body is another, or is fixed to it from there on."""
+    while body != root and body not in tree.joint_body:
+        body = int(tree.parent[body])
+    return body == root

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from estimator.arrays import Array
+from estimator.arrays import Array, point_inertia
 from estimator.errors import InputError
 
 
@@ -302,7 +302,7 @@ PARAMETERS = ("m", "hx", "hy", "hz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 
 def inertial_parameters(mass: float, com: Array, inertia: Array) -> Array:
     """The ten inertial parameters of a body from its mass, centre of mass and central inertia, shape (10,)."""
-    about = inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
+    about = inertia + mass * point_inertia(com)
     return np.array([mass, *(mass * com), *np.diag(about), about[0, 1], about[0, 2], about[1, 2]])
 
 
@@ -472,10 +472,11 @@ def with_load(mass: float, com: Array, inertia: Array, load: Array) -> tuple[flo
     """Mass, centre of mass and central inertia of a body after adding inertial parameters ``load``, shape (10,)."""
     total = max(mass + float(load[0]), 0.05 * mass)
     centre = (mass * com + load[1:4]) / total
-    xx, yy, zz, xy, xz, yz = load[4:]
-    more = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    own = inertia + mass * point_inertia(com) + moments_matrix(load[4:])
+    return total, centre, own - total * point_inertia(centre)
 
-    def about(c: Array) -> Array:
-        return c @ c * np.eye(3) - np.outer(c, c)
 
-    return total, centre, inertia + mass * about(com) + more - total * about(centre)
+def moments_matrix(moments: Array) -> Array:
+    """The inertia of its moments xx, yy, zz, xy, xz, yz, shape (6,) -> (3, 3)."""
+    xx, yy, zz, xy, xz, yz = moments
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -182,7 +182,7 @@ def _locks(model: mujoco.MjModel, joints: list[int]) -> str:
     ends = [model.jnt_range[j] if model.jnt_limited[j] else (-np.inf, np.inf) for j in joints]
     names = [model.joint(j).name for j in joints]
     rest = [min(max(reference(model, n), low), high) for n, (low, high) in zip(names, ends, strict=True)]
-    return " ".join(f"--lock {shlex.quote(f'{n}={x:g}')}" for n, x in zip(names, rest, strict=True))
+    return " ".join(f"--lock {shlex.quote(f'{n}={x:.9g}')}" for n, x in zip(names, rest, strict=True))
 
 
 def _moved(model: mujoco.MjModel) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,7 +59,7 @@ def read_spec(path: Path) -> Read:
     root, said = _TAG.search(text), ""
     if b"<xacro:" in text:
         raise InputError(
-            f"{path}: is a xacro file; make a URDF of it: ros2 run xacro xacro {path} > robot.urdf"
+            f"{path}: is a xacro file; make a URDF of it: ros2 run xacro xacro {shlex.quote(str(path))} > robot.urdf"
         )
     for bare in (False, True):
         try:

@@ -201,7 +201,7 @@ def resting(logs: Sequence[JointLog]) -> Iterator[str]:
     for log in logs:
         # Second differences of white noise have six times its variance; those of a motion are small.
         noise: Array = np.std(np.diff(log.q, 2, axis=0), axis=0) / np.sqrt(6.0)
-        still &= np.std(log.q, axis=0) <= np.maximum(RESTS * noise, log.position_step)
+        still &= np.std(log.q - log.q[0], axis=0) <= np.maximum(RESTS * noise, log.position_step)
     names = [name for name, rests in zip(logs[0].joints, still, strict=True) if rests] if logs else []
     if names and still.all():
         yield "No joint moves in these logs; they tell no friction and no inertia, and gravity in one pose only."

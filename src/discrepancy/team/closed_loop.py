@@ -16,6 +16,7 @@ from discrepancy.team.linear.signals import Signals
 from estimator.arm.unit import ArmUnit, true_joints
 from estimator.arrays import Array, inertia_matrix
 from estimator.errors import InputError
+from estimator.estimate.inertia import about_com
 from estimator.quantisation import without_held
 from estimator.recording.model import Recording
 from estimator.rigid_team import Bases, Shared
@@ -134,10 +135,9 @@ def team_of(
     for effect in effects:
         shift[getattr(effect, "robot", 1) - 1] += effect.base_shift()
     p = bases.p - np.einsum("nij,nj->ni", bases.R, shift)
-    mass, p_1c = float(pi[0]), pi[1:4] / pi[0]
-    about_c = inertia_matrix(pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    about_c = about_com(pi)
     X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
-    payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
+    payload = payload_mjcf(float(pi[0]), about_c[1:4], physical_inertia(inertia_matrix(about_c[4:])), X_1i)
     as_built, R = (), bases.R
     if units is not None:
         as_built, R = units_as_built(units), bases.R @ units.R_ba

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.unit import ArmUnit, in_encoder_frames, seen_by_encoders
 from estimator.arrays import Array, inertia_matrix
+from estimator.estimate.inertia import about_com
 from estimator.rigid_team import Shared
 
 Estimate = dict[str, Any]
@@ -15,13 +16,11 @@ Estimate = dict[str, Any]
 
 def to_dict(shared: Shared) -> Estimate:
     """Mass, centre of mass, principal moments and grasps as plain numbers."""
-    mass = float(shared.pi[0])
-    p_1c = shared.pi[1:4] / mass
-    about_c = inertia_matrix(shared.pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    about_c = about_com(shared.pi)
     return {
-        "mass_kg": mass,
-        "p_1c_m": p_1c.tolist(),
-        "principal_inertia_kgm2": np.linalg.eigvalsh(about_c).tolist(),
+        "mass_kg": float(about_c[0]),
+        "p_1c_m": about_c[1:4].tolist(),
+        "principal_inertia_kgm2": np.linalg.eigvalsh(inertia_matrix(about_c[4:])).tolist(),
         "grasps": [
             {
                 "p_1i_m": p.tolist(),

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
+from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters, point_inertia
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.uncertainty import (
     StepReport,
@@ -96,7 +96,7 @@ class PrincipalInertia:
 
 def about_origin(mass: float, c: Array, inertia: Array) -> Array:
     """Return (m, m c, J about the origin), shape (10,), from mass [kg], centre of mass c [m], inertia [kg m^2]."""
-    about = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    about = inertia + mass * point_inertia(c)
     return np.concatenate([[mass], mass * c, inertia_parameters(about)])
 
 
@@ -104,7 +104,7 @@ def about_com(parameters: Array) -> Array:
     """Inverse of ``about_origin``: return (m, c, inertia about c), shape (10,)."""
     m = parameters[0]
     c = parameters[1:4] / m
-    inertia = inertia_matrix(parameters[4:]) - m * (c @ c * np.eye(3) - np.outer(c, c))
+    inertia = inertia_matrix(parameters[4:]) - m * point_inertia(c)
     return np.concatenate([[m], c, inertia_parameters(inertia)])
 
 

@@ -147,15 +147,18 @@ class JointCalibration(Folder):
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> list[str]:
         """Write all files that the docstring of this module lists into an existing folder.
 
+        Returns:
+            One sentence per effect that ``as_found.xml`` cannot hold.
+
         Raises:
             InputError: a file cannot be written, or MuJoCo refuses the model.
         """
-        calibrated.write_into(self.found, folder, self.drives, **more)
+        as_given = calibrated.write_into(self.found, folder, self.drives, **more)
         if pictures and draws_plots():
             from mocobot_report.plots_calibration import save_torques
 
             save_torques(calibrated.from_dict(self.to_dict(), ""), folder / "torques.png")
-        return []
+        return as_given
 
 
 @overload
@@ -244,17 +247,6 @@ def read_calibration(path: Path | str) -> Calibration:
         InputError: the file cannot be read or is not a complete calibration.
     """
     return public(Calibration, calibration_of(path))
-
-
-def write_calibration(path: Path, calibration: Below, made_with: Mapping[str, Any] | None = None) -> None:
-    """Write a calibration as JSON, optionally with provenance; a failure leaves no partial file.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    write_json(
-        path, calibration_to_dict(calibration) | ({"provenance": dict(made_with)} if made_with else {})
-    )
 
 
 def _labels(given: Mapping[str, str] | Iterable[str], logs: Sequence[Given]) -> dict[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -77,11 +77,18 @@ def replay(
         )
     each = [logs] if isinstance(logs, Recording | Path | str) else list(logs)
     names = distinct_names([Path(one.name if isinstance(one, Recording) else one) for one in each])
-    trials = _trials(each, names, chosen) if model is None else _joint_replays(each, names, model, chosen)
+    trials: Sequence[ReplayTrial | JointReplay]
+    if model is None:
+        trials = team = _trials(each, names, chosen)
+        content = partial(outputs.log_replay, trials=team, progress=advance)
+    else:
+        from mocobot_view.joint_replay import log_joint_replay
+
+        trials = replays = _joint_replays(each, names, model, chosen)
+        content = partial(log_joint_replay, replays=replays, progress=advance)
     notes = [f"{trial.name}: {text}" for trial in trials for text in trial.notes]
     for text in notes:
         note(text)
-    content = partial(_log, trials, advance)
     if path is not None:
         outputs.save_content(content, Path(path))
     elif not chosen.web:
@@ -155,19 +162,6 @@ def _torques(path: Path, joints: tuple[str, ...]) -> tuple[list[Trace], list[int
     if any(trace.measured is None for trace in traces):
         raise InputError(f"{path}: is of an earlier version, without torques over time; diagnose again")
     return traces, [joints.index(name) for name in names]
-
-
-def _log(
-    trials: list[ReplayTrial] | list[JointReplay], advance: Callable[[int], object], stream: Any
-) -> None:
-    from mocobot_view.joint_replay import JointReplay, log_joint_replay
-    from mocobot_view.stream import log_replay
-
-    joints = [trial for trial in trials if isinstance(trial, JointReplay)]
-    if joints:
-        log_joint_replay(stream, joints, advance)
-    else:
-        log_replay(stream, [trial for trial in trials if isinstance(trial, ReplayTrial)], advance)
 
 
 def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | None) -> BodyFacts:

@@ -25,6 +25,8 @@ from mocobot_logs.joints.joint_map import (
     COMMANDS,
     DUTIES,
     EFFORTS,
+    LEAST_HZ,
+    MOST_HZ,
     POSITIONS,
     QUANTITIES,
     VELOCITIES,
@@ -43,7 +45,6 @@ MAX_GAP_S = 0.05
 """Longest time without samples, beyond one period, that is bridged [s]."""
 SHORTEST_S, LEAST_ROWS = 1.0, 32
 """Shortest part between gaps [s] and its least number of rows; shorter parts are left out."""
-LEAST_HZ, MOST_HZ = 20.0, 20e3
 _BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; quantile; slower intervals over the median
 _GAP = 1.75  # periods: jitter alone makes no longer intervals
 _INSIDE = 0.1  # share of a period: an instant this close to a sample does not count as inside a gap
@@ -570,9 +571,8 @@ def _at_joints(motor: Array, turns: Array, where: str, channel: str) -> Array:
 def _constants(columns: _Columns, log_map: JointMap, where: str) -> Array:
     """Return the torque constants of joints with currents, 1 for the others."""
     constants = np.where(_given(columns.of("current")), log_map.torque_constant, 1.0)
-    coupled = (log_map.turns - np.diag(np.diag(log_map.turns)) != 0).any(axis=1)
-    coupled |= (log_map.turns - np.diag(np.diag(log_map.turns)) != 0).any(axis=0)
-    if (np.isnan(constants) & coupled).any():
+    coupled = log_map.turns - np.diag(np.diag(log_map.turns)) != 0
+    if (np.isnan(constants) & (coupled.any(axis=0) | coupled.any(axis=1))).any():
         raise InputError(
             f"{where}: drive: torque_constant is 'free' for coupled drives; it must be known there, for their torques "
             "add up in one joint"

@@ -149,18 +149,25 @@ def _at_joint(
 
 
 def _coupled(spec: mujoco.MjSpec, model: mujoco.MjModel, effect: RobotEffect) -> bool:
-    """Add a fixed tendon along both joints, with friction and armature at their combined speed."""
+    """Give a fixed tendon along both joints friction and armature at their combined speed.
+
+    Inverse dynamics of a model that has the tendon, such as one as found before, hold its damping and its armature but
+    not its dry friction, so the effect adds to the former and replaces the latter.
+    """
     values = [effect.number(stem) for stem in ("coulomb", "viscous", "armature")]
     if min(values) < 0 or effect.partner is None or effect.joint is None:
         return False
-    tendon = spec.add_tendon(name=f"drive_of_{effect.partner}_and_{effect.joint}")
-    tendon.wrap_joint(model.joint(effect.joint - 1).name, 1.0)
-    tendon.wrap_joint(model.joint(effect.partner - 1).name, effect.number("ratio"))
+    name = f"drive_of_{effect.partner}_and_{effect.joint}"
+    tendon = spec.tendon(name)
+    if tendon is None:
+        tendon = spec.add_tendon(name=name)
+        tendon.wrap_joint(model.joint(effect.joint - 1).name, 1.0)
+        tendon.wrap_joint(model.joint(effect.partner - 1).name, effect.number("ratio"))
     damping = np.array(tendon.damping, dtype=float).reshape(-1)
-    damping[0] = values[1]
+    damping[0] += values[1]
     tendon.solref_friction, tendon.solimp_friction = list(SOLREF), list(SOLIMP)
-    tendon.frictionloss, tendon.armature = values[0], values[2]
-    tendon.damping = damping if damping.size > 1 else values[1]
+    tendon.frictionloss, tendon.armature = values[0], float(tendon.armature) + values[2]
+    tendon.damping = damping if damping.size > 1 else damping[0]
     return True
 
 

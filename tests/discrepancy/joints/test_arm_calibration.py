@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -68,7 +69,7 @@ def test_mujoco_asks_for_the_true_torques_with_the_model_as_found(found):
     wrong(true)
     rng = np.random.default_rng(8)
     moves = [rng.uniform(-1.5, 1.5, (3, 3)) for _ in range(20)]
-    asked = [torques(spec.compile(), moves) for spec in (true, as_found(found))]
+    asked = [torques(spec.compile(), moves) for spec in (true, as_found(found)[0])]
     nominal = torques(found.model.source.copy().compile(), moves)
     left = np.sqrt(np.mean((asked[1] - asked[0]) ** 2, axis=0))
     assert np.all(left < 0.03 * np.sqrt(np.mean(asked[0] ** 2, axis=0)))
@@ -88,7 +89,7 @@ def torques(model: mujoco.MjModel, moves: list[np.ndarray]) -> np.ndarray:
 
 
 def test_every_link_as_found_is_a_possible_body(found):
-    model = as_found(found).compile()
+    model = as_found(found)[0].compile()
     for b in range(1, model.nbody):
         moments = np.sort(model.body_inertia[b])
         assert model.body_mass[b] > 0.0
@@ -227,3 +228,32 @@ def test_the_prior_has_the_slope_and_curvature_of_its_divergence(tmp_path):
     assert prior.slopes(prior.given)[0] == pytest.approx(0.0, abs=1e-9)
     mass, *_ = central(prior.given)
     assert prior.slopes(np.append([-mass], prior.given[1:]))[0] == np.inf
+
+
+@pytest.mark.parametrize("rounds", [1, 8])
+def test_a_fit_that_has_not_settled_says_how_far_it_still_moves(tmp_path, monkeypatch, log, rounds):
+    monkeypatch.setattr("discrepancy.joints.calibration.ROUNDS", rounds)
+    found = calibrate_arm(arm_model(tmp_path), [cropped(log, 8.0)])
+    said = [note for note in found.notes if "has not settled" in note]
+    assert len(said) == (rounds == 1)
+    for note in said:
+        steps = re.findall(r"last of its 1 steps still moved a value by (\S+) standard errors", note)
+        largest = max(
+            abs(p.value - p.model) / p.se for p in found.parameters if p.place in found.model.joints
+        )
+        assert float(steps[0]) >= 0.95 * largest  # the first step comes from the given model
+        assert note in " ".join(to_text(found).split())
+
+
+def falling(q: np.ndarray, v: np.ndarray, time: float) -> np.ndarray:
+    """Dry friction that falls by 1 N m as a joint gets faster."""
+    return 0.3 + np.exp(-np.abs(v))
+
+
+def test_viscous_friction_at_its_bound_is_as_uncertain_as_its_law(tmp_path):
+    """Friction falls with speed, so the nearest law has no viscous friction though the arm has."""
+    found = calibrate_arm(arm_model(tmp_path), [arm_log(rubs(0.0, 0.2), 3, None, falling)])
+    for joint in ("turn", "shoulder", "elbow"):
+        x, se = value(found, joint, "viscous_Nms_per_rad")
+        assert x == 0.0
+        assert 3.0 * se > 0.2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -146,6 +147,15 @@ def test_others_are_refused_in_one_sentence(tmp_path, case) -> None:
         load_model(path)
     assert str(refused.value).startswith(f"{path}: ")
     assert "\n" not in str(refused.value)
+
+
+def test_the_command_for_a_xacro_file_can_be_pasted(tmp_path) -> None:
+    (tmp_path / "my robot").mkdir()
+    path = written(tmp_path / "my robot", REFUSED["xacro"][0])
+    with pytest.raises(InputError) as refused:
+        load_model(path)
+    command = shlex.split(str(refused.value).partition("make a URDF of it: ")[2])
+    assert command == ["ros2", "run", "xacro", "xacro", str(path), ">", "robot.urdf"]
 
 
 def test_no_file_and_no_model(tmp_path) -> None:

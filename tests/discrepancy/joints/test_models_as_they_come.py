@@ -328,6 +328,17 @@ def test_advice_for_objects_beside_the_arm_and_loops_of_a_gripper_works(tmp_path
     assert load_model(path, {**first, "grip": "0"}).joints == ("hip", "yaw", "pitch", "out", "elbow")
 
 
+def test_a_value_that_is_advised_is_within_the_range(tmp_path) -> None:
+    """The reference pose is out of the grip's range, and its nearest end has more digits than are usually printed."""
+    loop = '<equality><connect body1="finger" body2="fore" anchor="0 0 0.1"/></equality>'
+    fixed = TORSO.replace('<freejoint name="root"/>', "").replace("</worldbody>", f"</worldbody>{loop}")
+    fixed = fixed.replace('range="0 0.04"', 'range="-20 -12.345641"')
+    path = tmp_path / "torso.xml"
+    path.write_text(re.sub("<keyframe>.*</keyframe>", "", fixed), encoding="utf-8")
+    ((locks, _),) = advised(path)
+    assert load_model(path, locks).joints == ("hip", "yaw", "pitch", "out", "elbow")
+
+
 def test_a_locked_leader_takes_its_follower_along(tmp_path) -> None:
     mimic = '<mimic joint="left_joint" multiplier="-1.5" offset="0.02"/>'
     path = urdf(tmp_path, DUO + jaw("right", -1, mimic) + jaw("left", 1))

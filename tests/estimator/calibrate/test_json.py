@@ -23,8 +23,9 @@ from estimator.calibrate.prior import Prior
 from estimator.calibrate.text import format_calibration, frames_sentence, shown_groups, unit_toml
 from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
+from estimator.files import write_json
 from invented_calibration import invented_calibration
-from mocobot.api.calibration import read_calibration, write_calibration
+from mocobot.api.calibration import read_calibration
 from mocobot_sim.scene.scene import build_team
 
 
@@ -93,7 +94,7 @@ def test_units_in_the_keys_and_errors_with_the_held_scale() -> None:
 def test_a_file_and_its_folder(tmp_path: Path) -> None:
     made = invented_calibration(2)
     path = tmp_path / "calibration.json"
-    write_calibration(path, made, {"mocobot": "1"})
+    write_json(path, calibration_to_dict(made) | {"provenance": {"mocobot": "1"}})
     assert json.loads(path.read_text(encoding="utf-8"))["provenance"] == {"mocobot": "1"}
     for given in (path, tmp_path):
         np.testing.assert_array_equal(read_calibration(given).units.x, made.units.x)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.clocks import Rates, estimate_clocks, fit_clock, likely_lags, recorded_clocks
+from estimator.clocks import Rates, estimate_clocks, fit_clock, likely_lags
 from mocobot_sim.scene.as_built import SensorEffects
 from mocobot_sim.trial.sensors import PRESETS, measure
 from turning_body import RATE_HZ, clocked, swaying, theta_at
@@ -38,7 +38,9 @@ def test_a_log_that_is_late_has_a_positive_offset(delay_s):
 def test_the_simulators_delay_is_found(random_a, preset):
     delay_s = (0.0, 0.0042, -0.011)
     log = replace(random_a, sensors=SensorEffects(clock_delay_s=delay_s))
-    estimate = recorded_clocks(measure(log, PRESETS[preset], np.random.default_rng(1)))
+    seen = measure(log, PRESETS[preset], np.random.default_rng(1))
+    theta = [seen.joints(i)[1] for i in range(3)]
+    estimate = estimate_clocks(theta, np.full(3, seen.time[0]), seen.metadata.rate_hz)
     error = estimate.offset_s - delay_s
     assert np.all(np.abs(error[1:]) < 5 * estimate.offset_se_s[1:] + 2e-6)
     assert np.abs(error).max() < (5e-6 if preset == "ideal" else 5e-5)

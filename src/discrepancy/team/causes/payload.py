@@ -9,7 +9,7 @@ import numpy as np
 from discrepancy.candidate import Transient
 from discrepancy.team.causes.base import Cause, Shape, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters
+from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters, point_inertia
 from estimator.rigid_team import balance, fusion_matrix
 
 MASS_OVER_S = 60.0
@@ -212,7 +212,7 @@ class PayloadMass(Cause):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
         point = context.p_1c + values[1:4] / mass
         pi = _ten_columns(context.p_1c) @ values
-        own = inertia_parameters(inertia_matrix(pi[4:] / mass) - _of_point(point))
+        own = inertia_parameters(inertia_matrix(pi[4:] / mass) - point_inertia(point))
         over, shape = context.shape.get("over_s"), context.shape
         return (
             {"mass_kg": 0.0 if over else float(mass), "rate_kgps": float(mass / over) if over else 0.0}
@@ -225,14 +225,9 @@ class PayloadMass(Cause):
 def _ten_columns(com: Array) -> Array:
     """Inertial parameters (m, m c, J about {1}) per unit of each parameter, shape (10, 10)."""
     pi = np.eye(10)
-    pi[1:4, 0], pi[4:, 0] = com, inertia_parameters(_of_point(com))
+    pi[1:4, 0], pi[4:, 0] = com, inertia_parameters(point_inertia(com))
     for k, axis in enumerate(np.eye(3)):
         pi[4:, 1 + k] = inertia_parameters(
             2.0 * com[k] * np.eye(3) - np.outer(com, axis) - np.outer(axis, com)
         )
     return pi
-
-
-def _of_point(r: Array) -> Array:
-    """Inertia about {1} of 1 kg at a point of {1} [m], shape (3, 3)."""
-    return np.asarray(r @ r * np.eye(3) - np.outer(r, r))

@@ -29,8 +29,9 @@ from discrepancy.team.linear.trial_linear import (
 )
 from estimator.arm.motion import PHI, TAU, THETA
 from estimator.arm.unit import Arms
-from estimator.arrays import Array, inertia_matrix, inertia_parameters
+from estimator.arrays import Array, inertia_matrix
 from estimator.errors import InputError
+from estimator.estimate.inertia import about_com, about_origin
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import ends_with_this
 from estimator.recording.model import Recording
@@ -65,8 +66,7 @@ def held_inertia(p_1i: Array, mass: float, p_1c: Array) -> Array:
 
 def inertia_about_centre(shared: Shared) -> Array:
     """Inertia about the centre of mass, in the axes of {1} [kg m^2], shape (3, 3)."""
-    mass, c = shared.pi[0], shared.pi[1:4] / shared.pi[0]
-    return np.asarray(inertia_matrix(shared.pi[4:]) - mass * (c @ c * np.eye(3) - np.outer(c, c)))
+    return inertia_matrix(about_com(shared.pi)[4:])
 
 
 def inertia_is_like_held(shared: Shared) -> Array:
@@ -308,8 +308,7 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
             "add a recording with motion in all axes"
         )
     inertia = estimate.inertia.inertia if estimate.inertia else held_inertia(grasps.p_1i, mass.mass, c)
-    about_1 = inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
-    return Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
+    return Shared(grasps, about_origin(mass.mass, c, inertia))
 
 
 @dataclass(frozen=True, eq=False)
