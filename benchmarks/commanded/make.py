@@ -30,7 +30,8 @@ import tyro
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # also runs as a file
 
 from commanded.bodies import KINDS, add_play, spec_of, stand_of
-from commanded.machine import Machine, Run, run
+from commanded.drives import ControlLaw, actuate
+from commanded.machine import FIRMWARE_S, Machine, Run, late_at_servo, run
 from commanded.motion import SECONDS, held, wished
 from commanded.rubbing import LAWS, Law, law_of
 
@@ -87,28 +88,6 @@ def _put(spec: mujoco.MjSpec, joints: tuple[str, ...], **numbers: np.ndarray) ->
         joint = spec.joint(name)
         joint.armature, joint.frictionloss = numbers["armature"][j], numbers["coulomb"][j]
         joint.damping = [numbers["viscous"][j], 0.0, 0.0]
-
-
-def _actuate(spec: mujoco.MjSpec, kind: str, drives: _Drives, *, firmware: bool) -> None:
-    """Drives into a model: position loops, and the back-EMF of servos apart, which the limit of the duty leaves alone.
-
-    With ``firmware`` drives of servos are motors, whose torques the firmware gives.
-    """
-    joints, servo = KINDS[kind].joints, kind == "arm"
-    for j, name in enumerate(joints):
-        drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        drive.forcerange, drive.forcelimited = (
-            [-drives.most[j], drives.most[j]],
-            mujoco.mjtLimited.mjLIMITED_TRUE,
-        )
-        if not (servo and firmware):
-            drive.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-            drive.gainprm[0], drive.biasprm[1] = drives.kp[j], -drives.kp[j]
-            drive.biasprm[2] = 0.0 if servo else -drives.kd[j]
-    for j, name in enumerate(joints if servo else ()):
-        emf = spec.add_actuator(name=f"{name}_emf", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        emf.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-        emf.gainprm[0], emf.biasprm[2] = 0.0, -drives.kd[j]
 
 
 def _curve(law: Law, runs: list[Run]) -> dict[str, Any]:
@@ -187,7 +166,7 @@ def make(
     rate_hz: float,
     folder: Path,
     fault: Fault | None = None,
-    law: str | None = None,
+    friction: str | None = None,
 ) -> None:
     """Write a set into ``folder``.
 
@@ -197,7 +176,7 @@ def make(
         rate_hz: rate of the logs.
         folder: where to write.
         fault: what is wrong with the machine beside the wrong numbers.
-        law: friction law M1, M4, M5 or M6; by the seed without.
+        friction: law M1, M4, M5 or M6; by the seed without.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -206,9 +185,9 @@ def make(
         np.random.default_rng([seed, len(kind), kind == "arm", k]) for k in range(5)
     )
     n = len(joints)
-    if law is None:
-        law = ("M1", LAWS[1 + seed // 2 % 3])[seed % 2] if kind == "leg" else LAWS[seed % 4]
-    drives, rubs = _drives(kind, rng), law_of(kind, law, rng)
+    if friction is None:
+        friction = ("M1", LAWS[1 + seed // 2 % 3])[seed % 2] if kind == "leg" else LAWS[seed % 4]
+    drives, rubs = _drives(kind, rng), law_of(kind, friction, rng)
     told = _Drives(drives.kp.copy(), drives.kd, drives.most, drives.armature, drives.told_kd)
     delay = rng.uniform(*LATE_S[kind])
     command_hz = float(rng.choice([50.0, 100.0])) if kind == "leg" else rate_hz
@@ -233,11 +212,11 @@ def make(
         hurt["joint"] = joints[harmed]
 
     _put(spec, joints, armature=drives.armature, coulomb=rubs.factor * rubs.base, viscous=rubs.viscous)
+    servo = kind == "arm"
+    law = ControlLaw(drives.kp, drives.kd, drives.most, delay, servo)
     stepped = spec.copy()
-    _actuate(stepped, kind, drives, firmware=True)
-    machine = Machine(
-        stepped.compile(), joints, rubs, delay, kind == "arm", drives.kp, drives.most, COUNTS[kind]
-    )
+    actuate(stepped, joints, law, firmware=servo)
+    machine = Machine(stepped.compile(), joints, rubs, delay, servo, drives.kp, drives.most, COUNTS[kind])
     speeds, runs = kind == "leg" and seed // 2 % 2 == 1 and rate_hz <= 200.0, []
     fine = np.arange(0.0, SECONDS + 1e-3, 1e-3)
     stamps = np.arange(round(SECONDS * rate_hz) + 1) / rate_hz
@@ -246,7 +225,7 @@ def make(
         goal = wished(kind, own, which, fine, wish)
         at = held(stamps, rate_hz, command_hz, wish)
         command = np.column_stack([np.interp(stamps, fine, goal[:, j]) for j in range(n)])[at]
-        if kind == "arm":
+        if servo:
             command = step * np.round(command / step)
         ran = run(machine, stamps, command)
         low, high = own.range.T
@@ -261,20 +240,21 @@ def make(
     curve = _curve(rubs, runs[:2])
     coulomb, viscous = _plain(rubs, curve)
     _put(spec, joints, armature=drives.armature, coulomb=coulomb, viscous=viscous)
-    _actuate(spec, kind, drives, firmware=False)
+    actuate(spec, joints, law)
     spec.compile()
     (folder / "true.xml").write_text(spec.to_xml(), encoding="utf-8")
     (folder / "model.xml").write_text(_makers(kind, drives, coulomb, viscous, maker), encoding="utf-8")
     (folder / "log.toml").write_text(_map(kind, told, speeds=speeds), encoding="utf-8")
     truth = {
-        "kind": kind, "seed": seed, "rate_hz": rate_hz, "law": law, "command_hz": command_hz,
+        "kind": kind, "seed": seed, "rate_hz": rate_hz, "law": friction, "command_hz": command_hz,
         "integrator": "RK4, 0.5 ms", "counts_per_turn": COUNTS[kind], "noise_rad": NOISE_RAD[kind],
-        "fault": fault and {"name": fault, **hurt},
+        "bus_delay_s": delay, "fault": fault and {"name": fault, **hurt},
         "joints": {
             name: {
                 "armature_kgm2": drives.armature[j], "coulomb_Nm": coulomb[j], "viscous_Nms_per_rad": viscous[j],
-                "kp": drives.kp[j], "kd": drives.kd[j], "limit_Nm": drives.most[j], "delay_s": delay,
-                "loop_delay_s": 0.5e-3 if kind == "arm" else 0.0,
+                "kp": drives.kp[j], "kd": drives.kd[j], "limit_Nm": drives.most[j],
+                "delay_s": late_at_servo(stamps, delay) if servo else delay,
+                "loop_delay_s": 0.5 * FIRMWARE_S if servo else 0.0,
                 "friction": {key: value[j] for key, value in curve.items()},
             }
             for j, name in enumerate(joints)
@@ -300,10 +280,8 @@ def _makers(
         body.mass, body.inertia = body.mass * share, np.array(body.inertia) * share
     for j, name in enumerate(joints):
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        motor.ctrlrange, motor.ctrllimited = (
-            [-drives.most[j], drives.most[j]],
-            mujoco.mjtLimited.mjLIMITED_TRUE,
-        )
+        motor.ctrlrange = [-drives.most[j], drives.most[j]]
+        motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
     spec.compile()
     return spec.to_xml()
 
