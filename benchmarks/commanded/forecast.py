@@ -75,14 +75,16 @@ def by_rollout(m: mujoco.MjModel, joints: tuple[str, ...], log: Log, delay_s: fl
     data = mujoco.MjData(m)
 
     def simulated(start: Array, first: float, rows: int) -> Array:
-        count = int(np.ceil(rows * period / STEP_S - 1e-9))
+        step = m.opt.timestep
+        count = int(np.ceil(rows * period / step - 1e-9))
+        times = step * np.arange(count + 1)
         control = np.zeros((1, count, m.nu))
-        control[0, :, : len(joints)] = arriving(log.stamps, log.command, delay_s, count, first)
+        control[0, :, : len(joints)] = arriving(log.stamps, log.command, delay_s, first + times)
         begin = np.concatenate(([0.0], start, np.zeros(m.na)))[None]
         with rollout.Rollout(nthread=1) as own:
             states, _ = own.rollout([m], [data], begin, control)
         states = np.vstack((start, states[0, :, 1 : 1 + m.nq + m.nv]))
-        times, wanted = STEP_S * np.arange(count + 1), period * np.arange(1, rows + 1)
+        wanted = period * np.arange(1, rows + 1)
         return np.column_stack([np.interp(wanted, times, x) for x in states.T])
 
     return simulated

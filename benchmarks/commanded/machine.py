@@ -79,20 +79,19 @@ class Run:
     state: Array
 
 
-def arriving(stamps: Array, commands: Array, delay_s: float | Array, count: int, begin: float) -> Array:
-    """Mean of the command in effect over each step from ``begin`` [s] on, shape (count, J).
+def arriving(stamps: Array, commands: Array, delay_s: float | Array, edges: Array) -> Array:
+    """Mean of the command in effect between ``edges`` [s], shape (len(edges) - 1, J).
 
     A command holds from its stamp plus the delay (one, or one a joint) to that of the next; the first one before, too.
     """
-    edges = begin + STEP_S * np.arange(count + 1)
     gone = np.vstack(
         (np.zeros(commands.shape[1]), np.cumsum(commands[:-1] * np.diff(stamps)[:, None], axis=0))
     )
-    out = np.empty((count, commands.shape[1]))
+    out = np.empty((len(edges) - 1, commands.shape[1]))
     for j, late in enumerate(np.broadcast_to(delay_s, commands.shape[1])):
         sent = edges - late
         at = (np.searchsorted(stamps, sent, side="right") - 1).clip(0)
-        out[:, j] = np.diff(gone[at, j] + commands[at, j] * (sent - stamps[at])) / STEP_S
+        out[:, j] = np.diff(gone[at, j] + commands[at, j] * (sent - stamps[at])) / np.diff(edges)
     return out
 
 
@@ -129,7 +128,7 @@ def run(
     if machine.servo:  # a firmware reads what has arrived
         ctrl = commands[(np.searchsorted(stamps + machine.delay_s, times + 1e-9, side="right") - 1).clip(0)]
     else:
-        ctrl = arriving(stamps, commands, machine.delay_s, count, first - settle)
+        ctrl = arriving(stamps, commands, machine.delay_s, times)
     if start is None:
         data.qpos[at] = commands[0]
     else:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -240,7 +240,8 @@ def make(
     curve = _curve(rubs, runs[:2])
     coulomb, viscous = _plain(rubs, curve)
     _put(spec, joints, armature=drives.armature, coulomb=coulomb, viscous=viscous)
-    actuate(spec, joints, law)
+    acts = drives.kd - 0.5 * FIRMWARE_S * drives.kp if servo else drives.kd  # the firmware holds for a period
+    actuate(spec, joints, replace(law, kd=acts))
     spec.compile()
     (folder / "true.xml").write_text(spec.to_xml(), encoding="utf-8")
     (folder / "model.xml").write_text(_makers(kind, drives, coulomb, viscous, maker), encoding="utf-8")
@@ -262,6 +263,7 @@ def make(
         "masses": {b.name: b.mass for b in spec.bodies[2:]},
         "friction_law": rubs.to_json(),
     }  # fmt: skip
+    (folder / "forecast.json").unlink(missing_ok=True)  # what score.py keeps of an earlier set
     (folder / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")
 
 
