@@ -176,8 +176,8 @@ def scored(folder: Path, options: Options) -> list[Scored]:
     """Physical parameters beside the truth.
 
     The gain on velocity of a servo counts as it acts: less than the back-EMF by what the firmware's period takes. If
-    the result has none, viscous friction has to make up for what the map's is off. Coulomb and viscous friction count where
-    the true friction is these two.
+    the result has none, viscous friction has to make up for what the map's is off. Coulomb and viscous friction count
+    where the true friction is these two.
     """
     truth, out = read_truth(folder), []
     _, law = told_law(folder, apart=truth["kind"] == "arm")
