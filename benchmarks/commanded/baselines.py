@@ -118,7 +118,7 @@ Found = tuple[Array, Array, float, str]
 def by_cma(problem: Problem, seconds: float) -> Found:
     """CMA-ES, which ends after so many seconds of CPU."""
     try:
-        import cma
+        import cma  # pyright: ignore[reportMissingImports]
     except ImportError:
         sys.exit("The package cma is missing: pip install cma")
     size = problem.start.size

@@ -83,7 +83,7 @@ def by_rollout(m: mujoco.MjModel, joints: tuple[str, ...], log: Log, delay_s: fl
         begin = np.concatenate(([0.0], start, np.zeros(m.na)))[None]
         with rollout.Rollout(nthread=1) as own:
             states, _ = own.rollout([m], [data], begin, control)
-        states = np.vstack((start, states[0, :, 1 : 1 + m.nq + m.nv]))
+        states = np.vstack((start, np.asarray(states)[0, :, 1 : 1 + m.nq + m.nv]))
         wanted = period * np.arange(1, rows + 1)
         return np.column_stack([np.interp(wanted, times, x) for x in states.T])
 
@@ -103,7 +103,13 @@ def by_machine(machine: Machine, log: Log) -> Simulated:
     return simulated
 
 
-def errors(m: mujoco.MjModel, joints: tuple[str, ...], simulated: Simulated, log: Log) -> dict[str, Array]:
+def errors(
+    m: mujoco.MjModel,
+    joints: tuple[str, ...],
+    simulated: Simulated,
+    log: Log,
+    windows_s: tuple[float, ...] = WINDOWS_S,
+) -> dict[str, Array]:
     """Rms of forecast minus measured position per joint [rad], by ``0.5 s``, ``1 s`` and ``whole``, shape (J,) each."""
     at, dof, adds = addresses(m, joints)
     n = len(log.stamps)
@@ -123,7 +129,7 @@ def errors(m: mujoco.MjModel, joints: tuple[str, ...], simulated: Simulated, log
 
     whole = np.vstack((hidden, simulated(begun(0, hidden), 0.0, n - 1)))
     out = {}
-    for seconds in WINDOWS_S:
+    for seconds in windows_s:
         rows, off = round(seconds / period), []
         for row in range(0, n - rows, rows):
             states = simulated(begun(row, whole[row]), row * period, rows)

@@ -192,7 +192,8 @@ def make(
     delay = rng.uniform(*LATE_S[kind])
     command_hz = float(rng.choice([50.0, 100.0])) if kind == "leg" else rate_hz
 
-    harmed, hurt, stand = int(harm.integers(n)), {}, None
+    hurt: dict[str, Any] = {}
+    harmed, stand = int(harm.integers(n)), None
     if fault == "soft_stand":
         stand = stand_of(kind, harm)
         hurt = {"stiffness": stand[:, 0].tolist(), "damping": stand[:, 1].tolist()}

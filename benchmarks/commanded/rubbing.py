@@ -7,7 +7,7 @@ servo actuators" (2024): the friction torque is whatever stops the joint, up to 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -76,10 +76,11 @@ def law_of(kind: str, name: str, rng: np.random.Generator) -> Law:
     def drawn(low: float, high: float) -> np.ndarray:
         return np.exp(rng.uniform(np.log(low), np.log(high), COUNT))
 
-    zero = np.zeros(COUNT)
     leg = kind == "leg"
     base, viscous = (drawn(0.15, 0.6), drawn(0.15, 0.3)) if leg else (drawn(0.03, 0.08), drawn(0.03, 0.08))
-    law = Law(base, *(zero.copy() for _ in range(7)), np.ones(COUNT), np.ones(COUNT), viscous, np.ones(COUNT))
+    ones = {"speed", "sharpness", "factor"}
+    law = Law(**{each.name: np.full(COUNT, float(each.name in ones)) for each in fields(Law)})
+    law.base, law.viscous = base, viscous
     if name == "M1":
         return law
     law.base = base * 0.6
