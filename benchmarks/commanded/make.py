@@ -241,7 +241,8 @@ def make(
     curve = _curve(rubs, runs[:2])
     coulomb, viscous = _plain(rubs, curve)
     _put(spec, joints, armature=drives.armature, coulomb=coulomb, viscous=viscous)
-    acts = drives.kd - 0.5 * FIRMWARE_S * drives.kp if servo else drives.kd  # the firmware holds for a period
+    # A firmware that holds for a period is half of it late; true where its limit is not reached.
+    acts = drives.kd - 0.5 * FIRMWARE_S * drives.kp if servo else drives.kd
     actuate(spec, joints, replace(law, kd=acts))
     spec.compile()
     (folder / "true.xml").write_text(spec.to_xml(), encoding="utf-8")
