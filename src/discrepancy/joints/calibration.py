@@ -38,6 +38,10 @@ as the masses."""
 DETERMINED = 0.2
 """Largest ratio of standard error and prior standard deviation of a parameter that counts as determined. Chosen: the
 logs reduce its variance 25-fold."""
+LATE_S = 0.02
+"""Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
+LEARNING = 4
+"""Steps in which the noise of closed loops is learnt, too. Chosen: the fit settles only when it is held."""
 POSES = 20
 """Poses in which inertias that joints feel are computed. Chosen."""
 PLAIN = 3.0
@@ -220,7 +224,7 @@ class Fit:
         self.given, self.mount = trials.runs[0].tree, None if self.free else mount_of(trials.runs, self.known)
         if self.mount is not None:
             self.given = replace(self.given, gravity=self.mount)
-        self.tree, self.values = self.given, dict[str, float]()
+        self.tree, self.values, self.steps = self.given, dict[str, float](), 0
         self.options = Given(
             joints=self.known, motors=self.free, back_emf=frozenset(volts if switched else ()), noise=trials.noise,
             kept=trials.kept, inertias=True,
@@ -263,7 +267,7 @@ class Fit:
                 "viscous_Nms_per_rad",
                 t.viscous[j],
                 span.torque / span.speed,
-                0.0,
+                self.loops[0].damping[j] if self.loops else 0.0,
             )
             yield _Scalar(f"{n} armature_kgm2", n, "armature_kgm2", t.armature[j], self._rotor(j), 0.0)
             if ("back_emf", n) in slabs:
@@ -271,10 +275,12 @@ class Fit:
                     f"{n} braking", n, "braking_Nms_per_rad", 0.0, span.torque / span.speed, 0.0, False
                 )
             yield _Scalar(f"{n} offset_Nm", n, "offset_Nm", 0.0, span.torque, in_model=False)
-            gain = FREE_GAIN if j in self.free else GAIN
-            if len(self.known) > 1 or j in self.free:
+            rough = max((loop.signals.log.drive.gain_within[j, 0] for loop in self.loops), default=1.0)
+            gain = FREE_GAIN if j in self.free or rough > 1.0 else GAIN
+            if len(self.known) > 1 or gain == FREE_GAIN:
                 yield _Scalar(f"{n} scale", n, "gain", 0.0, gain, in_model=False)
-            yield _Scalar(f"{n} delay_s", n, "delay_s", 0.0, DELAY_S, in_model=False)
+            late = LATE_S if self.loops else DELAY_S
+            yield _Scalar(f"{n} delay_s", n, "delay_s", 0.0, late, in_model=False)
         for j, n in enumerate(self.model.joints):
             if j:
                 yield _Scalar(f"{n} zero", n, "zero_rad", 0.0, ZERO_RAD)
@@ -366,7 +372,8 @@ class Fit:
                 for j, own in self.problem.series[i].items():
                     lacking[:, j] -= value * own[t]
             loop.move(filtered, lacking)
-            loop.learn(filtered, lacking)
+            if self.steps < LEARNING:
+                loop.learn(filtered, lacking)
 
     def _columns(self) -> NDArray[np.intp]:
         """Columns of the problem that are fitted, in the order of ``x``."""
@@ -398,6 +405,7 @@ class Fit:
         self.x = found
         if self.loops:
             self._settle()
+        self.steps += 1
         self.jump(self.x)
         return float(np.max(np.abs(way)))
 

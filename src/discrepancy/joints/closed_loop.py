@@ -100,6 +100,13 @@ class ClosedLoop:
         )  # fmt: skip
 
     @property
+    def damping(self) -> Array:
+        """Least viscous friction, shape (J,): less than none where the loop's velocity gain may be less than told."""
+        d = self.signals.log.drive
+        told, within = np.nan_to_num(d.velocity_gain), d.gain_within[:, 1]
+        return -told * (1.0 - 1.0 / within)
+
+    @property
     def least(self) -> Array:
         """Least variance of the readings: that of their rounding, shape (J,)."""
         return self.signals.log.position_step**2 / 12.0 + LEAST_RAD**2

@@ -53,7 +53,7 @@ def _by_loop(log: JointLog) -> Array:
     velocity = differentiate(smooth, log.rate_hz)
     if log.dq is not None:
         velocity = np.where(np.isfinite(log.dq), log.dq, velocity)
-    damping = np.where(drive.gain_free[:, 1], np.nan, np.nan_to_num(drive.velocity_gain))
+    damping = np.nan_to_num(drive.velocity_gain)  # a free one counts as viscous friction
     wanted = 0.0 if drive.command_velocity is None else np.nan_to_num(_late(log, drive.command_velocity))
     added = 0.0 if drive.feedforward is None else np.nan_to_num(_late(log, drive.feedforward))
     return drive.position_gain * (_late(log, log.command) - log.q) + damping * (wanted - velocity) + added
