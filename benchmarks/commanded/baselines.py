@@ -69,7 +69,7 @@ class Problem:
     def read(cls, folder: Path, *, masses: bool) -> Problem:
         """The problem of a set."""
         servo = score.read_truth(folder)["kind"] == "arm"
-        joints, told = told_law(folder, apart=servo)
+        joints, told = told_law(folder)
         law = replace(told, kd=np.zeros(len(joints))) if servo else told
         spec = mujoco.MjSpec.from_file(str(folder / "model.xml"))
         spec.option.timestep, spec.option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_RK4

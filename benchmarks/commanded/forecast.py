@@ -6,7 +6,7 @@ encoder sees, such as a stand, begins where the same model is at that time of a 
 
 from __future__ import annotations
 
-import tomllib
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,12 +49,11 @@ def read_log(path: Path, joints: tuple[str, ...]) -> Log:
     return Log(table["time_s"], q, command)
 
 
-def told_law(folder: Path, *, apart: bool) -> tuple[tuple[str, ...], ControlLaw]:
-    """Joints and the control law that the map tells."""
-    told = tomllib.loads((folder / "log.toml").read_text(encoding="utf-8"))
-    control = told["control"]
-    numbers = (np.array(control[n], float) for n in ("position_gain", "velocity_gain", "limit"))
-    return tuple(told["joints"]), ControlLaw(*numbers, apart=apart)
+def told_law(folder: Path) -> tuple[tuple[str, ...], ControlLaw]:
+    """Joints and the control law that the map of a set has when it is written."""
+    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    numbers = (np.array(truth["told"][name], float) for name in ("kp", "kd", "limit"))
+    return tuple(truth["joints"]), ControlLaw(*numbers, apart=truth["kind"] == "arm")
 
 
 def compiled(path: Path, joints: tuple[str, ...], law: ControlLaw | None) -> mujoco.MjModel:

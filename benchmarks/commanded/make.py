@@ -262,6 +262,7 @@ def make(
             }
             for j, name in enumerate(joints)
         },
+        "told": {"kp": told.kp.tolist(), "kd": told.told_kd.tolist(), "limit": told.most.tolist()},
         "masses": {b.name: b.mass for b in spec.bodies[2:]},
         "friction_law": rubs.to_json(),
     }  # fmt: skip

@@ -123,8 +123,8 @@ def _found(parameters: dict[tuple[str, str], dict[str, Any]], joint: str, stem: 
 
 def control_of(folder: Path, options: Options) -> ControlLaw:
     """The control law of a fit: that of the map, with what the result or the file of the control law has instead."""
-    truth = read_truth(folder)
-    joints, law = told_law(folder, apart=truth["kind"] == "arm")
+    read_truth(folder)
+    joints, law = told_law(folder)
     found = parameters_of(options.result)
     numbers = {"kp": law.kp.copy(), "kd": law.kd.copy(), "delay_s": np.zeros(len(joints))}
     for j, joint in enumerate(joints):
@@ -141,7 +141,7 @@ def control_of(folder: Path, options: Options) -> ControlLaw:
 def forecasts(folder: Path, options: Options) -> dict[str, dict[str, Array]]:
     """Rms of forecast minus measured position per joint [rad], by model and window; the set keeps its own."""
     truth = read_truth(folder)
-    joints, law = told_law(folder, apart=truth["kind"] == "arm")
+    joints, law = told_law(folder)
     log = read_log(folder / "held_out.csv", joints)
 
     def by(path: Path, control: ControlLaw | None, delay: float | Array) -> dict[str, Array]:
@@ -180,7 +180,7 @@ def scored(folder: Path, options: Options) -> list[Scored]:
     where the true friction is these two.
     """
     truth, out = read_truth(folder), []
-    _, law = told_law(folder, apart=truth["kind"] == "arm")
+    _, law = told_law(folder)
     parameters, plain = parameters_of(options.result), truth["law"] == "M1"
     acts = _each(truth, "kd") - _each(truth, "kp") * _each(truth, "loop_delay_s")
     for j, (joint, own) in enumerate(truth["joints"].items()):
