@@ -85,7 +85,7 @@ _DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
     "flag": ("flags", "flag", "flag"),
 }
 """Plural, and dimension for a turning and for a sliding joint."""
-_COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
+COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
 _PLACEHOLDERS = ("joint", "number", "index")
 _OPTIONAL = ("version", "time", "csv", "defaults", "drive", "control", "joint", "log")
 _DRIVE = ("gear", "zero", "torque_constant")
@@ -325,7 +325,7 @@ def _joint_channel(
     name: str, fields: Fields, placeholders: Sequence[str], slides: bool, command: str
 ) -> ChannelMap:
     quantity = QUANTITIES[name]
-    kind: Kind = _COMMAND_KINDS.get(command, "position") if name in COMMANDS else quantity.kind
+    kind: Kind = COMMAND_KINDS.get(command, "position") if name in COMMANDS else quantity.kind
     if "unit" not in fields:
         raise InputError(
             f"{fields.where}: missing key 'unit'; it is one of {', '.join(units_of(kind, slides=slides))}"
@@ -371,7 +371,7 @@ def _check_together(channels: Channels, control: Control, where: str) -> None:
         raise InputError(
             f"{where}: control: command is 'duty', whose channel is duty or motor_voltage, not {next(iter(commands))}"
         )
-    if control.command in _COMMAND_KINDS and not commands:
+    if control.command in COMMAND_KINDS and not commands:
         raise InputError(
             f"{where}: control: command is {control.command!r}, but there is no channel command or motor_command"
         )
@@ -394,25 +394,20 @@ def _number(value: Any) -> float | None:
     return float(value) if is_number(value) else None
 
 
-def _nonzero(value: Any) -> float | None:
-    return _number(value) or None
-
-
 def _positive(value: Any) -> float | None:
     number = _number(value)
     return number if number is not None and number > 0 else None
 
 
-def _constant(value: Any) -> float | None:
-    return _UNKNOWN if value == "free" else _positive(value)
-
-
 _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
-    "gear": (1.0, _nonzero, "a number of motor turns per joint turn, not 0"),
+    "gear": (1.0, lambda value: _number(value) or None, "a number of motor turns per joint turn, not 0"),
     "zero": (0.0, _number, "a finite number"),
-    "torque_constant": (1.0, _constant, 'a positive number of newton metres per ampere, or "free"'),
+    "torque_constant": (
+        1.0, lambda value: _UNKNOWN if value == "free" else _positive(value),
+        'a positive number of newton metres per ampere, or "free"',
+    ),
     **dict.fromkeys(_GAIN, (_UNKNOWN, _positive, "a positive number")),
-}
+}  # fmt: skip
 """By key of a joint: default, converter (None refuses the value), and description of allowed values."""
 
 
