@@ -72,7 +72,7 @@ from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.survey import Timing
 from mocobot_inspect.team import Inspection, differs
 from mocobot_inspect.team_wiring import Misfit, Wiring
-from mocobot_logs.joints.joint_map import COMMANDS, QUANTITIES
+from mocobot_logs.joints.joint_map import COMMAND_KINDS, COMMANDS, QUANTITIES
 from mocobot_logs.resample import MAX_GAP_S, MOST_MISSING
 
 _HIDDEN = 6
@@ -87,7 +87,6 @@ _JOINT_UNITS = {
     "flag": ("", ""),
 }
 """Units of a turning and of a sliding joint, by the quantity's kind."""
-_COMMAND_KINDS = {"position": "position", "velocity": "velocity", "torque": "effort"}
 
 
 # Text
@@ -252,7 +251,7 @@ def _joint_lines(found: JointInspection) -> Iterator[str]:
 def _joint_unit(found: JointInspection, quantity: str, joint: str) -> str:
     kind, robot = QUANTITIES[quantity].kind, found.robot
     if quantity in COMMANDS:
-        kind = _COMMAND_KINDS.get(found.log_map.control.command, kind)
+        kind = COMMAND_KINDS.get(found.log_map.control.command, kind)
     slides = bool(joint) and bool(robot.slides[robot.joints.index(joint)]) and not QUANTITIES[quantity].motor
     return _JOINT_UNITS[kind][slides]
 

@@ -18,6 +18,7 @@ from discrepancy.evidence.search import floor_of
 from discrepancy.joints.causes import parameter_name
 from discrepancy.joints.closed_loop import ClosedLoop, commanded
 from discrepancy.joints.diagnose import in_parts
+from discrepancy.joints.forecast import WINDOW_S, errors, machine
 from discrepancy.joints.link_prior import CENTRAL, LinkPrior, central, fitted_links, welded
 from discrepancy.joints.mechanics import Tree, inertial_parameters, moments_matrix, rigid_torque, torque_of
 from discrepancy.joints.model import SerialModel
@@ -347,8 +348,7 @@ class Fit:
 
     def _see(self) -> None:
         """Take the present motion of the closed loops as the trials' signals."""
-        late, scale = (np.array([self.values.get(f"{n} {what}", 0.0) for n in self.model.joints]) for what in (
-            "delay_s", "scale"))  # fmt: skip
+        late, scale = (self._each(what) for what in ("delay_s", "scale"))
         runs = tuple(loop.seen(self.model, late) for loop in self.loops)
         self.options = replace(self.options, noise=None, kept=(), loops=[
             (loop, loop.filtered(s, self.tree, scale, np.maximum(self.tree.coulomb, 0.05 * np.sqrt(np.mean(s.torque**2, axis=0))), REST * s.slow))
@@ -362,10 +362,6 @@ class Fit:
 
     def _settle(self) -> None:
         """Learn the torques that nothing explains, and move the motions to their likeliest course."""
-        x = np.zeros(len(self.active))
-        x[self.fit] = self.x - self.at
-        squares = [np.mean(np.square(s.residual - s.columns @ x), axis=0) for s in self.series]
-        print("settle", np.round(np.mean(squares, axis=0),3), [(np.sqrt(l.torque),np.sqrt(l.reading),np.sqrt(l.jitter)) for l in self.loops][0])
         for t, (loop, filtered) in enumerate(self.options.loops):
             lacking = self.problem.residual[t].copy()
             for i, value in zip(self._columns(), self.x - self.at, strict=True):
@@ -630,8 +626,44 @@ class Fit:
             if len(terms) > 1 and se < DETERMINED * np.sqrt(way @ prior @ way):
                 yield Combination(terms, float(way @ given), float(way @ value), se)
 
-    def held_out(self) -> tuple[HeldOut, ...]:
+    def forecasts(self, tick: Callable[[], object] = lambda: None) -> tuple[HeldOut, ...]:
+        """Forecast the positions of each part from its commands, with values from the others."""
+        parts, out, before = range(len(self.normals)), [], self.x
+        still = np.zeros(len(self.model.joints))
+        plain = machine(self.model, self.given, self.given)
+        for t in parts:
+            k, steps = self.trials.parts[t]
+            loop = self.loops[k]
+            self.jump(self.solved([o for o in parts if o != t] or [t])[0])
+            scale, late = (self._each(what) for what in ("scale", "delay_s"))
+            fitted = machine(self.model, self.given, self.numbers())
+            braking = np.minimum(self.tree.viscous, 0.0)
+            own = steps, WINDOW_S, tick
+            sides = (
+                errors(plain, self.model, loop, still, still, still, still + 1.0, *own),
+                errors(fitted, self.model, loop, braking, self.zero(), late, 1.0 / (1.0 + scale), *own),
+            )
+            model, best = (np.sqrt(np.nanmean(off**2, axis=0)) for off in sides)
+            rows = slice(steps.start // loop.every, steps.stop // loop.every)
+            size = np.nanstd(loop.measured[rows], axis=0)
+            out.append(HeldOut(self.trials.names[t], model, still * np.nan, best, np.sqrt(loop.reading), size))
+        self.jump(before)
+        return tuple(out)
+
+    def numbers(self) -> Tree:
+        """The tree with the fitted lengths and gravity, too."""
+        return replace(self.problem.parts[0].tree, **{
+            name: getattr(self.tree, name) for name in ("mass", "com", "inertia", "armature", "coulomb", "viscous")
+        })  # fmt: skip
+
+    def _each(self, what: str) -> Array:
+        """A value of the linearisation point for every joint, shape (J,)."""
+        return np.array([self.values.get(f"{n} {what}", 0.0) for n in self.model.joints])
+
+    def held_out(self, tick: Callable[[], object] = lambda: None) -> tuple[HeldOut, ...]:
         """Predict each part from the others, with values linearised around those of all parts."""
+        if self.loops:
+            return self.forecasts(tick)
         out, parts = [], range(len(self.normals))
         nothing = self.given_x - self.at
         for t in parts:

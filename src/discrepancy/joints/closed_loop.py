@@ -132,9 +132,11 @@ class ClosedLoop:
         q, dq, ddq = self.middle
         log, h = self.signals.log, self.step_s
         time = log.time[self.first] + (np.arange(len(q)) + 0.5) * h
-        command, before, after = (self._command(late + d) for d in (0.0, -DELAY_STEP_S, DELAY_STEP_S))
-        kp, kd, limit, on = self._gains(len(q))
-        asked = kp * (command - q) - kd * dq + self._added(late)
+        (command, added), (before, _), (after, _) = (
+            self.told(late + d) for d in (0.0, -DELAY_STEP_S, DELAY_STEP_S)
+        )
+        kp, kd, limit, on = self.gains(len(q))
+        asked = kp * (command - q) - kd * dq + added
         torque = np.clip(asked, -limit, limit) * on
         free = (np.abs(asked) < limit) * on
         by_delay = -free * kp * (after - before) / (2.0 * DELAY_STEP_S)
@@ -144,7 +146,8 @@ class ClosedLoop:
             inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, enabled=None, spoilt=None,
         )  # fmt: skip
 
-    def _gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
+    def gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
+        """Gains on position and velocity, largest torque, shape (J,) each, and whether the drives are on, (N, 1)."""
         log = self.signals.log
         d = log.drive
         on = np.ones((steps, 1))
@@ -153,17 +156,15 @@ class ClosedLoop:
         limit = np.where(np.isnan(d.limit), np.inf, d.limit)
         return d.position_gain, np.nan_to_num(d.velocity_gain), limit, on
 
-    def _added(self, late: Array) -> Array | float:
-        """Torque that the loop gets beside the error of position, shape (N, J)."""
-        d, out = self.signals.log.drive, 0.0
+    def told(self, late: Array) -> tuple[Array, Array]:
+        """Commanded positions and torques beside them, means over each step, shape (N, J) each."""
+        log, d = self.signals.log, self.signals.log.drive
+        assert log.command is not None
+        added = np.zeros((len(self.q) - 1, len(late)))
         for told, factor in ((d.feedforward, 1.0), (d.command_velocity, np.nan_to_num(d.velocity_gain))):
             if told is not None:
-                out = out + factor * self._mean(np.nan_to_num(told), late)
-        return out
-
-    def _command(self, late: Array) -> Array:
-        assert self.signals.log.command is not None
-        return self._mean(self.signals.log.command, late)
+                added += factor * self._mean(np.nan_to_num(told), late)
+        return self._mean(log.command, late), added
 
     def _mean(self, told: Array, late: Array) -> Array:
         """Mean over each step of what a drive was told, held from sample to sample or interpolated, shape (N, J)."""
@@ -193,7 +194,7 @@ class ClosedLoop:
             slow: speed below which a joint may rest, shape (J,).
         """
         h, J, N = self.step_s, len(scale), len(s.time)
-        kp, kd, limit, on = self._gains(N)
+        kp, kd, limit, on = self.gains(N)
         free = (np.abs(s.torque) < limit) * on
         thin = max(1, round(s.rate_hz / MATRICES_HZ))
         at = np.arange(0, N, thin)

@@ -163,11 +163,9 @@ def _trials(trials: Sequence[CalibratedTrial]) -> list[str]:
 def _fit(pair: tuple[float, float] | None, count: tuple[int, int]) -> str:
     if pair is None:
         return "-"
-    return " / ".join(_short(value) if n else "-" for value, n in zip(pair, count, strict=True))
-
-
-def _short(value: float) -> str:
-    return f"{value:.2f}" if value < 100 else f"{value:.0f}"
+    return " / ".join(
+        f"{value:.{2 * (value < 100)}f}" if n else "-" for value, n in zip(pair, count, strict=True)
+    )
 
 
 _HEAD = """\

@@ -181,7 +181,9 @@ class PayloadEstimate:
                 "distance_se_m": self.p_1c_distance_se_m,
                 "covariance_m2": self.p_1c_covariance.tolist(),
             }
-        more: dict[str, Any] = {} if self.units is None else {"calibrated": _calibrated(self.units)}
+        more: dict[str, Any] = {}
+        if (units := self.units) is not None:
+            more["calibrated"] = {"design": units.design.to_dict(), "units": units_to_list(units)}
         if self.open:
             more["open"] = list(self.open)
         if self.zero_sd_rad:
@@ -237,10 +239,6 @@ class PayloadEstimate:
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"not a complete estimate ({type(error).__name__}: {error})") from error
-
-
-def _calibrated(units: ArmUnit) -> dict[str, Any]:
-    return {"design": units.design.to_dict(), "units": units_to_list(units)}
 
 
 def _units(values: dict[str, Any]) -> ArmUnit:

@@ -72,7 +72,8 @@ def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
     check_lifted(mass)
     within = [_mean_covariance(vertical_force(hold.R_bi, hold.batches)[:, None]) for hold in holds]
     residual = vertical - vertical.mean()
-    between = _between(residual @ residual, len(holds) - 1, float(np.mean(within)))
+    dof = len(holds) - 1
+    between = max(0.0, residual @ residual / dof - float(np.mean(within))) if dof else 0.0
     se = np.sqrt(np.mean(within) + between) / np.sqrt(len(holds)) / gravity_mps2
     return MassEstimate(mass, max(float(se), rounding_kg(holds, gravity_mps2)), rms(residual))
 
@@ -253,10 +254,6 @@ def _mean_covariance(batches: Array) -> Array:
     """Return the covariance of the mean of independent batches (B, K), shape (K, K)."""
     centred = batches - batches.mean(axis=0)
     return centred.T @ centred / (len(batches) * (len(batches) - 1))
-
-
-def _between(rss: float, dof: int, within: float) -> float:
-    return max(0.0, rss / dof - within) if dof else 0.0
 
 
 def _tilt_noise(holds: Sequence[Hold], grasps: GraspEstimate) -> float:

@@ -91,7 +91,7 @@ _DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
 """Plural, and dimension for a turning and for a sliding joint."""
 BETWEEN = ("held", "interpolated")
 """What the robot does between two commands."""
-_COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
+COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
 _PLACEHOLDERS = ("joint", "number", "index")
 _OPTIONAL = ("version", "time", "csv", "defaults", "drive", "control", "joint", "log")
 _DRIVE = ("gear", "zero", "torque_constant")
@@ -343,7 +343,7 @@ def _joint_channel(
     name: str, fields: Fields, placeholders: Sequence[str], slides: bool, command: str
 ) -> ChannelMap:
     quantity = QUANTITIES[name]
-    kind: Kind = _COMMAND_KINDS.get(command, "position") if name in COMMANDS else quantity.kind
+    kind: Kind = COMMAND_KINDS.get(command, "position") if name in COMMANDS else quantity.kind
     if "unit" not in fields:
         raise InputError(
             f"{fields.where}: missing key 'unit'; it is one of {', '.join(units_of(kind, slides=slides))}"
@@ -389,7 +389,7 @@ def _check_together(channels: Channels, control: Control, where: str) -> None:
         raise InputError(
             f"{where}: control: command is 'duty', whose channel is duty or motor_voltage, not {next(iter(commands))}"
         )
-    if control.command in _COMMAND_KINDS and not commands:
+    if control.command in COMMAND_KINDS and not commands:
         raise InputError(
             f"{where}: control: command is {control.command!r}, but there is no channel command or motor_command"
         )
@@ -418,25 +418,9 @@ def _number(value: Any) -> float | None:
     return float(value) if is_number(value) else None
 
 
-def _nonzero(value: Any) -> float | None:
-    return _number(value) or None
-
-
 def _positive(value: Any) -> float | None:
     number = _number(value)
     return number if number is not None and number > 0 else None
-
-
-def _constant(value: Any) -> float | None:
-    return _UNKNOWN if value == "free" else _positive(value)
-
-
-def _gain(value: Any) -> float | None:
-    return np.inf if value == "free" else _positive(value)
-
-
-def _damping(value: Any) -> float | None:
-    return np.inf if value == "free" else _not_negative(value)
 
 
 def _factor(value: Any) -> float | None:
@@ -450,19 +434,24 @@ def _not_negative(value: Any) -> float | None:
 
 
 _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
-    "gear": (1.0, _nonzero, "a number of motor turns per joint turn, not 0"),
+    "gear": (1.0, lambda value: _number(value) or None, "a number of motor turns per joint turn, not 0"),
     "zero": (0.0, _number, "a finite number"),
-    "torque_constant": (1.0, _constant, 'a positive number of newton metres per ampere, or "free"'),
-    "position_gain": (_UNKNOWN, _gain, 'a positive number, or "free" where the loop has an unknown one'),
+    "torque_constant": (
+        1.0, lambda value: _UNKNOWN if value == "free" else _positive(value),
+        'a positive number of newton metres per ampere, or "free"',
+    ),
+    "position_gain": (
+        _UNKNOWN, lambda value: np.inf if value == "free" else _positive(value),
+        'a positive number, or "free" where the loop has an unknown one',
+    ),
     "velocity_gain": (
-        _UNKNOWN,
-        _damping,
+        _UNKNOWN, lambda value: np.inf if value == "free" else _not_negative(value),
         'a number, not negative, or "free" where the loop has an unknown one',
     ),
     "limit": (_UNKNOWN, _positive, "a positive number"),
     "gain_known_within": (1.0, _factor, "a factor of at least 1, such as 2 for half to twice the gain"),
     "delay_s": (_UNKNOWN, _not_negative, "a number of seconds, not negative"),
-}
+}  # fmt: skip
 """By key of a joint: default, converter (None refuses the value), and description of allowed values."""
 
 

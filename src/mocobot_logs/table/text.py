@@ -343,7 +343,7 @@ class CsvTable(Table):
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             numbers = [int(column) for column, kind in types.items() if kind == pa.float64()]
             self._refuse_first_fault(numbers, rows)
-            raise InputError(f"{self.name}: {_plain(error)}") from error
+            raise InputError(f"{self.name}: cannot be read as CSV ({detail_of(error)!r})") from error
 
     def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
         """Parse some columns of whole lines.
@@ -508,7 +508,3 @@ def _is_cell(cell: str, decimal: str) -> bool:
 
 def _is_number(cell: str, decimal: str) -> bool:
     return _NUMBER.fullmatch(cell.replace(decimal, "\0").replace(".", "?").replace("\0", ".")) is not None
-
-
-def _plain(error: Exception) -> str:
-    return f"cannot be read as CSV ({detail_of(error)!r})"

@@ -1,0 +1,99 @@
+"""Forecast positions from commands alone: MuJoCo simulates the robot and its position loops from a known state."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+
+# mujoco's compiled modules come without types.
+# pyright: reportAttributeAccessIssue=false
+import mujoco
+import numpy as np
+
+from discrepancy.joints.closed_loop import ClosedLoop
+from discrepancy.joints.mechanics import Tree
+from discrepancy.joints.model import SerialModel
+from estimator.arrays import Array
+from mocobot_sim.serial.mjcf import SOLIMP, SOLREF
+
+STEP_S = 1e-3
+"""Longest integration step [s]. Chosen: a thirtieth of the fastest loop's period."""
+WINDOW_S = 1.0
+"""Length of a forecast [s]."""
+LOST = 3.0
+"""Error at which a forecast is lost [rad or m]; it counts with that error from there on. Chosen: half a turn."""
+
+
+def machine(model: SerialModel, given: Tree, found: Tree) -> mujoco.MjModel:
+    """The compiled model with the numbers of another tree, ready to be driven by torques; negative damping is left out.
+
+    Args:
+        model: the robot as described.
+        given: its kinematic tree.
+        found: the same with other numbers.
+    """
+    m = copy.copy(model.model)
+    m.body_mass[:], m.body_ipos[:], m.body_pos[:] = found.mass, found.com, found.position
+    changed = np.flatnonzero((found.inertia != given.inertia).any(axis=(1, 2)))
+    for b in changed:
+        size, axes = np.linalg.eigh(found.inertia[b])
+        axes[:, 0] *= np.sign(np.linalg.det(axes))
+        m.body_inertia[b] = np.maximum(size, 0.0)
+        mujoco.mju_mat2Quat(m.body_iquat[b], axes.ravel())
+    own = m.jnt_dofadr[model.coupling.own]
+    m.dof_armature[own] += found.armature - given.armature
+    m.dof_frictionloss[own] += found.coulomb - given.coulomb
+    m.dof_damping[own] += np.maximum(found.viscous, 0.0) - given.viscous
+    off = mujoco.mjtDisableBit
+    for bit in (off.mjDSBL_CONTACT, off.mjDSBL_LIMIT, off.mjDSBL_ACTUATION, off.mjDSBL_AUTORESET):
+        m.opt.disableflags |= int(bit)
+    m.opt.integrator, m.opt.gravity = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST), found.gravity
+    m.dof_solref[:], m.dof_solimp[:] = SOLREF, SOLIMP
+    mujoco.mj_setConst(m, mujoco.MjData(m))
+    return m
+
+
+def errors(
+    m: mujoco.MjModel, model: SerialModel, loop: ClosedLoop, braking: Array, zero: Array, late: Array, gain: Array,
+    steps: slice, window_s: float = WINDOW_S, tick: Callable[[], object] = lambda: None,
+) -> Array:  # fmt: skip
+    """Forecast minus measured positions in consecutive windows, shape (M, J); NaN where none was measured.
+
+    Args:
+        m: result of ``machine``.
+        model: the robot as described.
+        loop: the log with its estimated motion, from which every window starts.
+        braking: damping that the loop has beside its velocity gain, shape (J,).
+        zero, late, gain: joint zeros, delays of the commands [s] and factors of the loops' gains, shape (J,).
+        steps: steps of the grid to forecast.
+        window_s: length of a window [s].
+        tick: called once for every window.
+    """
+    h, data, own = loop.step_s, mujoco.MjData(m), model.coupling.own
+    dof, every = m.jnt_dofadr[own], max(1, int(np.ceil(loop.step_s / STEP_S - 1e-9)))
+    m.opt.timestep = h / every
+    kp, kd, limit, on = loop.gains(len(loop.q) - 1)
+    kp, kd = gain * kp, gain * kd + braking
+    told = loop.told(late)
+    out = np.full(loop.measured.shape, np.nan)
+    long = max(loop.every, round(window_s / h / loop.every) * loop.every)
+    begin = -(-steps.start // loop.every) * loop.every
+    for first in range(begin, steps.stop - loop.every + 1, long):
+        tick()
+        mujoco.mj_resetData(m, data)
+        q, dq = model.coupling.all(loop.q[first] + zero, loop.dq[first])
+        data.qpos[:], data.qvel[:] = q, dq
+        lost = False
+        for n in range(first, min(first + long, steps.stop)):
+            for _ in range(every):
+                if lost:
+                    break
+                at, rate = data.qpos[own] - zero, data.qvel[dof]
+                torque = np.clip(kp * (told[0][n] - at) + gain * told[1][n] - kd * rate, -limit, limit) * on[n]
+                data.qfrc_applied[dof] = torque
+                mujoco.mj_step(m, data)
+                lost = not np.abs(data.qpos[own] - loop.q[n]).max() < LOST
+            if (n + 1) % loop.every == 0:
+                row = (n + 1) // loop.every
+                out[row] = LOST if lost else data.qpos[own] - zero - loop.measured[row]
+    return np.where(np.isnan(loop.measured), np.nan, out)
