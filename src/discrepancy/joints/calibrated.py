@@ -9,8 +9,11 @@ parameters          list of {place, parameter, model, value, se, prior_se, deter
                     names, ``in_model`` is false for errors of the log, ``prior_se`` is the error before the logs
 combinations        list of {terms, model, value, se}: what the logs determine where they do not determine each
                     parameter; terms are lists of {place, parameter, factor}, inertial ones about the link's frame
-held_out            {joint: {model, least_squares, calibrated, noise, torque}}: rms of the torque that predictions from
-                    other parts leave, of the noise and of the torque [N m or N]
+predicts            torque, or position where commands alone tell the drives
+held_out            {joint: {model, least_squares, calibrated, noise, torque}}: rms of what predictions from other parts
+                    leave, of the noise and of the torque [N m or N]. Of positions: of forecasts over one second from
+                    commands alone, of the readings' noise, and standard deviation of the position [rad or m];
+                    least_squares is null
 validated           false if the only part was predicted from itself
 notes               sentences
 """
@@ -44,21 +47,22 @@ from mocobot_logs.joints.joint_log import Drive
 from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import put, take_along
-from mocobot_sim.serial.mjcf import keep_inertials, real_inertia, set_inertial, with_effects
+from mocobot_sim.serial.mjcf import keep_inertials, real_inertia, servo, set_inertial, with_effects
 
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
 KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
+OPTIONAL = "provenance", "predicts"
 PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
-    "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "zero": "zero",
+    "offset": "torque offset", "gain": "torque gain", "delay": "delay", "zero": "zero",
     "position": "frame position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
     "com": "centre of mass", "inertia": "inertia",
 }  # fmt: skip
 UNITS = {
-    "Nms_per_rad": "N m s/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
+    "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "N_per_m": "N/m", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
     "N": "N", "s": "s",
 }  # fmt: skip
 QUANTITY = {"parameter": (
@@ -98,8 +102,10 @@ def to_dict(found: ArmCalibration) -> dict[str, Any]:
             }
             for c in found.combinations
         ],
+        "predicts": found.predicts,
         "held_out": {
-            found.model.joints[j]: {n: _mean(found.held_out, n, j) for n in HELD_OUT} for j in found.joints
+            found.model.joints[j]: {n: None if np.isnan(x := _mean(found.held_out, n, j)) else x for n in HELD_OUT}
+            for j in found.joints
         },
         "validated": found.validated,
         "notes": list(found.notes),
@@ -120,6 +126,13 @@ def to_text(found: ArmCalibration) -> str:
 def gain(found: ArmCalibration) -> str:
     """Sentence on what the model predicts of data that it was not fitted to."""
     shares = {n: _share(found, n) for n in HELD_OUT[:4]}
+    if found.predicts == "position":
+        whose = "logs that were not fitted" if found.validated else "the log that was fitted (one part only)"
+        return (
+            f"Forecasts of one second from commands alone err by {_percent(shares['calibrated'])} of the motion with "
+            f"the calibrated model and by {_percent(shares['model'])} with the given one, in {whose}. The readings' "
+            f"noise is about {_percent(shares['noise'])}."
+        )
     which = (
         "torques of parts that were not fitted"
         if found.validated
@@ -140,12 +153,7 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
     yield f"The logs determine {told} of {len(found.parameters)} parameters{both}."
     yield from findings(found)
     yield ""
-    yield f" {'rms torque':<24}{'measured':>10}{'model':>10}{'least sq.':>10}{'calibrated':>12}{'noise':>10}"
-    for j in found.joints:
-        unit = "N" if found.model.slides[j] else "N m"
-        numbers = [_mean(found.held_out, n, j) for n in ("torque", *HELD_OUT[:4])]
-        cells = "".join(f"{x:>{12 if k == 3 else 10}.3g}" for k, x in enumerate(numbers))
-        yield f" {f'{found.model.joints[j]} [{unit}]':<24.24}{cells}"
+    yield from _left(found)
     for title, wanted in (
         ("Determined, in the model (clearest change first)", True),
         ("Determined, of the log", False),
@@ -181,6 +189,27 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
         yield from found.notes
 
 
+def _left(found: ArmCalibration) -> Iterator[str]:
+    """Table of what predictions leave."""
+    names = ("torque", *(n for n in HELD_OUT[:4] if n != "least_squares" or found.predicts == "torque"))
+    what, first = (
+        ("rms torque", "measured") if found.predicts == "torque" else ("rms error over 1 s", "motion")
+    )
+    heads = {"torque": first, "model": "model", "least_squares": "least sq."}
+    yield f" {what:<24}" + "".join(f"{heads.get(n, n):>12}" for n in names)
+    for j in found.joints:
+        cells = "".join(
+            f"{1e3 ** (found.predicts == 'position') * _mean(found.held_out, n, j):>12.3g}" for n in names
+        )
+        yield f" {f'{found.model.joints[j]} [{unit_of(found, j)}]':<24.24}{cells}"
+
+
+def unit_of(found: ArmCalibration, joint: int) -> str:
+    """Unit of what the table of predictions shows of a joint: N m, N, mrad or mm."""
+    units = ("N m", "N") if found.predicts == "torque" else ("mrad", "mm")
+    return units[int(found.model.slides[joint])]
+
+
 def findings(found: ArmCalibration) -> tuple[str, ...]:
     """Sentences on what casts doubt on the numbers."""
     out = []
@@ -189,7 +218,7 @@ def findings(found: ArmCalibration) -> tuple[str, ...]:
         out.append(
             "It predicts worse than the given model: do not use it. Longer logs in more poses may mend that."
         )
-    if share["calibrated"] > MISFIT * share["noise"]:
+    if found.predicts == "torque" and share["calibrated"] > MISFIT * share["noise"]:
         out.append(
             "Much more than noise is left, so something else acts, too; `mocobot diagnose` looks for it."
         )
@@ -222,6 +251,8 @@ def described(name: str) -> tuple[str, str, float]:
     if stem == "gain":
         return f"{WORDS[stem]} error", "%", 100.0
     suffix = next(s for s in UNITS if name.endswith(f"_{s}"))
+    if name.startswith("position_gain_"):
+        return "position gain", UNITS[suffix], 1.0
     words, middle = WORDS[stem], rest.removesuffix(suffix).strip("_").replace("_", " ")
     unit, scale = SMALL.get(UNITS[suffix], (UNITS[suffix], 1.0))
     middle = WORDS.get(middle, middle)
@@ -279,7 +310,7 @@ def effects_of(found: ArmCalibration) -> list[RobotEffect]:
             viscous = next(
                 q for q in found.parameters if q.place == p.place and q.name.startswith("viscous_")
             )
-            numbers = {p.name: change, viscous.name: viscous.value - viscous.model}
+            numbers = {p.name: change, viscous.name: max(viscous.value, 0.0) - viscous.model}
             out.append(RobotEffect("friction", j, None, numbers, ""))
         elif p.name.startswith("armature_"):
             out.append(RobotEffect("armature", j, None, {p.name: change}, ""))
@@ -311,6 +342,9 @@ def as_found(found: ArmCalibration) -> tuple[mujoco.MjSpec, list[str]]:
     for b in found.links:
         body = spec.body(found.model.model.body(b).name)
         set_inertial(body, float(found.tree.mass[b]), found.tree.com[b], real_inertia(found.tree.inertia[b]))
+    if found.gains is not None:
+        for name, (stiffness, damping, most) in zip(found.model.joints, found.gains, strict=True):
+            servo(spec, name, float(stiffness), float(damping), float(most))
     effects = effects_of(found)
     inside = with_effects(spec, numbered(effects, found.model))[1]
     joints = found.model.joints
@@ -381,6 +415,7 @@ class Told:
     validated: bool
     logs: tuple[str, ...]
     notes: tuple[str, ...]
+    predicts: str
 
     @property
     def found(self) -> ArmCalibration:
@@ -424,10 +459,12 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
     Raises:
         InputError: a value is missing, invalid or unknown.
     """
-    file = Fields(values, KEYS, where, ("provenance",))
+    file = Fields(values, KEYS, where, OPTIONAL)
     file.check({"version": (str(VERSION), lambda version: version == VERSION)})
     parameters = tuple(map(_parameter, file.objects("parameters", PARAMETER)))
-    held = file.object("held_out")
+    held, predicts = file.object("held_out"), values.get("predicts", "torque")
+    if predicts not in ("torque", "position"):
+        file.refuse("predicts", "torque or position")
     # Zeros are those of all joints but the first, which has friction if it has torque.
     zeros = [p.place for p in parameters if p.name.startswith("zero_")]
     joints = (next((joint for joint in held if joint not in zeros), ""), *zeros)
@@ -436,12 +473,15 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
     known, table = tuple(j for j, joint in enumerate(joints) if joint in held), np.zeros((5, len(joints)))
     for j in known:
         sizes = Fields(held[joints[j]], HELD_OUT, f"{where}: held_out: {joints[j]}")
-        table[:, j] = [sizes.number(name, 0.0) for name in HELD_OUT]
+        table[:, j] = [
+            np.nan if name == "least_squares" and predicts == "position" else sizes.number(name, 0.0)
+            for name in HELD_OUT
+        ]
     slides = [any((p.place, p.name) == (joint, "coulomb_N") for p in parameters) for joint in joints]
     combinations = tuple(map(_combination, file.objects("combinations", ("terms", *PARAMETER[2:5]))))
     return Told(
         SimpleNamespace(path=Path(file.words("model")), joints=joints, slides=slides), known, parameters, combinations,
-        (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"),
+        (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"), predicts,
     )  # fmt: skip
 
 

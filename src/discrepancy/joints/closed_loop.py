@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
@@ -215,7 +214,9 @@ class ClosedLoop:
             for a, b in friction.rests(s.dq[:, j], h, slow[j]):
                 Q[a:b, j] += (0.5 * dry[j]) ** 2 * REST_S / h
         speed = self.dq[:: self.every] ** 2
-        R = np.where(np.isfinite(self.measured).all(axis=1, keepdims=True), self.reading + self.jitter * speed, np.inf)
+        R = np.where(
+            np.isfinite(self.measured).all(axis=1, keepdims=True), self.reading + self.jitter * speed, np.inf
+        )
         start = np.repeat([START_RAD**2, START_RAD_PER_S**2], J)
         return Filtered.of(LinearLoop(A, B, Q, R, self.every, start))
 
@@ -234,23 +235,30 @@ class ClosedLoop:
             lacking: torque that the model lacks there, shape (N, J).
         """
         loop, J = filtered.loop, self.q.shape[1]
-        speed, off, seen = self.dq[:: self.every] ** 2, self.off, np.isfinite(loop.R).all(axis=1)
+        speed, off = (np.ascontiguousarray(x.T) for x in (self.dq[:: self.every] ** 2, self.off))
+        seen = np.isfinite(loop.R).all(axis=1)
         for j in range(J):
             at = [j, J + j]
             A, B = (np.ascontiguousarray(x) for x in (loop.A[:, at][:, :, at], loop.B[:, at, j]))
-            rest = loop.Q[:, j] - self.torque[j] / self.step_s
-            u, y, v, start = (np.ascontiguousarray(x) for x in (lacking[:, j], off[:, j], speed[:, j], loop.start[at]))
-            now = np.log([self.reading[j], self.jitter[j], self.torque[j]])
+            rest, start = loop.Q[:, j] - self.torque[j] / self.step_s, loop.start[at]
+            own = A, B, rest, seen, speed[j], off[j], np.ascontiguousarray(lacking[:, j]), start
+            self.reading[j], self.jitter[j], self.torque[j] = self._likeliest(j, own)
 
-            def left(x: Array) -> float:
-                read, jitter, torque = np.exp(np.clip(x, now - LARGEST, now + LARGEST))
-                R = np.where(seen, np.maximum(read, self.least[j]) + jitter * v, np.inf)
-                return cost(A, B, rest + torque / self.step_s, R, self.every, start, u, y)
+    def _likeliest(self, j: int, own: tuple[Array, ...]) -> Array:
+        """Variances of reading, jitter and torque that maximise the likelihood of one joint, shape (3,)."""
+        A, B, rest, seen, speed, off, lacking, start = own
+        now = np.log([self.reading[j], self.jitter[j], self.torque[j]])
+        most, least = now + LARGEST, np.maximum(now - LARGEST, [np.log(self.least[j]), -np.inf, -np.inf])
 
-            simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
-            best = minimize(left, now, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1})
-            self.reading[j], self.jitter[j], self.torque[j] = np.exp(np.clip(best.x, now - LARGEST, now + LARGEST))
-            self.reading[j] = max(self.reading[j], self.least[j])
+        def left(x: Array) -> float:
+            read, jitter, torque = np.exp(np.clip(x, least, most))
+            R = np.where(seen, read + jitter * speed, np.inf)
+            return float(cost(A, B, rest + torque / self.step_s, R, self.every, start, lacking, off))
+
+        simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
+        options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1}
+        best = minimize(left, now, method="Nelder-Mead", options=options)
+        return np.exp(np.clip(best.x, least, most))
 
     def move(self, filtered: Filtered, lacking: Array) -> None:
         """Move the motion to its likeliest course.
@@ -307,7 +315,9 @@ def cells_of(
         series: columns in torque by joint; an empty one stays without rows.
     """
     bands = bands_of([loop for loop, _ in loops])
-    white = [f.innovations(r[:, :, None], loop.off)[:, :, 0] for (loop, f), r in zip(loops, residual, strict=True)]
+    white = [
+        f.innovations(r[:, :, None], loop.off)[:, :, 0] for (loop, f), r in zip(loops, residual, strict=True)
+    ]
     cells = Cells.of(bands, white)
     rows = []
     for t, ((_, f), r) in enumerate(zip(loops, residual, strict=True)):

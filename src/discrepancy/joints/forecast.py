@@ -89,7 +89,9 @@ def errors(
                 if lost:
                     break
                 at, rate = data.qpos[own] - zero, data.qvel[dof]
-                torque = np.clip(kp * (told[0][n] - at) + gain * told[1][n] - kd * rate, -limit, limit) * on[n]
+                torque = (
+                    np.clip(kp * (told[0][n] - at) + gain * told[1][n] - kd * rate, -limit, limit) * on[n]
+                )
                 data.qfrc_applied[dof] = torque
                 mujoco.mj_step(m, data)
                 lost = not np.abs(data.qpos[own] - loop.q[n]).max() < LOST

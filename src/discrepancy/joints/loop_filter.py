@@ -71,7 +71,16 @@ class Filtered:
         M, J = self.loop.R.shape
         out = np.zeros((M, J, torque.shape[2]))
         y = np.zeros((M, J)) if position is None else position
-        _filter(self.loop.A, self.loop.B, self.gain, self.root, self.loop.every, np.ascontiguousarray(torque), y, out)
+        _filter(
+            self.loop.A,
+            self.loop.B,
+            self.gain,
+            self.root,
+            self.loop.every,
+            np.ascontiguousarray(torque),
+            y,
+            out,
+        )
         return out
 
     def smoothed(self, torque: Array, position: Array) -> Array:
@@ -93,7 +102,7 @@ class Filtered:
 
 @compiled
 def _gains(A, B, Q, R, every, start, gain, root):
-    N, twice, J = B.shape
+    N, _, J = B.shape
     P = np.diag(start)
     for n in range(N + 1):
         if n % every == 0:
@@ -109,7 +118,9 @@ def _gains(A, B, Q, R, every, start, gain, root):
                 root[k] = inverse
         if n < N:
             noise = B[n] * Q[n]
-            P = np.dot(np.dot(A[n], P), np.ascontiguousarray(A[n].T)) + np.dot(noise, np.ascontiguousarray(B[n].T))
+            P = np.dot(np.dot(A[n], P), np.ascontiguousarray(A[n].T)) + np.dot(
+                noise, np.ascontiguousarray(B[n].T)
+            )
 
 
 @compiled
@@ -138,7 +149,9 @@ def _smooth(A, B, Q, gain, root, every, start, torque, white, out):
             back = np.dot(np.ascontiguousarray(A[n].T), back)
         if n % every == 0:
             k = n // every
-            score = np.dot(np.ascontiguousarray(root[k].T), white[k]) - np.dot(np.ascontiguousarray(gain[k].T), back)
+            score = np.dot(np.ascontiguousarray(root[k].T), white[k]) - np.dot(
+                np.ascontiguousarray(gain[k].T), back
+            )
             back[:J] += score
     x = start * back
     out[0] = x

@@ -15,9 +15,9 @@ from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
+from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.joints.closed_loop import ClosedLoop, bands_of, cells_of
 from discrepancy.joints.loop_filter import Filtered
-from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.joints.mechanics import (
     Tree,
     body_regressor,
@@ -468,7 +468,9 @@ class _Builder:
         out = self.out
         out.changed, out.mount = self.more.changed, self.more.mount
         body = int(self.tree.joint_body[self.tree.last_link])
-        none = self.more.motors or self.more.loops or "push" in self.more.excluded  # a sticking gear looks like a push
+        none = (
+            self.more.motors or self.more.loops or "push" in self.more.excluded
+        )  # a sticking gear looks like a push
         for s in () if none else self.parts:
             out.pushed.append(force_torque(s.motion, body, self.tree.com[body]))
         for i, label in enumerate(

@@ -1,0 +1,184 @@
+"""Calibration of robots whose drives tell no torque: rows are positions in the closed loop (``closed_loop``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.joints.closed_loop import ClosedLoop
+from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
+from discrepancy.joints.forecast import errors, machine
+from discrepancy.joints.mechanics import Tree
+from discrepancy.joints.model import SerialModel
+from discrepancy.joints.problem import MOMENTS, REST, JointProblem
+from discrepancy.joints.servo import with_torques
+from discrepancy.joints.trials import Trials
+from estimator.arrays import Array
+from mocobot_logs.joints.asked_torque import with_asked_torques
+from mocobot_logs.joints.joint_log import JointLog
+
+LATE_S = 0.02
+"""Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
+LEARNING = 4
+"""Steps in which the noise is learnt, too. Chosen: the fit settles only when it is held."""
+REST_SHARE = 0.05
+"""Least friction at rest over the rms torque. Chosen."""
+
+
+def with_gains(model: SerialModel, logs: Sequence[JointLog]) -> tuple[JointLog, ...]:
+    """Give loops of unknown position gain a first one: that with which the model's masses explain the motion best.
+
+    Args:
+        model: the robot as described.
+        logs: logs of one robot with position commands and no torques.
+
+    Raises:
+        InputError: the errors of the positions do not go with the torque that the model asks for.
+    """
+    if not any(
+        log.by_command and log.drive.gain_of == "torque" and log.drive.gain_free[:, 0].any() for log in logs
+    ):
+        return tuple(logs)
+    asked = []
+    for log in logs:
+        assert log.command is not None
+        asked.append(
+            replace(log, torque=None, drive=replace(log.drive, duty=log.command - log.q, supply_V=None))
+        )
+    motors = with_torques(model, asked)[1]
+    out = []
+    for log in logs:
+        gain = log.drive.position_gain.copy()
+        for motor in motors:
+            if log.drive.gain_free[motor.joint, 0]:
+                gain[motor.joint] = motor.torque_per_unit
+        out.append(with_asked_torques(replace(log, drive=replace(log.drive, position_gain=gain))))
+    return tuple(out)
+
+
+class LoopFit(Fit):
+    """The fit around its current values and motion.
+
+    Attributes:
+        loops: closed loops of the runs.
+        steps: steps done.
+    """
+
+    late_s = LATE_S
+
+    def __init__(self, model: SerialModel, trials: Trials) -> None:
+        self.loops, self.steps = [ClosedLoop.of(s) for s in trials.runs], 0
+        super().__init__(model, replace(trials, noise=(), kept=()))
+        names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
+        self.options = replace(self.options, wanted=frozenset([*names, *(s.label for s in self.scalars)]))
+
+    def rough(self, j: int) -> float:
+        """Factor within which the position gain of a joint is known."""
+        return max(float(loop.signals.log.drive.gain_within[j, 0]) for loop in self.loops)
+
+    def gain_prior(self, j: int) -> float:
+        """Prior standard deviation of the relative error of a joint's gains."""
+        return GAIN if self.rough(j) == 1.0 else FREE_GAIN
+
+    def least_damping(self, j: int) -> float:
+        """Least viscous friction of a joint: below none where the loop's velocity gain may be less than told."""
+        return min(float(loop.damping[j]) for loop in self.loops)
+
+    def linear(self) -> JointProblem:
+        """Build the problem around the present motion."""
+        late, scale = (self.each(what) for what in ("delay_s", "scale"))
+        runs = tuple(loop.seen(self.model, late) for loop in self.loops)
+        pairs = []
+        for loop, s in zip(self.loops, runs, strict=True):
+            dry = np.maximum(self.tree.coulomb, REST_SHARE * np.sqrt(np.mean(s.torque**2, axis=0)))
+            pairs.append((loop, loop.filtered(s, self.tree, scale, dry, REST * s.slow)))
+        self.options = replace(self.options, noise=None, loops=pairs)
+        parts = []
+        for k, at in self.trials.parts:
+            share = len(runs[k].time) / len(self.trials.runs[k].time)
+            parts.append((k, slice(round(at.start * share), round(at.stop * share))))
+        self.trials = replace(self.trials, runs=runs, parts=tuple(parts))
+        return super().linear()
+
+    def step(self) -> float:
+        """Fit around the current values and motion, and move both; return the largest step in standard errors."""
+        moved = super().step()
+        for t, (loop, filtered) in enumerate(self.options.loops):
+            lacking = self.problem.residual[t].copy()
+            for i, value in zip(self.columns(), self.x - self.at, strict=True):
+                for j, own in self.problem.series[i].items():
+                    lacking[:, j] -= value * own[t]
+            loop.move(filtered, lacking)
+            if self.steps < LEARNING:
+                loop.learn(filtered, lacking)
+        self.steps += 1
+        return moved if self.steps > LEARNING else np.inf
+
+    def each(self, what: str) -> Array:
+        """A value of the linearisation point for every joint, shape (J,)."""
+        return np.array([self.values.get(f"{n} {what}", 0.0) for n in self.model.joints])
+
+    def told(self, s: Scalar, value: float, se: float, prior: float) -> Parameter:
+        """A scalar as it is told; roughly known gains by their values, which a gain's error divides."""
+        j = self.model.joints.index(s.place) if s.place in self.model.joints else -1
+        if s.name != "gain" or self.rough(j) == 1.0:
+            return super().told(s, value, se, prior)
+        gain, error = float(self.loops[0].signals.log.drive.position_gain[j]), 1.0 + value
+        slope = gain / error**2
+        name = "position_gain_N_per_m" if self.model.slides[j] else "position_gain_Nm_per_rad"
+        known = se < DETERMINED * prior
+        return Parameter(s.place, name, gain, gain / error, slope * se, slope * prior, known, in_model=False)
+
+    def gains(self) -> Array:
+        """Position gain, velocity gain with negative damping, and largest torque of each loop, shape (J, 3)."""
+        kp, kd, limit, _ = self.loops[0].gains(1)
+        true = 1.0 / (1.0 + self.each("scale"))
+        return np.column_stack([kp * true, kd * true + np.minimum(self.tree.viscous, 0.0), limit])
+
+    def numbers(self) -> Tree:
+        """The tree with the fitted lengths and gravity, too."""
+        names = ("mass", "com", "inertia", "armature", "coulomb", "viscous")
+        return replace(self.problem.parts[0].tree, **{name: getattr(self.tree, name) for name in names})
+
+    def held_out(self) -> tuple[HeldOut, ...]:
+        """Forecast the positions of each part from its commands, with values from the others."""
+        parts, out, before = range(len(self.normals)), [], self.x
+        none = np.zeros(len(self.model.joints))
+        plain = machine(self.model, self.given, self.given)
+        for t in parts:
+            k, steps = self.trials.parts[t]
+            loop = self.loops[k]
+            self.jump(self.solved([o for o in parts if o != t] or [t])[0])
+            fitted, braking = (
+                machine(self.model, self.given, self.numbers()),
+                np.minimum(self.tree.viscous, 0.0),
+            )
+            gain = 1.0 / (1.0 + self.each("scale"))
+            off = (
+                errors(plain, self.model, loop, none, none, none, none + 1.0, steps),
+                errors(fitted, self.model, loop, braking, self.zero(), self.each("delay_s"), gain, steps),
+            )
+            model, best = (np.sqrt(np.nanmean(x**2, axis=0)) for x in off)
+            rows = loop.measured[steps.start // loop.every : steps.stop // loop.every]
+            read, size = np.sqrt(loop.reading), np.nanstd(rows, axis=0)
+            out.append(HeldOut(self.trials.names[t], model, none + np.nan, best, read, size))
+        self.jump(before)
+        return tuple(out)
+
+    def notes(self) -> Iterator[str]:
+        """Sentences on what the fit holds fixed or cannot tell apart."""
+        yield from super().notes()
+        drive = self.loops[0].signals.log.drive
+        names = [
+            n for n, factor in zip(self.model.joints, drive.gain_within[:, 1], strict=True) if factor > 1.0
+        ]
+        if names:
+            yield (
+                f"Velocity gain and viscous friction of {', '.join(names)} have the same effect: only their sum is "
+                "determined. The viscous friction is told for the velocity gain of the map, 0 where it is free."
+            )
+        jitter = max(float(np.sqrt(loop.jitter).max()) for loop in self.loops)
+        if jitter > 1e-4:
+            yield f"Positions are as if they were read up to {1e3 * jitter:.1f} ms (rms) beside their stamps."
