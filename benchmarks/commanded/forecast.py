@@ -63,6 +63,8 @@ def compiled(path: Path, joints: tuple[str, ...], law: ControlLaw | None) -> muj
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     for own in [*spec.sensors, *(spec.actuators if law is not None else ())]:
         spec.delete(own)
+    for own in spec.actuators:
+        own.delay, own.nsample = 0.0, 0  # delays are told beside the model
     if law is not None:
         actuate(spec, joints, law)
     return spec.compile()

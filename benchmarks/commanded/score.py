@@ -31,8 +31,9 @@ from commanded.machine import Machine, addresses
 from commanded.rubbing import Law
 
 ARMATURE, COULOMB, VISCOUS, DELAY = "armature_kgm2", "coulomb_Nm", "viscous_Nms_per_rad", "delay_s"
-KP, KD = "position_gain", "velocity_gain"
+KP, KD = ("position_gain", "kp"), ("velocity_gain", "kd")
 """Names of parameters in a result; those of gains may have a unit behind them."""
+Parameters = dict[tuple[str, str], dict[str, Any]]
 MASS_SHARE = 0.1 / np.sqrt(3.0)
 """Standard deviation of the masses of a leg's model, for the oracle."""
 
@@ -106,7 +107,7 @@ def true_machine(folder: Path) -> Machine:
     return Machine(spec.compile(), joints, law, delay, servo, kp, most, truth["counts_per_turn"])
 
 
-def parameters_of(result: Path | None) -> dict[tuple[str, str], dict[str, Any]]:
+def parameters_of(result: Path | None) -> Parameters:
     """Parameters of a result by place and name."""
     if result is None:
         return {}
@@ -114,16 +115,20 @@ def parameters_of(result: Path | None) -> dict[tuple[str, str], dict[str, Any]]:
     return {(p["place"], p.get("parameter") or p["name"]): p for p in listed}
 
 
-def _found(parameters: dict[tuple[str, str], dict[str, Any]], joint: str, stem: str) -> dict[str, Any] | None:
+def _found(parameters: Parameters, joint: str, stem: str | tuple[str, ...]) -> dict[str, Any] | None:
     """The parameter of a joint, or else of the whole robot, whose name begins so."""
     joints = {place for place, name in parameters if name == ARMATURE}
     own = {place: p for (place, name), p in parameters.items() if name.startswith(stem)}
     return own.get(joint) or next((p for place, p in own.items() if place not in joints), None)
 
 
-def control_of(folder: Path, options: Options) -> ControlLaw:
-    """The control law of a fit: that of the map, with what the result or the file of the control law has instead."""
-    read_truth(folder)
+def fitted_model(folder: Path, options: Options) -> tuple[mujoco.MjModel, Array]:
+    """The fitted model with its control law, and the delay of commands [s], shape (J,).
+
+    The model's own actuators are taken if they make position loops. Else the law is that of the map, with what the
+    result or the file of the control law has instead.
+    """
+    assert options.fitted is not None
     joints, law = told_law(folder)
     found = parameters_of(options.result)
     numbers = {"kp": law.kp.copy(), "kd": law.kd.copy(), "delay_s": np.zeros(len(joints))}
@@ -135,7 +140,10 @@ def control_of(folder: Path, options: Options) -> ControlLaw:
     if options.control is not None:
         told = json.loads(options.control.read_text(encoding="utf-8"))
         law = replace(law, **{key: np.array(value) for key, value in told.items()})
-    return law
+    own = mujoco.MjModel.from_xml_path(str(options.fitted))
+    loops = own.nu >= len(joints) and (own.actuator_biastype[: len(joints)] > 0).all()
+    model = compiled(options.fitted, joints, None if loops else law)
+    return model, np.broadcast_to(law.delay_s, len(joints))
 
 
 def forecasts(folder: Path, options: Options) -> dict[str, dict[str, Array]]:
@@ -160,10 +168,8 @@ def forecasts(folder: Path, options: Options) -> dict[str, dict[str, Array]]:
         plain = {which: {window: x.tolist() for window, x in own.items()} for which, own in out.items()}
         kept.write_text(json.dumps(plain), encoding="utf-8")
     if options.fitted is not None:
-        control = control_of(folder, options)
-        own = mujoco.MjModel.from_xml_path(str(options.fitted))
-        loops = own.nu >= len(joints) and (own.actuator_biastype[: len(joints)] > 0).all()
-        out["fitted"] = by(options.fitted, None if loops else control, control.delay_s)
+        m, delay = fitted_model(folder, options)
+        out["fitted"] = errors(m, joints, by_rollout(m, joints, log, delay), log)
     return out
 
 
@@ -202,21 +208,35 @@ def scored(folder: Path, options: Options) -> list[Scored]:
 def curve_errors(folder: Path, options: Options) -> Array:
     """Error of each joint's friction over speed, a share of the curve: rms over the speeds of the fitted runs.
 
-    Friction of the fitted MJCF is its ``frictionloss`` and ``damping``; what its control law has too much or too little
-    on velocity counts as friction. The true curve is the mean over the loads of the runs.
+    MuJoCo tells what the fitted model and its drives, without an error of position, set against a speed. The true
+    drives' part is taken off, so that what a fit has too much or too little there counts as friction. The true curve is
+    the mean over the loads of the runs.
     """
-    assert options.fitted is not None
-    truth, control = read_truth(folder), control_of(folder, options)
-    spec, out = mujoco.MjSpec.from_file(str(options.fitted)), []
+    truth, out = read_truth(folder), []
+    m, _ = fitted_model(folder, options)
+    joints = tuple(truth["joints"])
+    at, dof, _ = addresses(m, joints)
+    data = mujoco.MjData(m)
+
+    def against(speeds: Array) -> Array:
+        data.qpos[:], data.qvel[:] = m.qpos0, 0.0
+        data.qvel[dof], data.ctrl[: len(joints)] = speeds, data.qpos[at]
+        mujoco.mj_forward(m, data)
+        return -(data.qfrc_passive + data.qfrc_actuator)[dof]
+
     acts = _each(truth, "kd") - _each(truth, "kp") * _each(truth, "loop_delay_s")
-    for j, (joint, own) in enumerate(truth["joints"].items()):
-        curve, found = own["friction"], spec.joint(joint)
-        v, many = np.array(curve["speed_rads"]), np.array(curve["samples"], float)
-        damping = np.atleast_1d(found.damping)
-        torque = found.frictionloss + sum(c * v ** (k + 1) for k, c in enumerate(damping))
-        off = torque + (control.kd[j] - acts[j]) * v - np.array(curve["torque_Nm"])
-        size = np.average(np.array(curve["torque_Nm"]) ** 2, weights=many)
-        out.append(np.sqrt(np.average(off**2, weights=many) / size))
+    rest = against(np.zeros(len(joints)))
+    for j, own in enumerate(truth["joints"].values()):
+        curve = {
+            name: np.array(own["friction"][name], float) for name in ("speed_rads", "torque_Nm", "samples")
+        }
+        only = np.eye(len(joints))[j]
+        off = [
+            m.dof_frictionloss[dof[j]] + (against(v * only) - rest)[j] - acts[j] * v - torque
+            for v, torque in zip(curve["speed_rads"], curve["torque_Nm"], strict=True)
+        ]
+        size = np.average(curve["torque_Nm"] ** 2, weights=curve["samples"])
+        out.append(np.sqrt(np.average(np.square(off), weights=curve["samples"]) / size))
     return np.array(out)
 
 
