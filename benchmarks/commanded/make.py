@@ -150,12 +150,13 @@ def _map(kind: str, drives: _Drives, *, speeds: bool) -> str:
         return "[" + ", ".join(f"{v:.6g}" for v in x) + "]"
 
     joints = ", ".join(f'"{n}"' for n in KINDS[kind].joints)
+    damping = '"free"' if kind == "arm" else numbers(drives.told_kd)  # nobody knows a servo's back-EMF
     dq = 'dq = { column = "{joint}_velocity_rads", unit = "rad/s" }\n' if speeds else ""
     return (
         f'version = 1\njoints = [{joints}]\ntime = {{ column = "time_s", unit = "s" }}\n\n[channels]\n'
         f'q = {{ column = "{{joint}}_position_rad", unit = "rad" }}\n{dq}'
         'command = { column = "{joint}_command_rad", unit = "rad" }\n\n[control]\ncommand = "position"\n'
-        f'gain_of = "torque"\nposition_gain = {numbers(drives.kp)}\nvelocity_gain = {numbers(drives.told_kd)}\n'
+        f'gain_of = "torque"\nposition_gain = {numbers(drives.kp)}\nvelocity_gain = {damping}\n'
         f"limit = {numbers(drives.most)}\n"
     )
 
@@ -262,7 +263,7 @@ def make(
             }
             for j, name in enumerate(joints)
         },
-        "told": {"kp": told.kp.tolist(), "kd": told.told_kd.tolist(), "limit": told.most.tolist()},
+        "told": {"kp": told.kp.tolist(), "kd": (told.told_kd * (kind == "leg")).tolist(), "limit": told.most.tolist()},
         "masses": {b.name: b.mass for b in spec.bodies[2:]},
         "friction_law": rubs.to_json(),
     }  # fmt: skip

@@ -258,7 +258,8 @@ def lerobot_places(
     own: dict[str, dict[str, Any]] = {}
     asked, degrees = [], []
     for joint, motor, x in zip(joints, motors, state.values, strict=True):
-        step = 0.0 if x is None or not len(x) else rounding_step(x[:1024])
+        parts = () if x is None else (x[k : k + 1024] for k in range(0, len(x), 1024))
+        step = next(filter(None, map(rounding_step, parts)), 0.0)
         told = (beside[1] if beside else {}).get(motor)
         if abs(step / _DEGREE - 1.0) < _SAME:
             degrees.append(joint)
@@ -277,17 +278,20 @@ def lerobot_places(
             continue
         own[joint] = {"unit": "%", "rated": float(f"{2.0 * np.pi / _COUNTS * 100.0 / one:.12g}")}
     doubts = []
-    if beside is not None and (turned := [m for m in motors if beside[1].get(m, {}).get("drive_mode")]):
+    if beside is None and own:
+        doubts.append("one step of the readings is taken for one count in 4096 a turn: is it?")
+    turned = [m for m in motors if beside is not None and beside[1].get(m, {}).get("drive_mode")]
+    if turned:
         doubts.append(
-            f"drive_mode of {', '.join(turned)} is 1: LeRobot has turned its sign (not that of degrees)"
+            f"drive_mode of {', '.join(turned)} is 1: LeRobot turned its sign, unless it is in degrees"
         )
     if asked:
-        why = (
-            f"{beside[0].name} does not fit the steps of its readings"
+        steps = (
+            f"the steps of its readings fit neither those nor {beside[0].name}"
             if beside
-            else "no calibration (JSON) lies beside the dataset, and its readings show no step of 4096 a turn"
+            else "it has no calibration"
         )
-        doubts.append(f"unit of {', '.join(asked)}: deg, or % with rated [rad at 100]? {why}")
+        doubts.append(f"unit of {', '.join(asked)}: deg, or % with rated [rad at 100]? {steps}")
     if not own and not degrees:
         return dict(places), doubts
     said = f"% of a range, by {beside[0].name if beside else 'the step of one count in 4096'}"

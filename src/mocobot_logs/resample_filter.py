@@ -311,6 +311,28 @@ def _fitted(time: Array, values: Array, at: Array, width: int) -> Array:
     return np.einsum("nw,nwc->nc", weights, values[rows], optimize=True)
 
 
+def held_means(stamp_ns: Stamps, values: Array, at_ns: Array | Stamps, until_ns: Array | Stamps) -> Array:
+    """Return means over intervals of values that hold until the next stamp, exact where none changes, shape (n, C).
+
+    Args:
+        stamp_ns: increasing times of the values [ns], shape (q,); q at least 1.
+        values: shape (q, C).
+        at_ns, until_ns: begin and end of the intervals [ns], shape (n,). The first value holds before its stamp, too.
+    """
+    first = np.maximum(np.searchsorted(stamp_ns, at_ns + TOLERANCE_NS, side="right") - 1, 0)
+    last = np.maximum(np.searchsorted(stamp_ns, until_ns - TOLERANCE_NS, side="left") - 1, first)
+    out = values[first]
+    rows = np.flatnonzero(last > first)
+    first, last, at_ns, until_ns = (x[rows] for x in (first, last, at_ns, until_ns))
+    ends = np.append(stamp_ns[1:], np.iinfo(np.int64).max)
+    out[rows] = 0.0
+    for k in range(int(np.max(last - first, initial=-1)) + 1):
+        now = np.minimum(first + k, last)
+        span = np.minimum(ends[now], until_ns) - np.maximum(stamp_ns[now], at_ns)
+        out[rows] += (np.where(first + k <= last, span, 0.0) / (until_ns - at_ns))[:, None] * values[now]
+    return out
+
+
 def on_grid(time_ns: Stamps, values: Array, grid: Grid, k: int) -> tuple[Array, int]:
     """Resample a whole stream at once: merge, fill, interpolate, low-pass, decimate.
 

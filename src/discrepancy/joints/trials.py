@@ -81,7 +81,7 @@ def trials_of(model: SerialModel, logs: Sequence[JointLog], reference: Sequence[
         if log.torque is None:
             raise InputError(
                 f"{log.name}: there are no torques, currents or duties, nor commands with known gains; one of them is "
-                "needed"
+                "needed (position_gain and velocity_gain in the map's [control])"
             )
         known &= np.isfinite(log.torque).any(axis=0)
     joints = np.flatnonzero(known)

@@ -31,7 +31,6 @@ from mocobot_logs.bag.cdr import (
     CdrReader,
     MessageType,
     Selector,
-    Walk,
     message_type,
     string_of,
     type_name,
@@ -40,6 +39,7 @@ from mocobot_logs.bag.files import BagFiles
 from mocobot_logs.bag.messages import Messages, listed, listed_names, printable
 from mocobot_logs.log import NS, REF, Array, Level, Samples, Stamps, joined, rows_of
 from mocobot_logs.maps import ChannelMap, LogMap, builtin_map
+from mocobot_logs.resample_filter import held_means
 
 MAX_GAP_NS = 50_000_000
 """Longest time without samples of a topic, beyond its period, that is interpolated [ns]."""
@@ -58,8 +58,8 @@ class RowAligner:
     phase per sample. At 100 Hz this is 4e-7 for 1 Hz and 2.3e-4 for 5 Hz. Nothing is decimated, so nothing aliases.
     There are no rows before a topic's first sample, after its last, or in its gaps.
 
-    Channels that are held, such as commands, are not interpolated: a row has their last value at its stamp. A topic
-    of such channels alone does not set the rows, and may pause or end.
+    Channels that are held, such as commands, are not interpolated: a row has the mean of what holds until the next row.
+    A topic of such channels alone does not set the rows, and may pause or end.
     """
 
     def __init__(
@@ -102,6 +102,8 @@ class RowAligner:
         until = min(int(stamps[-2]) if len(stamps) > 1 else -(1 << 62) for stamps in others)
         later = leader > until
         ready = int(np.argmax(later)) if later.any() else len(leader)
+        # What is held is needed until the next row.
+        ready = max(ready - any(each.any() for each in self._held), 0)
         return self._rows(max(ready, len(leader) - HELD))
 
     def finish(self) -> Samples | None:
@@ -110,6 +112,8 @@ class RowAligner:
 
     def _rows(self, ready: int) -> Samples | None:
         rows = rows_of(self._topics[self._leader], slice(ready))
+        until = self._topics[self._leader].stamp_ns[1 : ready + 1]
+        until = np.append(until, rows.stamp_ns[len(until) :] + round(self._periods[self._leader]))
         values = np.full((ready, sum(map(len, self._columns))), np.nan)
         values[:, self._columns[self._leader]] = rows.values
         good = np.ones(ready, bool)
@@ -117,8 +121,12 @@ class RowAligner:
             keep = ready
             if number != self._leader:
                 values[:, self._columns[number]], near = _interpolated(
-                    topic, rows.stamp_ns, self._periods[number], self._held[number]
+                    topic, rows.stamp_ns, self._periods[number]
                 )
+                if (held := self._held[number]).any() and len(topic.stamp_ns):
+                    means = held_means(topic.stamp_ns, topic.values[:, held], rows.stamp_ns, until)
+                    values[:, self._columns[number][held]] = means
+                    near = rows.stamp_ns >= topic.stamp_ns[0] if held.all() else near
                 good &= near
                 keep = max(len(topic.stamp_ns) - HELD // 2, 0)
                 if ready:  # later rows need two samples before the last row
@@ -137,22 +145,8 @@ class RowAligner:
             )
 
 
-def _interpolated(
-    topic: Samples, at_ns: Stamps, period_ns: float, held: NDArray[np.bool_]
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return values at some stamps, and which stamps have close enough samples on both sides.
-
-    Columns that are ``held`` have the last value; a stamp after the first sample suffices if all of them are.
-    """
-    if held.any():
-        last = np.searchsorted(topic.stamp_ns, at_ns, side="right") - 1
-        if not len(topic.stamp_ns):
-            return np.full((len(at_ns), len(held)), np.nan), last >= 0
-        if held.all():
-            return topic.values[np.maximum(last, 0)], last >= 0
-        values, good = _interpolated(topic, at_ns, period_ns, np.zeros_like(held))
-        values[:, held] = topic.values[np.maximum(last, 0)][:, held]
-        return values, good
+def _interpolated(topic: Samples, at_ns: Stamps, period_ns: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Return interpolated values at some stamps, and which stamps have close enough samples on both sides."""
     fresh = np.ones(len(topic.stamp_ns), bool)
     fresh[1:] = topic.stamp_ns[1:] > topic.stamp_ns[:-1]  # drop repeated stamps
     stamp, values = topic.stamp_ns[fresh], topic.values[fresh]
@@ -315,11 +309,13 @@ class Look:
         return np.concatenate(stamps), np.concatenate(values)
 
     def joint_names(self, topic: str) -> tuple[str, ...]:
-        """Return the texts of ``joint_names`` in the first message of a topic, empty if it has none."""
-        found = self.first(topic, 1)
-        if found is None:
-            return ()
-        return tuple(Walk(found[0], message_type(self._files.topics[topic], self._bag), set(), True).joints)
+        """Return the texts of ``joint_names`` in the first messages of a topic, empty if there are none."""
+        reader = CdrReader(
+            message_type(self._files.topics[topic], self._bag), [Selector("", "")], stamp=False
+        )
+        if (found := self.first(topic, 1)) is not None:
+            reader.read(found)
+        return tuple(reader.joints)
 
     def fields(self, topic: str) -> tuple[str, ...]:
         """Return the names of the fields of a topic's type."""

@@ -37,8 +37,9 @@ class Drive:
         gain_within: factor within which position and velocity gain are known, shape (J, 2): 1 if exactly, infinity if
             free, that is unknown, although the loop has them. Ones if not given.
         delay_s: time from the stamp of a command until the drive follows it [s], shape (J,), NaN where unknown.
-        held: whether a command holds until the next one; else the robot interpolates between commands. The samples of
-            ``JointLog.command``, ``command_velocity`` and ``feedforward`` are the values in force at their instants.
+        held: whether a command holds until the next one; else the robot interpolates between commands. Samples of
+            ``JointLog.command``, ``command_velocity`` and ``feedforward`` are then means over the period that follows
+            them, which differ from a command only where one comes within the period.
         feedforward: commanded torque that is added to the loop's [N m or N], shape (Q, J), NaN where a joint has none;
             None if no joint has one.
         command_velocity: commanded velocity beside a commanded position [rad/s or m/s], shape (Q, J), NaN where a joint

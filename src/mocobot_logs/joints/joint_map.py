@@ -423,34 +423,23 @@ def _positive(value: Any) -> float | None:
     return number if number is not None and number > 0 else None
 
 
-def _factor(value: Any) -> float | None:
-    number = _number(value)
-    return number if number is not None and number >= 1 else None
+def _from(least: float) -> Callable[[Any], float | None]:
+    return lambda value: float(value) if is_number(value) and value >= least else None
 
 
-def _not_negative(value: Any) -> float | None:
-    number = _number(value)
-    return number if number is not None and number >= 0 else None
+def _or_free(convert: Callable[[Any], float | None], free: float) -> Callable[[Any], float | None]:
+    return lambda value: free if value == "free" else convert(value)
 
 
 _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
     "gear": (1.0, lambda value: _number(value) or None, "a number of motor turns per joint turn, not 0"),
     "zero": (0.0, _number, "a finite number"),
-    "torque_constant": (
-        1.0, lambda value: _UNKNOWN if value == "free" else _positive(value),
-        'a positive number of newton metres per ampere, or "free"',
-    ),
-    "position_gain": (
-        _UNKNOWN, lambda value: np.inf if value == "free" else _positive(value),
-        'a positive number, or "free" where the loop has an unknown one',
-    ),
-    "velocity_gain": (
-        _UNKNOWN, lambda value: np.inf if value == "free" else _not_negative(value),
-        'a number, not negative, or "free" where the loop has an unknown one',
-    ),
+    "torque_constant": (1.0, _or_free(_positive, _UNKNOWN), 'a positive number of newton metres per ampere, or "free"'),
+    "position_gain": (_UNKNOWN, _or_free(_positive, np.inf), 'a positive number, or "free"'),
+    "velocity_gain": (_UNKNOWN, _or_free(_from(0.0), np.inf), 'a number, not negative, or "free"'),
     "limit": (_UNKNOWN, _positive, "a positive number"),
-    "gain_known_within": (1.0, _factor, "a factor of at least 1, such as 2 for half to twice the gain"),
-    "delay_s": (_UNKNOWN, _not_negative, "a number of seconds, not negative"),
+    "gain_known_within": (1.0, _from(1.0), "a factor of at least 1, such as 2 for half to twice the gain"),
+    "delay_s": (_UNKNOWN, _from(0.0), "a number of seconds, not negative"),
 }  # fmt: skip
 """By key of a joint: default, converter (None refuses the value), and description of allowed values."""
 

@@ -37,7 +37,7 @@ from mocobot_logs.joints.joint_map import (
 from mocobot_logs.log import NS, LogSource, Samples, Stamps, collect, repeated, rows_of
 from mocobot_logs.open_log import open_log
 from mocobot_logs.resample import LARGEST, MANY, MOST_MISSING, UNEVEN, Screen, beyond_s
-from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, on_grid
+from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_rows, held_means, on_grid
 
 EVEN_SHARE = 2e-3
 """Largest deviation of even stamps, as a share of a period. Derived: an arm turns by micrometres meanwhile."""
@@ -194,7 +194,8 @@ def _even_parts(
 ) -> list[_Even]:
     """Split a log at gaps too long to be bridged and resample each part to ``rate_hz`` [Hz] or the log's own rate.
 
-    Channels that are ``held``, shape (C,), are not interpolated: each instant has the last value before it.
+    Channels that are ``held``, shape (C,), are not interpolated: each instant has the mean of what held for one period
+    of the log from there on, which is the value itself on the log's own stamps.
     """
     _check_values(name, channels, samples.values)
     screen = Screen(name, channels)
@@ -277,8 +278,7 @@ def _even(
             )
     out, lead = on_grid(time_ns, values, grid, k)
     at_ns = (lead + np.arange(len(out))) / wanted / NS
-    last = np.searchsorted(time_ns, at_ns + TOLERANCE_NS, side="right") - 1
-    out[:, held] = values[np.ix_(last, held)]
+    out[:, held] = held_means(time_ns, values[:, held], at_ns, at_ns + period_ns)
     usable = _between_samples(at_ns, time_ns, grid.period_ns)
     if not usable.all():
         notes.append(f"{np.sum(~usable)} of {len(out)} samples are bridged gaps and are left out.")

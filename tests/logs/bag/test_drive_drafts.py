@@ -69,7 +69,12 @@ MOTOR = {
 LEGS = [f"{leg}_{name}_joint" for leg in ("FL", "FR", "RL", "RR") for name in ("hip", "thigh", "calf")]
 """Joints in the order of the model, which is not that of the motors."""
 MOTORS = [f"{leg}_{name}_joint" for leg in ("FR", "FL", "RR", "RL") for name in ("hip", "thigh", "calf")]
-LOW_STAMPS = SimpleNamespace(state=np.arange(int(500 * SECONDS)) / 500.0, cmd=np.arange(0.011, SECONDS, 0.02))
+LOW_STAMPS = SimpleNamespace(
+    state=np.arange(int(500 * SECONDS)) / 500.0, cmd=np.arange(0.0113, SECONDS - 0.3, 0.02)
+)
+LOW_STAMPS.cmd = np.delete(
+    LOW_STAMPS.cmd, slice(60, 68)
+)  # a pause, longer than gaps that are bridged, and an early end
 
 
 def unitree_bag(folder: Path, kp: np.ndarray, tau: float) -> tuple[Path, np.ndarray, np.ndarray]:
@@ -104,6 +109,20 @@ def unitree_bag(folder: Path, kp: np.ndarray, tau: float) -> tuple[Path, np.ndar
     return raw_mcap(folder / "log.mcap", messages, definitions=told_texts), q[:, :12], told[:, :12]
 
 
+def held(
+    stamps: np.ndarray, values: np.ndarray, at: np.ndarray, period: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Means of what holds during a period, and which periods have one value alone, by the integral over time."""
+    ends = np.append(stamps, at[-1] + 1.0)
+    integral = np.concatenate(
+        [np.zeros((1, values.shape[1])), np.cumsum(values * np.diff(ends)[:, None], axis=0)]
+    )
+    a, b = (np.column_stack([np.interp(t, ends, x) for x in integral.T]) for t in (at, at + period))
+    first, last = (np.searchsorted(stamps, t, side="right") - 1 for t in (at + 1e-9, at + period - 1e-9))
+    whole = first == last
+    return np.where(whole[:, None], values[first], (b - a) / period), whole
+
+
 def whole(name: str) -> str:
     return f"unitree_go/Motor{name}[20] motor_{name.lower()}\nuint32 tick\n"
 
@@ -116,10 +135,13 @@ def test_unitree_commands_hold_on_their_own_stamps(tmp_path) -> None:
     assert "# no feedforward: it is zero throughout" in text
     assert "doubtful" not in text.split("\n", 1)[1]
     order = [MOTORS.index(joint) for joint in LEGS]
-    last = np.searchsorted(LOW_STAMPS.cmd, LOW_STAMPS.state + 1e-9, side="right") - 1
-    rows = last >= 0
+    rows = LOW_STAMPS.state >= LOW_STAMPS.cmd[0]
     np.testing.assert_array_equal(log.q, q[rows][:, order])
-    np.testing.assert_array_equal(log.command, told[last[rows]][:, order])
+    mean, whole = held(LOW_STAMPS.cmd, told[:, order], LOW_STAMPS.state[rows], 0.002)
+    assert log.command is not None
+    np.testing.assert_allclose(log.command, mean, rtol=0, atol=1e-6)  # stamps are whole nanoseconds
+    np.testing.assert_array_equal(log.command[whole], mean[whole])
+    assert log.usable.all()
     assert log.drive.held
     assert log.drive.gain_of == "torque"
     assert log.drive.position_gain.tolist() == [20.0] * 12
@@ -138,11 +160,12 @@ def test_unitree_gains_that_change_and_torques_that_are_added(tmp_path) -> None:
     text, log = drafted(path, model(tmp_path, joints))
     assert "doubtful: position_gain of RR_thigh_joint is 20 to 40: the most frequent is here" in text
     motors = [MOTORS.index(joint) for joint in joints]
-    rows = LOW_STAMPS.state >= LOW_STAMPS.cmd[0] - 1e-9
+    rows = LOW_STAMPS.state >= LOW_STAMPS.cmd[0]
     np.testing.assert_array_equal(log.q, q[rows][:, motors])
-    last = np.searchsorted(LOW_STAMPS.cmd, LOW_STAMPS.state[rows] + 1e-9, side="right") - 1
+    tau = np.float32(0.01 * np.arange(len(LOW_STAMPS.cmd)))[:, None].astype(float)
     assert log.drive.feedforward is not None
-    np.testing.assert_array_equal(log.drive.feedforward[:, 2], np.float32(0.01 * last))
+    mean, _ = held(LOW_STAMPS.cmd, tau, LOW_STAMPS.state[rows], 0.002)
+    np.testing.assert_allclose(log.drive.feedforward[:, 2], mean[:, 0], rtol=0, atol=1e-6)
 
 
 # Dynamixel.
@@ -238,6 +261,7 @@ def test_feetech_in_shares_of_a_range(tmp_path, beside) -> None:
     assert log.drive.gain_of == "duty"
     assert ("by my_arm.json" in text) == beside
     assert ("drive_mode of shoulder_lift is 1" in text) == beside
+    assert ("one step of the readings is taken for one count in 4096 a turn: is it?" in text) != beside
     assert "zero = [ ... ]" in text
     assert lag_ms(text) == pytest.approx(80.0, abs=3.0)
 
@@ -292,6 +316,36 @@ def test_trajectory_controllers(tmp_path, words) -> None:
     assert 'position_gain = "free"' in draft
     assert log.drive.gain_free.all()
     assert lag_ms(draft) == pytest.approx(25.0, abs=1.0)
+
+
+def test_a_gripper_that_no_controller_moves(tmp_path) -> None:
+    """Joint states name four joints, the controller three of them, at half the rate."""
+    text = f"std_msgs/Header header\nstring[] joint_names\n{POINT.replace('/msg', '')} reference\n"
+    text += f"{POINT.replace('/msg', '')} feedback\n"
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    types.register(get_types_from_msg(text, JTC))
+    names, joints = ["c", "a", "b"], ["a", "grip", "b", "c"]
+    time = np.arange(600) / 100.0
+    told, q = waves(time, 3), waves(time, 4, 0.025)
+    messages, none = [], np.empty(0)
+    zero = types.types["builtin_interfaces/msg/Duration"](sec=0, nanosec=0)
+    for k, at in enumerate(time):
+        ns = EPOCH_NS + round(1e9 * at)
+        state = bags.joint_state(q[k], [], ns, names=joints)
+        messages.append(bags.said("/joint_states", ns, state))
+        if k % 2 == 0:
+            points = [types.types[POINT](x, none, none, none, zero) for x in (told[k], q[k, [3, 0, 2]])]
+            data = bytes(types.serialize_cdr(types.types[JTC](bags.header(ns), names, *points), JTC))
+            messages.append(Said("/arm_controller/state", ns, JTC, data))
+    definition = joined([text, f"MSG: {POINT}", bags.definition(POINT)])
+    path = raw_mcap(tmp_path / "log.mcap", messages, definitions={JTC: ("ros2msg", definition)})
+    draft, log = drafted(path, model(tmp_path, joints))
+    assert '[joint."grip".channels]\ncommand = false' in draft
+    np.testing.assert_array_equal(log.q, q)
+    last = np.arange(600) // 2 * 2
+    assert log.command is not None
+    np.testing.assert_array_equal(log.command[:, [3, 0, 2]], told[last])
+    assert np.isnan(log.command[:, 1]).all()
 
 
 def joined(texts: list[str]) -> str:
