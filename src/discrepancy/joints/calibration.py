@@ -96,6 +96,8 @@ def calibrate_arm(
             f"errors, where less than {SETTLED:g} is settled."
         ]
     say("predicting each part from the others")
+    if isinstance(fit, LoopFit):
+        print(fit.scatter())
     held = fit.held_out()
     names = tuple(dict.fromkeys(log.name for log in logs))
     notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs)]

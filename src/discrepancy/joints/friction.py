@@ -117,3 +117,22 @@ def other_forms(
             0.5 * share * (coulomb * s.direction + viscous * s.v) * f[i]
             for s, f in zip(signals, each, strict=True)
         ]
+
+
+def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -> Iterator[list[Array]]:
+    """Series of one standard deviation by which friction in a servo's gear may exceed Coulomb and viscous friction.
+
+    More at low speed (Stribeck), more under torque, and both together: the laws M4 and M5 of M. Duclusaud et al.,
+    "Extended friction models for the physics simulation of servo actuators", 2024.
+
+    Args:
+        signals: signals of one joint, one for each log.
+        coulomb: Coulomb friction [N m].
+        share: deviation relative to the friction, and to the torque.
+    """
+    for speed in (0.05, 0.2, 0.5):
+        slow = [s.direction * np.exp(-np.abs(s.v) / (speed * s.span.speed)) for s in signals]
+        yield [coulomb * x for x in slow]
+        yield [share * x * np.abs(s.asked) for x, s in zip(slow, signals, strict=True)]
+    for which in ("asked", "load"):
+        yield [share * s.direction * np.abs(getattr(s, which)) for s in signals]

@@ -116,6 +116,29 @@ class LoopFit(Fit):
         self.steps += 1
         return moved if self.steps > LEARNING else np.inf
 
+    def scatter(self) -> dict[str, float]:
+        """Widen standard errors by the scatter between parts, and return the factor by quantity (R. T. Birge, 1932).
+
+        The values of one part differ from those of all by as much as their covariances differ, if the model holds. Where
+        its laws do not, such as those of friction, other motions give other values.
+        """
+        parts, n = range(len(self.normals)), self.first
+        names, out = [s.name for s in self.scalars], {}
+        if len(parts) < 2:
+            return out
+        squares = []
+        for t in parts:
+            x, covariance = self.solved([t])
+            wider = np.diag(covariance - self.covariance)[n:]
+            squares.append((x - self.x)[n:] ** 2 / np.maximum(wider, 1e-3 * np.diag(covariance)[n:]))
+        each, wide = np.mean(squares, axis=0) * len(parts) / (len(parts) - 1), np.ones(len(self.x))
+        for name in dict.fromkeys(names):
+            at = [i for i, own in enumerate(names) if own == name]
+            out[name] = max(1.0, float(np.sqrt(np.mean(each[at]))))
+            wide[n + np.array(at)] = out[name]
+        self.covariance = self.covariance * np.outer(wide, wide)
+        return out
+
     def each(self, what: str) -> Array:
         """A value of the linearisation point for every joint, shape (J,)."""
         return np.array([self.values.get(f"{n} {what}", 0.0) for n in self.model.joints])

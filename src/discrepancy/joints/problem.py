@@ -578,7 +578,8 @@ class _Builder:
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
             forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
-            for i, x in enumerate(forms):
+            servo = friction.servo_forms(self.joints[j], float(t.coulomb[j]), FORM) if self.more.loops else ()
+            for i, x in enumerate((*forms, *servo)):
                 self.add(f"{n} form {i}", 1.0, {j: x})
 
     def _kinds(self) -> None:
