@@ -118,7 +118,8 @@ def gain_lines(gains: Mapping[str, Array], joints: Sequence[str]) -> Iterator[st
         texts = [f"{x:.6g}" if x >= least else '"free"' for x in usual]
         alike = len(set(texts)) == 1
         change = f"{'; '.join(doubts)}: the most frequent is here; cut the log to where it holds"
-        doubt = f"  # {DOUBTFUL}{name} {change}" if doubts else "  # as the log has it"
+        constant = "" if '"free"' in texts else "  # constant in the log"
+        doubt = f"  # {DOUBTFUL}{name} {change}" if doubts else constant
         yield f"{name} = {texts[0] if alike else '[' + ', '.join(texts) + ']'}{doubt}"
 
 

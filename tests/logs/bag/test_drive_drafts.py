@@ -131,7 +131,7 @@ def test_unitree_commands_hold_on_their_own_stamps(tmp_path) -> None:
     path, q, told = unitree_bag(tmp_path, np.full((1, 12), 20.0), 0.0)
     text, log = drafted(path, model(tmp_path, LEGS))
     assert f"joints = {json.dumps(MOTORS)}" in text
-    assert 'gain_of = "torque"\nposition_gain = 20  # as the log has it\nvelocity_gain = 1.5' in text
+    assert 'gain_of = "torque"\nposition_gain = 20  # constant in the log\nvelocity_gain = 1.5' in text
     assert "# no feedforward: it is zero throughout" in text
     assert "doubtful" not in text.split("\n", 1)[1]
     order = [MOTORS.index(joint) for joint in LEGS]
@@ -379,6 +379,6 @@ def test_a_time_that_cannot_be_read_leaves_the_lag_out(tmp_path) -> None:
     (tmp_path / "log.csv").write_text(f"time,j_pos,j_goal,j_motor_cmd_kp\n{rows}\n", encoding="utf-8")
     text = draft_joint_map(tmp_path / "log.csv", ["j"], [False]).text
     assert "its values cannot be read" in text
-    assert 'command = { column = "j_goal"' in text
-    assert 'position_gain = "free"' in text
+    assert 'command = { column = "{joint}_goal"' in text
+    assert 'position_gain = "free"\n' in text
     assert "follows" not in text
