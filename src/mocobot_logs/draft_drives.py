@@ -111,14 +111,15 @@ def gain_lines(gains: Mapping[str, Array], joints: Sequence[str]) -> Iterator[st
         usual, doubts = [], []
         for joint, x in zip(joints, values.T, strict=True):
             given, count = np.unique(x[np.isfinite(x)], return_counts=True)
-            usual.append(float(given[np.argmax(count)]) if len(given) else 0.0)
+            usual.append(float(given[np.argmax(count)]) if len(given) else np.nan)
             if len(given) > 1:
                 doubts.append(f"of {joint} is {given[0]:.6g} to {given[-1]:.6g}")
-        least = 0.0 if name == "velocity_gain" else None
-        texts = ['"free"' if not x and least is None else f"{x:.6g}" for x in usual]
+        least = 0.0 if name == "velocity_gain" else 1e-300
+        texts = [f"{x:.6g}" if x >= least else '"free"' for x in usual]
         alike = len(set(texts)) == 1
         change = f"{'; '.join(doubts)}: the most frequent is here; cut the log to where it holds"
-        doubt = f"  # {DOUBTFUL}{name} {change}" if doubts else "  # constant in the log"
+        constant = "" if '"free"' in texts else "  # constant in the log"
+        doubt = f"  # {DOUBTFUL}{name} {change}" if doubts else constant
         yield f"{name} = {texts[0] if alike else '[' + ', '.join(texts) + ']'}{doubt}"
 
 

@@ -224,7 +224,10 @@ def _rows(table: Table, columns: Sequence[str], clock: Mapping[str, str]) -> tup
     below = [clock["nanosec"]] if "nanosec" in clock else []
     names = tuple(dict.fromkeys([*(name for name, _ in places), *below]))
     wanted = Wanted(names, (clock["column"],), TIME_UNITS.get(clock["unit"]))
-    block = next(table.blocks(wanted, lambda _: None), None)
+    try:
+        block = next(table.blocks(wanted, lambda _: None), None)
+    except InputError:  # text
+        block = None
     if block is None:
         return np.empty(0), np.empty((0, len(columns)))
     ns = block.clocks[clock["column"]][0][:_ROWS]

@@ -15,7 +15,8 @@ isaaclab          {implicit, dc_motor, names_before_3_0}: keys of ImplicitActuat
 missing           {joint: list of keys that these configurations need and that are not determined}
 
 Ranges for domain randomisation come from the posterior: 95 % quantiles of a log-normal distribution of that mean and
-standard error; from 0 to two standard errors for a value at its bound of 0; a delay within two standard errors.
+standard error; from 0 to two standard errors for a value at its bound of 0; a delay within two standard errors. A delay
+counts from the stamp of a command that holds until the next one.
 
 Sources: mujocolab.github.io/mjlab (mjlab.actuator), isaac-sim.github.io/IsaacLab/release/3.0.0 (isaaclab.actuators).
 """
@@ -43,7 +44,7 @@ STEMS: Mapping[str, tuple[str, ...]] = {
     "effort_limit": ("limit", "effort_limit"),
     "saturation_effort": ("stall",),
     "velocity_limit": ("no_load", "velocity_limit"),
-    "delay": ("delay",),
+    "delay": ("delay", "command_delay"),
 }
 """Quantities, each with the first words of the parameters that are one."""
 UNITS: Mapping[str, tuple[str, str]] = {
@@ -78,6 +79,8 @@ BEFORE_3_0 = {
     "joint_effort_limit": "effort_limit_sim", "joint_velocity_limit": "velocity_limit_sim",
     "actuator_effort_limit": "effort_limit", "actuator_velocity_limit": "velocity_limit",
 }  # fmt: skip
+TORQUE_DELAY = "delay_s"
+"""Parameter of the log that says how much later than the motion its torques are."""
 _OF_MAP = {
     "stiffness": ("position_gain", 0), "damping": ("velocity_gain", 1), "effort_limit": ("limit", None),
     "delay": ("delay_s", None),
@@ -124,13 +127,15 @@ def to_dict(
         for quantity, units in UNITS.items():
             unit = units[int(found.model.slides[j])]
             k, p = own.get((name, quantity), (-1, None))
+            mean, factor, source = _given(found, drives, j, quantity)
             if p is not None and p.determined:
-                ends, kind = range_of(quantity, p.value, p.se)
-                joints[name][quantity] = _entry(p.value, p.se, ends, kind, unit, "logs")
+                # Torques that commands ask for come early, by what the drive lags behind the map's delay.
+                value = float(np.nan_to_num(mean)) - p.value if p.name == TORQUE_DELAY else p.value
+                ends, kind = range_of(quantity, value, p.se)
+                joints[name][quantity] = _entry(value, p.se, ends, kind, unit, "logs")
                 fitted.append((k, name, quantity))
                 continue
-            mean, factor, source = _given(found, drives, j, quantity) if p is None else (np.nan, np.inf, "")
-            if np.isfinite(mean) and factor == 1.0:
+            if p is None and np.isfinite(mean) and factor == 1.0:
                 joints[name][quantity] = _entry(mean, 0.0, [mean, mean], "given", unit, source)
                 continue
             around = [mean / factor, mean * factor] if factor < np.inf else None

@@ -60,15 +60,14 @@ def _by_loop(log: JointLog) -> Array:
 
 
 def _late(log: JointLog, told: Array) -> Array:
-    """Return what the drives have been told by ``delay_s`` before each instant, shape (Q, J)."""
-    late_s = np.nan_to_num(log.drive.delay_s)
-    if not late_s.any():
-        return told
-    at = log.time[:, None] - late_s
-    if log.drive.held:
-        rows = np.floor(at * log.rate_hz + 1e-6).astype(int)
-        return np.take_along_axis(told, np.clip(rows, 0, None), axis=0)
-    columns = [np.interp(x, log.time, y) for x, y in zip(at.T, told.T, strict=True)]
+    """Return what the drives follow at each instant, ``delay_s`` after it was told, shape (Q, J).
+
+    A command that holds is in force for the period after its sample; half a period earlier is the mean around it.
+    """
+    late_s = np.nan_to_num(log.drive.delay_s) + 0.5 * log.period_s * log.drive.held
+    columns = [
+        np.interp(log.time - late, log.time, x) if late else x for late, x in zip(late_s, told.T, strict=True)
+    ]
     return np.column_stack(columns)
 
 

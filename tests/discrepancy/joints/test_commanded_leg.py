@@ -223,7 +223,7 @@ def test_ranges_covariance_and_a_motor(leg):
     parameters = [
         replace(p, determined=True, value=0.3, se=0.1) if p.name == "coulomb_Nm"
         else replace(p, determined=True, value=0.0, se=0.02) if p.name == "viscous_Nms_per_rad"
-        else replace(p, determined=True, value=0.004, se=0.0007) if p.name == "delay_s" else p
+        else replace(p, determined=True, value=-0.004, se=0.0007) if p.name == "delay_s" else p
         for p in (*calibration.found.parameters, *more)
     ]  # fmt: skip
     found = replace(calibration.found, parameters=tuple(parameters))
@@ -270,3 +270,16 @@ def test_logs_with_torques_make_no_actuators(leg, tmp_path):
     assert not log.by_command
     assert log.asked is not None
     assert log.asked.tolist() == [False, True]
+
+
+def test_a_delay_is_that_of_the_drive(leg, tmp_path):
+    """The drive follows 8 ms after the stamps of the commands; the map tells all of it, a part, or nothing."""
+    columns = np.genfromtxt(leg / "log.csv", delimiter=",", skip_header=1)
+    late = np.column_stack([columns[:-4, :3], columns[4:, 3:]])
+    np.savetxt(tmp_path / "log.csv", late, delimiter=",", comments="", header=HEADER, fmt="%.8g")
+    for known in ("", "delay_s = 0.008\n", "delay_s = 0.005\n"):
+        (tmp_path / "log.toml").write_text(f"{MAP}{known}", encoding="utf-8")
+        found = mocobot.calibrate(tmp_path / "log.csv", leg / "leg.xml", map=tmp_path / "log.toml")
+        told = to_dict(found.found, found.drives)["joints"]
+        for joint in ("hip", "knee"):
+            assert told[joint]["delay"]["mean"] == pytest.approx(0.008, abs=3e-4)

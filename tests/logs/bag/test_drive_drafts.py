@@ -372,3 +372,13 @@ def test_the_command_that_the_position_follows_is_chosen(tmp_path) -> None:
     assert 'command = { column = "{joint}_goal"' in text
     assert "doubtful: elbow moves against it: sign = -1?" in text
     assert lag_ms(text) == pytest.approx(50.0, abs=1.0)
+
+
+def test_a_time_that_cannot_be_read_leaves_the_lag_out(tmp_path) -> None:
+    rows = "\n".join(f"noon,{0.1 * k},{0.1 * k},20" for k in range(100))
+    (tmp_path / "log.csv").write_text(f"time,j_pos,j_goal,j_motor_cmd_kp\n{rows}\n", encoding="utf-8")
+    text = draft_joint_map(tmp_path / "log.csv", ["j"], [False]).text
+    assert "its values cannot be read" in text
+    assert 'command = { column = "{joint}_goal"' in text
+    assert 'position_gain = "free"\n' in text
+    assert "follows" not in text

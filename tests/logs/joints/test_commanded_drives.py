@@ -149,7 +149,10 @@ def test_commands_have_rows_of_their_own(tmp_path) -> None:
 
 
 def test_torques_that_a_loop_is_asked_for(tmp_path) -> None:
-    """kp (q_d - q) + kd (dq_d - dq) + tau, as Unitree's motors have it, two samples after the command."""
+    """kp (q_d - q) + kd (dq_d - dq) + tau, as Unitree's motors have it, two samples after the command.
+
+    At a sample, what has held changes to what will hold: the mean of both acts.
+    """
     rng = np.random.default_rng(2)
     extra = {f"{joint}.{name}": rng.normal(size=len(TIME)) for joint in JOINTS for name in ("ff", "dgoal")}
     more = """
@@ -163,14 +166,13 @@ unit = "rad/s"
     units = LIFT + 'feedforward.unit = "N"\ncommand_velocity.unit = "m/s"\n'
     gains = 'gain_of = "torque"\nposition_gain = [20, 30, 900]\nvelocity_gain = [1.5, 0, 40]\ndelay_s = 0.004'
     log = log_of(tmp_path, commanded(gains, more).replace(LIFT, units), **extra)
-    late = np.maximum(np.arange(len(TIME)) - 2, 0)
+    now, before = (np.maximum(np.arange(len(TIME)) - k, 0) for k in (2, 3))
     q, dq = motion(TIME)
     ff, dgoal = (np.column_stack([extra[f"{joint}.{name}"] for joint in JOINTS]) for name in ("ff", "dgoal"))
-    wanted = np.array([20, 30, 900]) * (staircase(TIME)[late] - q) + np.array([1.5, 0, 40]) * (
-        dgoal[late] - dq
-    )
+    goal, dgoal_acts, ff_acts = (0.5 * (x[now] + x[before]) for x in (staircase(TIME), dgoal, ff))
+    wanted = np.array([20, 30, 900]) * (goal - q) + np.array([1.5, 0, 40]) * (dgoal_acts - dq)
     assert log.torque is not None
-    np.testing.assert_allclose(log.torque, wanted + ff[late], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(log.torque, wanted + ff_acts, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(log.drive.feedforward, ff)
     np.testing.assert_array_equal(log.drive.command_velocity, dgoal)
 

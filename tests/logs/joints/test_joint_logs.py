@@ -155,7 +155,11 @@ control = { command = "position", position_gain = [30, 20, 900] }
     (log,) = read(folder, text)
     assert log.rate_hz == 50.0
     assert log.torque is not None
-    np.testing.assert_allclose(log.torque, [30, 20, 900] * (log.command - log.q), atol=1e-9)
+    assert log.command is not None
+    held = 0.5 * (
+        log.command + np.concatenate([log.command[:1], log.command[:-1]])
+    )  # before and after a sample
+    np.testing.assert_allclose(log.torque, [30, 20, 900] * (held - log.q), atol=1e-9)
     np.testing.assert_allclose(log.q, late, atol=1e-6)
     np.testing.assert_allclose(log.command, q, atol=1e-6)
     assert log.drive.command == "position"
