@@ -133,7 +133,7 @@ def fitted_model(folder: Path, options: Options) -> tuple[mujoco.MjModel, Array]
     found = parameters_of(options.result)
     numbers = {"kp": law.kp.copy(), "kd": law.kd.copy(), "delay_s": np.zeros(len(joints))}
     for j, joint in enumerate(joints):
-        for key, stem in (("kp", KP), ("kd", KD), ("delay_s", DELAY)):
+        for key, stem in (("kp", KP), ("kd", KD), ("delay_s", f"command_{DELAY}")):
             if (one := _found(found, joint, stem)) is not None:
                 numbers[key][j] = one["value"]
     law = replace(law, **numbers)
@@ -191,7 +191,7 @@ def scored(folder: Path, options: Options) -> list[Scored]:
     acts = _each(truth, "kd") - _each(truth, "kp") * _each(truth, "loop_delay_s")
     for j, (joint, own) in enumerate(truth["joints"].items()):
         gain = _found(parameters, joint, KD)
-        wanted = {ARMATURE: own[ARMATURE], DELAY: own[DELAY], KP: own["kp"], KD: acts[j]}
+        wanted = {ARMATURE: own[ARMATURE], f"command_{DELAY}": own[DELAY], KP: own["kp"], KD: acts[j]}
         if plain:
             wanted[COULOMB] = own[COULOMB]
             wanted[VISCOUS] = own[VISCOUS] + (0.0 if gain else acts[j] - law.kd[j])

@@ -57,7 +57,7 @@ PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determin
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
-    "offset": "torque offset", "gain": "torque gain", "delay": "delay", "zero": "zero",
+    "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "command": "command", "zero": "zero",
     "position": "frame position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
     "com": "centre of mass", "inertia": "inertia",
 }  # fmt: skip
@@ -255,7 +255,7 @@ def described(name: str) -> tuple[str, str, float]:
         return "position gain", UNITS[suffix], 1.0
     words, middle = WORDS[stem], rest.removesuffix(suffix).strip("_").replace("_", " ")
     unit, scale = SMALL.get(UNITS[suffix], (UNITS[suffix], 1.0))
-    middle = WORDS.get(middle, middle)
+    middle = "delay" if stem == "command" else WORDS.get(middle, middle)
     return (
         f"{words} {middle}".strip(),
         SHOWN.get(unit, unit) if unit == "N m" and suffix == "N" else unit,
@@ -342,9 +342,8 @@ def as_found(found: ArmCalibration) -> tuple[mujoco.MjSpec, list[str]]:
     for b in found.links:
         body = spec.body(found.model.model.body(b).name)
         set_inertial(body, float(found.tree.mass[b]), found.tree.com[b], real_inertia(found.tree.inertia[b]))
-    if found.gains is not None:
-        for name, (stiffness, damping, most) in zip(found.model.joints, found.gains, strict=True):
-            servo(spec, name, float(stiffness), float(damping), float(most))
+    for name, loop in zip(found.model.joints, () if found.servos is None else found.servos, strict=False):
+        servo(spec, name, *map(float, loop))
     effects = effects_of(found)
     inside = with_effects(spec, numbered(effects, found.model))[1]
     joints = found.model.joints

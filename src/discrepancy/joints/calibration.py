@@ -44,8 +44,8 @@ class ArmCalibration:
         logs: names of the logs.
         notes: sentences on the logs and on what is not fitted.
         predicts: what ``held_out`` predicts: torques from the motion, or positions from commands over one second.
-        gains: position gain, velocity gain without negative damping, and largest torque of each joint's position loop,
-            shape (J, 3); None unless positions are predicted.
+        servos: what MJCF can hold of each joint's position loop, shape (J, 4); None unless positions are predicted:
+            position gain, velocity gain with negative damping, torque added to it, and largest torque.
         covariance: posterior covariance of ``parameters``, in their order, shape (P, P).
     """
 
@@ -64,7 +64,7 @@ class ArmCalibration:
     notes: tuple[str, ...]
     predicts: Literal["torque", "position"] = "torque"
     covariance: Array | None = None
-    gains: Array | None = None
+    servos: Array | None = None
 
 
 def calibrate_arm(
@@ -96,9 +96,9 @@ def calibrate_arm(
             f"errors, where less than {SETTLED:g} is settled."
         ]
     say("predicting each part from the others")
-    if isinstance(fit, LoopFit):
-        print(fit.scatter())
     held = fit.held_out()
+    if isinstance(fit, LoopFit):
+        fit.widen()
     names = tuple(dict.fromkeys(log.name for log in logs))
     notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs)]
     notes = [*unsettled, *notes, *fit.notes()]
@@ -106,5 +106,5 @@ def calibrate_arm(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
         len(trials.parts) > 1, names, tuple(notes), "position" if positions else "torque", fit.covariances(),
-        fit.gains(),
+        fit.servos(),
     )  # fmt: skip

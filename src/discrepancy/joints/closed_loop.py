@@ -155,6 +155,12 @@ class ClosedLoop:
         limit = np.where(np.isnan(d.limit), np.inf, d.limit)
         return d.position_gain, np.nan_to_num(d.velocity_gain), limit, on
 
+    @property
+    def plain(self) -> Array:
+        """The loops as the log's map has them: gains, no torque added, and limit, shape (J, 4)."""
+        kp, kd, limit, _ = self.gains(1)
+        return np.column_stack([kp, kd, np.zeros(len(kp)), limit])
+
     def told(self, late: Array) -> tuple[Array, Array]:
         """Commanded positions and torques beside them, means over each step, shape (N, J) each."""
         log, d = self.signals.log, self.signals.log.drive

@@ -489,8 +489,8 @@ class Fit:
         known, name = se < DETERMINED * prior, parameter_name(s.name, slide=slide)
         return Parameter(s.place, name, float(s.model), float(s.model + value), se, prior, known, s.in_model)
 
-    def gains(self) -> Array | None:
-        """Gains and limits of position loops, shape (J, 3); None: the fit has none."""
+    def servos(self) -> Array | None:
+        """Position loops as MJCF holds them, shape (J, 4); None: the fit has none."""
         return None
 
     def covariances(self) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
@@ -54,8 +53,8 @@ def machine(model: SerialModel, given: Tree, found: Tree) -> mujoco.MjModel:
 
 
 def errors(
-    m: mujoco.MjModel, model: SerialModel, loop: ClosedLoop, braking: Array, zero: Array, late: Array, gain: Array,
-    steps: slice, window_s: float = WINDOW_S, tick: Callable[[], object] = lambda: None,
+    m: mujoco.MjModel, model: SerialModel, loop: ClosedLoop, servos: Array, zero: Array, late: Array, steps: slice,
+    window_s: float = WINDOW_S,
 ) -> Array:  # fmt: skip
     """Forecast minus measured positions in consecutive windows, shape (M, J); NaN where none was measured.
 
@@ -63,23 +62,21 @@ def errors(
         m: result of ``machine``.
         model: the robot as described.
         loop: the log with its estimated motion, from which every window starts.
-        braking: damping that the loop has beside its velocity gain, shape (J,).
-        zero, late, gain: joint zeros, delays of the commands [s] and factors of the loops' gains, shape (J,).
+        servos: position gain, velocity gain, torque added, and largest torque of each loop, shape (J, 4).
+        zero, late: joint zeros and delays of the commands [s], shape (J,).
         steps: steps of the grid to forecast.
         window_s: length of a window [s].
-        tick: called once for every window.
     """
     h, data, own = loop.step_s, mujoco.MjData(m), model.coupling.own
     dof, every = m.jnt_dofadr[own], max(1, int(np.ceil(loop.step_s / STEP_S - 1e-9)))
     m.opt.timestep = h / every
-    kp, kd, limit, on = loop.gains(len(loop.q) - 1)
-    kp, kd = gain * kp, gain * kd + braking
-    told = loop.told(late)
+    (kp, kd, more, limit), on = servos.T, loop.gains(len(loop.q) - 1)[3]
+    command, added = loop.told(late)
+    added = added * (kp / loop.gains(1)[0]) + more
     out = np.full(loop.measured.shape, np.nan)
     long = max(loop.every, round(window_s / h / loop.every) * loop.every)
     begin = -(-steps.start // loop.every) * loop.every
     for first in range(begin, steps.stop - loop.every + 1, long):
-        tick()
         mujoco.mj_resetData(m, data)
         q, dq = model.coupling.all(loop.q[first] + zero, loop.dq[first])
         data.qpos[:], data.qvel[:] = q, dq
@@ -89,9 +86,7 @@ def errors(
                 if lost:
                     break
                 at, rate = data.qpos[own] - zero, data.qvel[dof]
-                torque = (
-                    np.clip(kp * (told[0][n] - at) + gain * told[1][n] - kd * rate, -limit, limit) * on[n]
-                )
+                torque = np.clip(kp * (command[n] - at) + added[n] - kd * rate, -limit, limit) * on[n]
                 data.qfrc_applied[dof] = torque
                 mujoco.mj_step(m, data)
                 lost = not np.abs(data.qpos[own] - loop.q[n]).max() < LOST

@@ -46,20 +46,23 @@ class Filtered:
     Attributes:
         loop: the loop.
         gain: shape (M, 2J, J).
+        spread: covariance of the predicted state at every grid point, shape (N + 1, 2J, 2J).
         root: inverse of the lower Cholesky factor of the innovations' covariance, shape (M, J, J).
     """
 
     loop: LinearLoop
     gain: Array
     root: Array
+    spread: Array
 
     @classmethod
     def of(cls, loop: LinearLoop) -> Filtered:
         """Run the covariance recursion."""
         M, J = loop.R.shape
         gain, root = np.zeros((M, 2 * J, J)), np.zeros((M, J, J))
-        _gains(loop.A, loop.B, loop.Q, loop.R, loop.every, loop.start, gain, root)
-        return cls(loop, gain, root)
+        spread = np.zeros((len(loop.A) + 1, 2 * J, 2 * J))
+        _gains(loop.A, loop.B, loop.Q, loop.R, loop.every, loop.start, gain, root, spread)
+        return cls(loop, gain, root, spread)
 
     def innovations(self, torque: Array, position: Array | None = None) -> Array:
         """Whitened innovations of input series, shape (M, J, P).
@@ -90,21 +93,20 @@ class Filtered:
             torque: input torques, shape (N, J).
             position: measurements, shape (M, J).
         """
-        N, twice = self.loop.A.shape[:2]
-        white = self.innovations(torque[:, :, None], position)[:, :, 0]
-        out = np.zeros((N + 1, twice))
+        loop, out = self.loop, np.zeros((len(self.loop.A) + 1, self.loop.A.shape[1]))
         _smooth(
-            self.loop.A, self.loop.B, self.loop.Q, self.gain, self.root, self.loop.every, self.loop.start, torque,
-            white, out,
+            loop.A, loop.B, self.gain, self.root, self.spread, loop.every, np.ascontiguousarray(torque),
+            np.ascontiguousarray(position), out,
         )  # fmt: skip
         return out
 
 
 @compiled
-def _gains(A, B, Q, R, every, start, gain, root):
-    N, _, J = B.shape
+def _gains(A, B, Q, R, every, start, gain, root, spread):
+    N, twice, J = B.shape
     P = np.diag(start)
     for n in range(N + 1):
+        spread[n] = P
         if n % every == 0:
             k = n // every
             if np.isfinite(R[k]).all():
@@ -112,8 +114,11 @@ def _gains(A, B, Q, R, every, start, gain, root):
                 S = P[:J, :J] + np.diag(R[k])
                 inverse = np.linalg.inv(np.linalg.cholesky(S))
                 K = np.dot(np.dot(H, np.ascontiguousarray(inverse.T)), inverse)
-                P = P - np.dot(K, np.ascontiguousarray(H.T))
-                P = 0.5 * (P + P.T)
+                # Joseph's form keeps P positive definite.
+                kept = np.eye(twice)
+                kept[:, :J] -= K
+                P = np.dot(np.dot(kept, P), np.ascontiguousarray(kept.T))
+                P = P + np.dot(K * R[k], np.ascontiguousarray(K.T))
                 gain[k] = K
                 root[k] = inverse
         if n < N:
@@ -139,25 +144,27 @@ def _filter(A, B, gain, root, every, torque, position, out):
 
 
 @compiled
-def _smooth(A, B, Q, gain, root, every, start, torque, white, out):
+def _smooth(A, B, gain, root, spread, every, torque, position, out):
     N, twice, J = B.shape
+    x, white = np.zeros(twice), np.zeros((len(gain), J))
+    for n in range(N + 1):
+        out[n] = x
+        if n % every == 0:
+            k = n // every
+            e = position[k] - x[:J]
+            white[k] = np.dot(root[k], e)
+            x = x + np.dot(gain[k], e)
+        if n < N:
+            x = np.dot(A[n], x) + np.dot(B[n], torque[n])
     back = np.zeros(twice)
-    push = np.zeros((N, J))
     for n in range(N, -1, -1):
         if n < N:
-            push[n] = Q[n] * np.dot(np.ascontiguousarray(B[n].T), back)
             back = np.dot(np.ascontiguousarray(A[n].T), back)
         if n % every == 0:
             k = n // every
-            score = np.dot(np.ascontiguousarray(root[k].T), white[k]) - np.dot(
-                np.ascontiguousarray(gain[k].T), back
-            )
-            back[:J] += score
-    x = start * back
-    out[0] = x
-    for n in range(N):
-        x = np.dot(A[n], x) + np.dot(B[n], torque[n] + push[n])
-        out[n + 1] = x
+            score = np.dot(np.ascontiguousarray(root[k].T), white[k])
+            back[:J] += score - np.dot(np.ascontiguousarray(gain[k].T), back)
+        out[n] += np.dot(spread[n], back)
 
 
 @compiled

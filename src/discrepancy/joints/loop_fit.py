@@ -23,6 +23,8 @@ LATE_S = 0.02
 """Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
 LEARNING = 4
 """Steps in which the noise is learnt, too. Chosen: the fit settles only when it is held."""
+WIDE = 1.5
+"""Least factor on standard errors that is told. Chosen: ten values of two parts scatter by less than that."""
 REST_SHARE = 0.05
 """Least friction at rest over the rms torque. Chosen."""
 
@@ -64,12 +66,14 @@ class LoopFit(Fit):
     Attributes:
         loops: closed loops of the runs.
         steps: steps done.
+        widened: factor on the standard errors by quantity, see ``widen``.
     """
 
     late_s = LATE_S
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
         self.loops, self.steps = [ClosedLoop.of(s) for s in trials.runs], 0
+        self.widened: dict[str, float] = {}
         super().__init__(model, replace(trials, noise=(), kept=()))
         names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
         self.options = replace(self.options, wanted=frozenset([*names, *(s.label for s in self.scalars)]))
@@ -116,28 +120,27 @@ class LoopFit(Fit):
         self.steps += 1
         return moved if self.steps > LEARNING else np.inf
 
-    def scatter(self) -> dict[str, float]:
-        """Widen standard errors by the scatter between parts, and return the factor by quantity (R. T. Birge, 1932).
+    def widen(self) -> None:
+        """Widen standard errors by the scatter between parts, by quantity (R. T. Birge, Phys. Rev. 40, 1932).
 
-        The values of one part differ from those of all by as much as their covariances differ, if the model holds. Where
-        its laws do not, such as those of friction, other motions give other values.
+        Values of one part differ from those of all by as much as their covariances differ, if the model holds. Where its
+        laws do not, such as those of friction, other motions give other values.
         """
         parts, n = range(len(self.normals)), self.first
-        names, out = [s.name for s in self.scalars], {}
+        names = [s.name for s in self.scalars]
         if len(parts) < 2:
-            return out
+            return
         squares = []
         for t in parts:
             x, covariance = self.solved([t])
             wider = np.diag(covariance - self.covariance)[n:]
             squares.append((x - self.x)[n:] ** 2 / np.maximum(wider, 1e-3 * np.diag(covariance)[n:]))
-        each, wide = np.mean(squares, axis=0) * len(parts) / (len(parts) - 1), np.ones(len(self.x))
+        each, wide = np.mean(squares, axis=0), np.ones(len(self.x))
         for name in dict.fromkeys(names):
             at = [i for i, own in enumerate(names) if own == name]
-            out[name] = max(1.0, float(np.sqrt(np.mean(each[at]))))
-            wide[n + np.array(at)] = out[name]
+            self.widened[name] = max(1.0, float(np.sqrt(np.mean(each[at]))))
+            wide[n + np.array(at)] = self.widened[name]
         self.covariance = self.covariance * np.outer(wide, wide)
-        return out
 
     def each(self, what: str) -> Array:
         """A value of the linearisation point for every joint, shape (J,)."""
@@ -146,6 +149,9 @@ class LoopFit(Fit):
     def told(self, s: Scalar, value: float, se: float, prior: float) -> Parameter:
         """A scalar as it is told; roughly known gains by their values, which a gain's error divides."""
         j = self.model.joints.index(s.place) if s.place in self.model.joints else -1
+        if s.name == "delay_s":
+            told = float(np.nan_to_num(self.loops[0].signals.log.drive.delay_s[j]))
+            s = replace(s, name="command_delay_s", model=told)
         if s.name != "gain" or self.rough(j) == 1.0:
             return super().told(s, value, se, prior)
         gain, error = float(self.loops[0].signals.log.drive.position_gain[j]), 1.0 + value
@@ -154,11 +160,19 @@ class LoopFit(Fit):
         known = se < DETERMINED * prior
         return Parameter(s.place, name, gain, gain / error, slope * se, slope * prior, known, in_model=False)
 
-    def gains(self) -> Array:
-        """Position gain, velocity gain with negative damping, and largest torque of each loop, shape (J, 3)."""
+    def servos(self) -> Array:
+        """Position gain, velocity gain with negative damping, torque added, and largest torque, shape (J, 4)."""
         kp, kd, limit, _ = self.loops[0].gains(1)
         true = 1.0 / (1.0 + self.each("scale"))
-        return np.column_stack([kp * true, kd * true + np.minimum(self.tree.viscous, 0.0), limit])
+        return np.column_stack(
+            [kp * true, kd * true + np.minimum(self.tree.viscous, 0.0), -self.offset * true, limit]
+        )
+
+    @property
+    def offset(self) -> Array:
+        """Torque that the loop's formula tells too much, shape (J,)."""
+        own = dict(zip((s.label for s in self.scalars), self.x[self.first :], strict=True))
+        return np.array([own.get(f"{n} offset_Nm", 0.0) for n in self.model.joints])
 
     def numbers(self) -> Tree:
         """The tree with the fitted lengths and gravity, too."""
@@ -173,20 +187,22 @@ class LoopFit(Fit):
         for t in parts:
             k, steps = self.trials.parts[t]
             loop = self.loops[k]
-            self.jump(self.solved([o for o in parts if o != t] or [t])[0])
-            fitted, braking = (
+            self.x = self.solved([o for o in parts if o != t] or [t])[0]
+            self.jump(self.x)
+            fitted, zero, late = (
                 machine(self.model, self.given, self.numbers()),
-                np.minimum(self.tree.viscous, 0.0),
+                self.zero(),
+                self.each("delay_s"),
             )
-            gain = 1.0 / (1.0 + self.each("scale"))
             off = (
-                errors(plain, self.model, loop, none, none, none, none + 1.0, steps),
-                errors(fitted, self.model, loop, braking, self.zero(), self.each("delay_s"), gain, steps),
+                errors(plain, self.model, loop, loop.plain, none, none, steps),
+                errors(fitted, self.model, loop, self.servos(), zero, late, steps),
             )
             model, best = (np.sqrt(np.nanmean(x**2, axis=0)) for x in off)
             rows = loop.measured[steps.start // loop.every : steps.stop // loop.every]
             read, size = np.sqrt(loop.reading), np.nanstd(rows, axis=0)
             out.append(HeldOut(self.trials.names[t], model, none + np.nan, best, read, size))
+        self.x = before
         self.jump(before)
         return tuple(out)
 
@@ -201,6 +217,13 @@ class LoopFit(Fit):
             yield (
                 f"Velocity gain and viscous friction of {', '.join(names)} have the same effect: only their sum is "
                 "determined. The viscous friction is told for the velocity gain of the map, 0 where it is free."
+            )
+        wide = {name: factor for name, factor in self.widened.items() if factor > WIDE}
+        if wide:
+            listed = ", ".join(f"{name} {factor:.1f}" for name, factor in wide.items())
+            yield (
+                "Parts of the logs differ by more than their standard errors, so something acts that no parameter is. "
+                f"Standard errors count that scatter; they are wider by a factor of: {listed}."
             )
         jitter = max(float(np.sqrt(loop.jitter).max()) for loop in self.loops)
         if jitter > 1e-4:

@@ -248,13 +248,16 @@ def with_effects(spec: mujoco.MjSpec, effects: Sequence[Effect]) -> tuple[mujoco
         raise InputError(f"MuJoCo refuses the model with the causes in it ({text})") from error
 
 
-def servo(spec: mujoco.MjSpec, joint: str, stiffness: float, damping: float, most: float) -> None:
+def servo(
+    spec: mujoco.MjSpec, joint: str, stiffness: float, damping: float, more: float, most: float
+) -> None:
     """Make the actuator of a joint, or a new one, a position loop.
 
     Args:
         spec: the robot; changed.
         joint: name of the joint.
         stiffness, damping: torque per error of position and per velocity [N m/rad, N m s/rad; N/m, N s/m].
+        more: torque added [N m or N].
         most: largest torque [N m or N], inf for no limit.
     """
     own = [a for a in spec.actuators if a.trntype == mujoco.mjtTrn.mjTRN_JOINT and a.target == joint]
@@ -264,8 +267,12 @@ def servo(spec: mujoco.MjSpec, joint: str, stiffness: float, damping: float, mos
         actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
         actuator.dyntype, actuator.ctrllimited = mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtLimited.mjLIMITED_FALSE
         gear, count = actuator.gear[0], len(own)
-        actuator.gainprm[:3] = stiffness / gear**2 / count, 0.0, 0.0
-        actuator.biasprm[:3] = 0.0, -stiffness / gear**2 / count, -damping / gear**2 / count
+        actuator.gainprm[:3] = stiffness / gear / count, 0.0, 0.0
+        actuator.biasprm[:3] = (
+            more / gear / count,
+            -stiffness / gear**2 / count,
+            -max(damping, 0.0) / gear**2 / count,
+        )
         if np.isfinite(most):
             actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
             actuator.forcerange = np.array([-most, most]) / abs(gear) / count
