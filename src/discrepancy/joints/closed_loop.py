@@ -142,7 +142,8 @@ class ClosedLoop:
         ones = np.ones(q.shape, dtype=bool)
         return replace(
             self.signals, rate_hz=1.0 / h, time=time, q=q, dq=dq, ddq=ddq, torque=torque, usable=ones,
-            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, enabled=None, spoilt=None,
+            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, by_command=None, enabled=None,
+            spoilt=None,
         )  # fmt: skip
 
     def gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
