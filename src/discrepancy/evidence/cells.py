@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -64,6 +64,72 @@ def _fade(count: int, samples: float) -> Array:
     """Weights that rise from zero within a number of samples and fall to zero at the end, shape (count,)."""
     place = np.arange(count) + 0.5
     return np.asarray(np.sin(0.5 * np.pi * np.minimum(np.minimum(place, place[::-1]) / samples, 1.0)) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Rows of some columns. Each channel holds only the columns that are not zero in it.
+
+    Attributes:
+        count: number of columns k.
+        at: for each channel, increasing indices of its columns, shape (k_c,).
+        X: for each channel, rows of these columns, sorted by band, shape (n, k_c).
+    """
+
+    count: int
+    at: Sequence[NDArray[np.intp]]
+    X: Sequence[NDArray[Any]]
+
+    @classmethod
+    def none(cls, channels: int, rows: int) -> Columns:
+        """No columns, of a number of channels with a number of rows each."""
+        at = np.zeros(0, dtype=np.intp)
+        return cls(0, [at] * channels, [np.zeros((rows, 0), dtype=np.float32)] * channels)
+
+    @classmethod
+    def of(cls, X: NDArray[Any]) -> Columns:
+        """Drop the zeros of columns, shape (C, n, k)."""
+        at = [np.flatnonzero(x.any(axis=0)) for x in X]
+        return cls(X.shape[2], at, [x[:, k] for x, k in zip(X, at, strict=True)])
+
+    @classmethod
+    def joined(cls, each: Sequence[Columns]) -> Columns:
+        """Append columns to one another."""
+        first = np.cumsum([0, *(e.count for e in each)])
+        at = [
+            np.concatenate([f + e for f, e in zip(first, own, strict=False)])
+            for own in _by_channel(e.at for e in each)
+        ]
+        return cls(
+            int(first[-1]), at, [np.concatenate(own, axis=1) for own in _by_channel(e.X for e in each)]
+        )
+
+    @property
+    def single(self) -> Columns:
+        """The same columns in single precision."""
+        return replace(self, X=[x.astype(np.float32) for x in self.X])
+
+    @property
+    def shown(self) -> NDArray[np.intp]:
+        """Indices of the columns that are not zero in every channel."""
+        return np.unique(np.concatenate(self.at))
+
+    def only_shown(self) -> Columns:
+        """Drop the columns that are zero in every channel, and renumber the others."""
+        shown = self.shown
+        return Columns(len(shown), [np.searchsorted(shown, at) for at in self.at], self.X)
+
+    def dense(self, which: Sequence[int]) -> NDArray[Any]:
+        """Some columns with their zeros, in increasing order, shape (C, n, len(which))."""
+        out = np.zeros((len(self.X), len(self.X[0]), len(which)), dtype=self.X[0].dtype)
+        for own, at, x in zip(out, self.at, self.X, strict=True):
+            _, to, of = np.intersect1d(which, at, assume_unique=True, return_indices=True)
+            own[:, to] = x[:, of]
+        return out
+
+
+def _by_channel(each: Iterable[Sequence[NDArray[Any]]]) -> list[list[NDArray[Any]]]:
+    return [list(own) for own in zip(*each, strict=True)]
 
 
 @dataclass(eq=False)
@@ -149,14 +215,13 @@ class Cells:
         self.count += len(series)
         return list(range(first, self.count))
 
-    def add_rows(self, X: NDArray[Any]) -> list[int]:
-        """Append columns given as rows in each channel, sorted by band, shape (C, n, k); return their indices."""
+    def add_rows(self, columns: Columns) -> list[int]:
+        """Append columns, and return their indices."""
         first, self._last = self.count, None
-        for channel, own in zip(self.channels, X, strict=True):
-            seen = np.flatnonzero(own.any(axis=0))
-            if len(seen):
-                self._append(channel, (first + seen).tolist(), own[:, seen].astype(np.float64))
-        self.count += X.shape[2]
+        for channel, at, X in zip(self.channels, columns.at, columns.X, strict=True):
+            if len(at):
+                self._append(channel, (first + at).tolist(), X.astype(np.float64))
+        self.count += columns.count
         return list(range(first, self.count))
 
     @staticmethod
