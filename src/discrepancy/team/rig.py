@@ -38,7 +38,7 @@ from discrepancy.team.linear.start import (
     trial_at,
     without_bases,
 )
-from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.linear.trial_linear import TrialLinear, with_derivatives
 from discrepancy.team.long import LaterPart
 from estimator.arm.motion import PHI, TAU, THETA
 from estimator.arm.unit import ArmUnit
@@ -330,13 +330,15 @@ class TeamRig:
         """
         units, shared = found.units, found.shared
         known = replace(recording, metadata=replace(recording.metadata, units=units))
-        trial = trial_at(known, shared, self.sensed.noise, full=False)
+        trial = trial_at(known, shared, self.sensed.noise)
         own = replace(self, recordings=(known,), linear=(trial,), kept={})
         signals, others = own._without(0, found.causes)
-        rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
+        rows = trial.residual
+        if signals is not trial.signals:
+            rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
         if others:
-            own = replace(own, linear=(trial_at(known, shared, self.sensed.noise, full=True),))
-            rows -= sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
+            own = replace(own, linear=(with_derivatives(trial),))
+            rows = rows - sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
         return trial.reduction, without_bases(trial, rows)
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:

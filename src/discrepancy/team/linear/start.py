@@ -264,19 +264,18 @@ def _arrays(trial: TrialLinear) -> Iterator[NDArray[np.generic]]:
     yield from (data.R_bi, data.p_bi, data.twist, data.twist_dot, data.wrench)
 
 
-def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) -> TrialLinear:
-    """Linearise a trial at given shared unknowns, with bases that fit its poses.
+def trial_at(recording: Recording, shared: Shared, noise: Noise) -> TrialLinear:
+    """Linearise a trial by the bases alone, at given shared unknowns and with bases that fit its poses.
 
     Args:
         recording: the trial.
         shared: the shared unknowns, which stay fixed.
         noise: resolution of the sensors.
-        full: whether to compute derivatives by the robots' signals.
     """
     signals, arms = noise.known_to(Signals.of(recording)), recording.metadata.arms
     angles = signals.phi[signals.keep], signals.theta[signals.keep]
     bases = start_bases(*poses(*angles, arms), shared)
-    return linearise(signals, shared, bases, arms, Reduction.of(signals), full=full, known=True)
+    return linearise(signals, shared, bases, arms, Reduction.of(signals), full=False, known=True)
 
 
 def without_bases(trial: TrialLinear, rows: Array) -> Array:
