@@ -91,14 +91,30 @@ class Listed:
     """Candidate causes whose columns are kept outside the problem.
 
     Attributes:
+        rig: the rig whose linearisation gives the columns.
         groups: the candidates, without column indices.
         columns: of all groups, in single precision.
     """
 
+    rig: TeamRig
     groups: Sequence[Group]
     columns: Columns
 
-    @property
+    def of(self, group: Group) -> Columns | None:
+        """Columns of a group, or None if it is not listed."""
+        if group.identity not in self._index:
+            return None
+        own = self.spans[self._index[group.identity]]
+        ends = [np.searchsorted(at, [own.start, own.stop]) for at in self.columns.at]
+        at = [at[low:high] - own.start for at, (low, high) in zip(self.columns.at, ends, strict=True)]
+        X = [x[:, low:high] for x, (low, high) in zip(self.columns.X, ends, strict=True)]
+        return Columns(own.stop - own.start, at, X)
+
+    @cached_property
+    def _index(self) -> dict[Hashable, int]:
+        return {g.identity: k for k, g in enumerate(self.groups)}
+
+    @cached_property
     def spans(self) -> list[slice]:
         """Columns of each group in ``columns``."""
         ends = np.cumsum([len(g.slab) for g in self.groups])
@@ -121,6 +137,7 @@ class TeamProblem:
         candidates: candidate of every group, by the group's identity.
         catalogue: columns that stay the same during the search.
         there: parameter values at the linearisation point, shape (K,).
+        near: neighbours of the shape that was refined last, and their columns.
     """
 
     rig: TeamRig
@@ -137,6 +154,7 @@ class TeamProblem:
     candidates: dict[Hashable, Candidate] = field(default_factory=dict)
     catalogue: Catalogue | None = None
     there: Array = field(default_factory=lambda: np.zeros(0))
+    near: Listed | None = None
 
     @property
     def bands(self) -> RowBands:
@@ -203,7 +221,7 @@ class TeamProblem:
         for c in candidates:
             groups.append(self.group_of(c, -math.log(c.among or count)))
             each.append(self.spectra(self.columns_of(c)).single)
-        return Listed(groups, Columns.joined(each))
+        return Listed(self.rig, groups, Columns.joined(each))
 
     def group_of(self, candidate: Candidate, log_prior: float, columns: Sequence[int] = ()) -> Group:
         """Turn a candidate into a group of the search and register it."""
@@ -239,6 +257,10 @@ class TeamProblem:
         if group.late:
             pairs = zip(self.rig.whitening, self.laws_of.columns(self.laws_of.of(group)), strict=True)
             return replace(group, columns=tuple(self.add(self.rows_of([w(x) for w, x in pairs]))))
+        for listed in filter(None, (self.listed, self.near)):
+            known = listed.of(group) if listed.rig is self.rig else None
+            if known is not None:
+                return replace(group, columns=tuple(self.cells.add_rows(known)))
         return replace(group, columns=tuple(self.add(self.columns_of(self.candidates[group.identity]))))
 
     # --- proposals
@@ -421,7 +443,7 @@ class TeamProblem:
             base = self.prior((), None)
             for k in group.columns:
                 prior[k] = base[k] if k < len(base) else 0.0
-            listed = self.listing(near, 1)
+            listed = self.near = self.listing(near, 1)
             listed = replace(listed, groups=[replace(g, log_prior=-math.log(c.among or math.exp(-group.log_prior)))
                                              for g, c in zip(listed.groups, near, strict=True)])  # fmt: skip
             gains = self.gains(Posterior(self.cells, prior, posterior.variance), listed)
@@ -550,7 +572,7 @@ class Catalogue:
         labels: list[tuple[Candidate, int] | None] = []
         none = Columns.none(len(plain.cells.channels), len(plain.cells.order))
         tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none]
-        others = [Listed([], none)]
+        others = [Listed(rig, [], none)]
         apart: dict[Hashable, Columns] = {}
         for candidate in rig.candidates():
             shapes = in_shapes(candidate, CAUSES[candidate.cause].shapes, len(rig.linear))
@@ -580,7 +602,7 @@ class Catalogue:
                 labels += [None] * rows[-1].count
             kinds.setdefault(candidate.cause, []).extend(range(first, len(labels)))
         every = [g for e in others for g in e.groups]
-        listed = near.listed if near else Listed(every, Columns.joined([e.columns for e in others]))
+        listed = near.listed if near else Listed(rig, every, Columns.joined([e.columns for e in others]))
         known = {**near.candidates, **plain.candidates} if near else plain.candidates
         return cls(rig, groups, labels, tolerance, kinds, Columns.joined(rows), listed, apart, known)
 
