@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -68,7 +68,7 @@ def _fade(count: int, samples: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Rows of some columns. Each channel holds only the columns that are not zero in it.
+    """Rows of some columns in single precision. Each channel holds only the columns that are not zero in it.
 
     Attributes:
         count: number of columns k.
@@ -78,58 +78,36 @@ class Columns:
 
     count: int
     at: Sequence[NDArray[np.intp]]
-    X: Sequence[NDArray[Any]]
-
-    @classmethod
-    def none(cls, channels: int, rows: int) -> Columns:
-        """No columns, of a number of channels with a number of rows each."""
-        at = np.zeros(0, dtype=np.intp)
-        return cls(0, [at] * channels, [np.zeros((rows, 0), dtype=np.float32)] * channels)
+    X: Sequence[NDArray[np.float32]]
 
     @classmethod
     def of(cls, X: NDArray[Any]) -> Columns:
         """Drop the zeros of columns, shape (C, n, k)."""
         at = [np.flatnonzero(x.any(axis=0)) for x in X]
-        return cls(X.shape[2], at, [x[:, k] for x, k in zip(X, at, strict=True)])
+        return cls(X.shape[2], at, [x[:, k].astype(np.float32) for x, k in zip(X, at, strict=True)])
 
     @classmethod
     def joined(cls, each: Sequence[Columns]) -> Columns:
         """Append columns to one another."""
         first = np.cumsum([0, *(e.count for e in each)])
-        at = [
-            np.concatenate([f + e for f, e in zip(first, own, strict=False)])
-            for own in _by_channel(e.at for e in each)
-        ]
-        return cls(
-            int(first[-1]), at, [np.concatenate(own, axis=1) for own in _by_channel(e.X for e in each)]
-        )
+        places = [[k + at for at in e.at] for k, e in zip(first, each, strict=False)]
+        at = [np.concatenate(own) for own in zip(*places, strict=True)]
+        X = [np.concatenate(own, axis=1) for own in zip(*(e.X for e in each), strict=True)]
+        return cls(int(first[-1]), at, X)
+
+    def part(self, own: slice) -> Columns:
+        """Some successive columns."""
+        ends = [slice(*np.searchsorted(at, [own.start, own.stop])) for at in self.at]
+        at = [at[k] - own.start for at, k in zip(self.at, ends, strict=True)]
+        return Columns(own.stop - own.start, at, [x[:, k] for x, k in zip(self.X, ends, strict=True)])
 
     @property
-    def single(self) -> Columns:
-        """The same columns in single precision."""
-        return replace(self, X=[x.astype(np.float32) for x in self.X])
-
-    @property
-    def shown(self) -> NDArray[np.intp]:
-        """Indices of the columns that are not zero in every channel."""
-        return np.unique(np.concatenate(self.at))
-
-    def only_shown(self) -> Columns:
-        """Drop the columns that are zero in every channel, and renumber the others."""
-        shown = self.shown
-        return Columns(len(shown), [np.searchsorted(shown, at) for at in self.at], self.X)
-
-    def dense(self, which: Sequence[int]) -> NDArray[Any]:
-        """Some columns with their zeros, in increasing order, shape (C, n, len(which))."""
-        out = np.zeros((len(self.X), len(self.X[0]), len(which)), dtype=self.X[0].dtype)
+    def dense(self) -> NDArray[Any]:
+        """The columns with their zeros, shape (C, n, k)."""
+        out = np.zeros((len(self.X), len(self.X[0]), self.count), dtype=np.float32)
         for own, at, x in zip(out, self.at, self.X, strict=True):
-            _, to, of = np.intersect1d(which, at, assume_unique=True, return_indices=True)
-            own[:, to] = x[:, of]
+            own[:, at] = x
         return out
-
-
-def _by_channel(each: Iterable[Sequence[NDArray[Any]]]) -> list[list[NDArray[Any]]]:
-    return [list(own) for own in zip(*each, strict=True)]
 
 
 @dataclass(eq=False)

@@ -93,7 +93,7 @@ class Listed:
     Attributes:
         rig: the rig whose linearisation gives the columns.
         groups: the candidates, without column indices.
-        columns: of all groups, in single precision.
+        columns: of all groups.
     """
 
     rig: TeamRig
@@ -102,13 +102,8 @@ class Listed:
 
     def of(self, group: Group) -> Columns | None:
         """Columns of a group, or None if it is not listed."""
-        if group.identity not in self._index:
-            return None
-        own = self.spans[self._index[group.identity]]
-        ends = [np.searchsorted(at, [own.start, own.stop]) for at in self.columns.at]
-        at = [at[low:high] - own.start for at, (low, high) in zip(self.columns.at, ends, strict=True)]
-        X = [x[:, low:high] for x, (low, high) in zip(self.columns.X, ends, strict=True)]
-        return Columns(own.stop - own.start, at, X)
+        k = self._index.get(group.identity)
+        return None if k is None else self.columns.part(self.spans[k])
 
     @cached_property
     def _index(self) -> dict[Hashable, int]:
@@ -189,19 +184,19 @@ class TeamProblem:
         bands, order, columns = self.bands, self.cells.order, list(columns)
         there = np.any([x.any(axis=0) for x in columns], axis=0)
         at = [np.flatnonzero(there[c : c + 3].any(axis=0)) for c in range(0, len(there), 3)]
-        X = [bands.spectrum([x[:, 3 * c : 3 * c + 3, k] for x in columns])[order] for c, k in enumerate(at)]
-        return Columns(there.shape[1], at, X)
+        X = [bands.spectrum([x[:, 3 * c : 3 * c + 3, k] for x in columns]) for c, k in enumerate(at)]
+        return Columns(there.shape[1], at, [x[order].astype(np.float32) for x in X])
 
     def add(self, columns: Sequence[Array]) -> list[int]:
         """Append columns (n, 3 C, k), one array a trial, and return their indices."""
         return self.cells.add_rows(self.spectra(columns))
 
     def beside(self, columns: Columns) -> Columns:
-        """Whiten columns in single precision against the latent states of the chosen causes."""
+        """Whiten columns against the latent states of the chosen causes."""
         if self.opened is None or not columns.count:
             return columns
-        blocks = [range(k, min(k + BLOCK, columns.count)) for k in range(0, columns.count, BLOCK)]
-        return Columns.joined([self._beside(columns.dense(block)).single for block in blocks])
+        blocks = [slice(k, min(k + BLOCK, columns.count)) for k in range(0, columns.count, BLOCK)]
+        return Columns.joined([self._beside(columns.part(block).dense) for block in blocks])
 
     def _beside(self, X: NDArray[Any]) -> Columns:
         bands, order = self.bands, self.cells.order
@@ -220,7 +215,7 @@ class TeamProblem:
         groups, each = [], []
         for c in candidates:
             groups.append(self.group_of(c, -math.log(c.among or count)))
-            each.append(self.spectra(self.columns_of(c)).single)
+            each.append(self.spectra(self.columns_of(c)))
         return Listed(self.rig, groups, Columns.joined(each))
 
     def group_of(self, candidate: Candidate, log_prior: float, columns: Sequence[int] = ()) -> Group:
@@ -319,9 +314,8 @@ class TeamProblem:
         for channel, own, there, X in each:
             weight = np.repeat(1.0 / own, np.diff(channel.starts)).astype(np.float32)[:, None]
             keep = np.flatnonzero(at[channel.columns] >= 0)
-            G[at[channel.columns[keep], None], there] += (
-                channel.X[:, keep].astype(np.float32) * weight
-            ).T @ X
+            Y = channel.X[:, keep].astype(np.float32) * weight
+            G[at[channel.columns[keep], None], there] += Y.T @ X
             b[there] += X.T @ (weight[:, 0] * channel.y)
             ends = np.searchsorted(there, [[k.start, k.stop] for k in spans])
             for square, k, (low, high) in zip(squares, spans, ends, strict=True):
@@ -542,7 +536,7 @@ class Catalogue:
         groups: causes in their first shapes; column indices start at zero.
         labels, tolerance: of every column, as in ``TeamProblem``.
         kinds: column indices by cause.
-        columns: in single precision.
+        columns: of all groups.
         listed: all other shapes.
         apart: for each candidate, columns that describe how its other shapes differ from the first.
         candidates: candidate of every group, by the group's identity.
@@ -570,7 +564,7 @@ class Catalogue:
         rig = plain.rig
         groups: list[Group] = []
         labels: list[tuple[Candidate, int] | None] = []
-        none = Columns.none(len(plain.cells.channels), len(plain.cells.order))
+        none = Columns.of(np.zeros((len(plain.cells.channels), len(plain.cells.order), 0)))
         tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none]
         others = [Listed(rig, [], none)]
         apart: dict[Hashable, Columns] = {}
@@ -581,22 +575,21 @@ class Catalogue:
                 others += [] if near else [plain.listing([candidate, *shapes], count)]
                 continue
             own = plain.spectra(rig.columns(candidate))
-            shown = own.shown
+            shown = np.unique(np.concatenate(own.at))
             g = plain.group_of(candidate, -math.log(count), range(first, first + len(shown)))
             least = tuple(g.least[k] for k in shown) if g.least else ()
             groups.append(replace(g, slab=tuple(g.slab[k] for k in shown), least=least))
             labels += [(candidate, int(k)) for k in shown]
             tolerance += [candidate.parameters[k].tolerance for k in shown]
-            rows.append(own.only_shown().single)
+            rows.append(Columns(len(shown), [np.searchsorted(shown, at) for at in own.at], own.X))
             if shapes:
                 if near:
                     apart[candidate.key] = near.apart[candidate.key]
                 else:
                     others.append(plain.listing(shapes, count))
                     firsts = [span.start for span in others[-1].spans]
-                    apart[candidate.key] = _apart(
-                        own.dense([0]), others[-1].columns.dense(firsts).astype(float)
-                    )
+                    more = others[-1].columns.dense[..., firsts].astype(float)
+                    apart[candidate.key] = _apart(own.dense[..., :1], more)
                 rows.append(apart[candidate.key])
                 tolerance += [candidate.parameters[0].tolerance] * rows[-1].count
                 labels += [None] * rows[-1].count
@@ -611,7 +604,7 @@ def _apart(first: Array, others: Array, most: int = 2) -> Columns:
     """Main directions in which other shapes of a healthy part, (C, n, s), differ from its first shape, (C, n, 1)."""
     apart = others - first
     _, V = np.linalg.eigh(np.einsum("cnk,cnl->kl", apart, apart))
-    return Columns.of(apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2])).single
+    return Columns.of(apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2]))
 
 
 def team_problem(

@@ -26,7 +26,6 @@ from discrepancy.team.linear.rest import HEALTHY, limits_of
 from discrepancy.team.linear.rows import Patches, Reduction, Whitening, whitened
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import (
-    OneByOne,
     Sensed,
     as_loud,
     exact_residual,
@@ -156,11 +155,7 @@ class TeamRig:
         return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
 
     def columns(self, candidate: Candidate) -> Sequence[Array]:
-        return self._each(lambda t: self._columns(t, candidate), len(self.linear))
-
-    def _each(self, of: Callable[[int], Array], count: int) -> Sequence[Array]:
-        """Compute several arrays; those of long recordings are computed at each access."""
-        return OneByOne(of, count) if is_filed(self.linear[0]) else list(map(of, range(count)))
+        return [self._columns(t, candidate) for t in range(len(self.linear))]
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:
         linear = self.linear[trial]

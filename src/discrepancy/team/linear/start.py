@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import cast, overload
+from typing import cast
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -229,24 +229,6 @@ def rested(trial: TrialLinear) -> None:
     """Release the memory of a trial that is kept in files until it is read again."""
     if is_filed(trial):
         given_back(*_arrays(trial), *(x for x in (trial.__dict__.get("by_wrist"),) if x is not None))
-
-
-class OneByOne(Sequence[Array]):
-    """A sequence of arrays that computes each array when it is indexed."""
-
-    def __init__(self, of: Callable[[int], Array], count: int) -> None:
-        self._of, self._count = of, count
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, at: int) -> Array: ...
-    @overload
-    def __getitem__(self, at: slice) -> list[Array]: ...
-    def __getitem__(self, at: int | slice) -> Array | list[Array]:
-        where = range(self._count)[at]
-        return self._of(where) if isinstance(where, int) else [self._of(k) for k in where]
 
 
 def _reduction(reduction: Reduction) -> Reduction:
