@@ -189,7 +189,7 @@ class Cells:
             for c, x in one.items():
                 seen.setdefault(c, []).append((first + k, self.bands.spectrum(x, c)[self.order]))
         for c, found in seen.items():
-            self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
+            self.append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
         self.count += len(series)
         return list(range(first, self.count))
 
@@ -198,12 +198,13 @@ class Cells:
         first, self._last = self.count, None
         for channel, at, X in zip(self.channels, columns.at, columns.X, strict=True):
             if len(at):
-                self._append(channel, (first + at).tolist(), X.astype(np.float64))
+                self.append(channel, (first + at).tolist(), X.astype(np.float64))
         self.count += columns.count
         return list(range(first, self.count))
 
     @staticmethod
-    def _append(channel: Channel, indices: list[int], X: Array) -> None:
+    def append(channel: Channel, indices: list[int], X: Array) -> None:
+        """Append columns to one channel, given by their indices and rows sorted by band, shape (n, k)."""
         old, new = channel.X.shape[1], X.shape[1]
         grams = np.zeros((len(channel.starts) - 1, old + new, old + new))
         products = np.zeros((len(channel.starts) - 1, old + new))

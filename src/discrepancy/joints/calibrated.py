@@ -62,8 +62,8 @@ WORDS = {
     "com": "centre of mass", "inertia": "inertia",
 }  # fmt: skip
 UNITS = {
-    "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "N_per_m": "N/m", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
-    "N": "N", "s": "s",
+    "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m",
+    "N_per_m": "N/m", "rad": "rad", "kg": "kg", "m": "m", "N": "N", "s": "s",
 }  # fmt: skip
 QUANTITY = {"parameter": (
     "a quantity with its unit, such as coulomb_Nm", lambda name: name == "gain" or (isinstance(name, str)

@@ -243,7 +243,7 @@ class ClosedLoop:
         """
         loop, J = filtered.loop, self.q.shape[1]
         speed, off = (np.ascontiguousarray(x.T) for x in (self.dq[:: self.every] ** 2, self.off))
-        seen = np.isfinite(loop.R).all(axis=1)
+        seen = np.asarray(np.isfinite(loop.R).all(axis=1))
         for j in range(J):
             at = [j, J + j]
             A, B = (np.ascontiguousarray(x) for x in (loop.A[:, at][:, :, at], loop.B[:, at, j]))
@@ -337,5 +337,9 @@ def cells_of(
                     torque[:, j, k] = x[t]
             own[:, :, some] = f.innovations(torque)
         rows.append(dct(bands.faded(own, t), axis=0, norm="ortho")[: len(bands.of_trial(t))])
-    cells.add_rows(np.concatenate(rows)[cells.order].swapaxes(0, 1))
+    kept = [k for k, own in enumerate(series) if own]
+    X = np.concatenate(rows)[cells.order][:, :, kept]
+    for c, channel in enumerate(cells.channels):
+        cells.append(channel, kept, X[:, c])
+    cells.count = len(series)
     return cells
