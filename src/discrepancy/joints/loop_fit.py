@@ -164,9 +164,8 @@ class LoopFit(Fit):
         """Position gain, velocity gain with negative damping, torque added, and largest torque, shape (J, 4)."""
         kp, kd, limit, _ = self.loops[0].gains(1)
         true = 1.0 / (1.0 + self.each("scale"))
-        return np.column_stack(
-            [kp * true, kd * true + np.minimum(self.tree.viscous, 0.0), -self.offset * true, limit]
-        )
+        damping = kd * true + np.minimum(self.tree.viscous, 0.0)
+        return np.column_stack([kp * true, damping, -self.offset * true, limit * true])
 
     @property
     def offset(self) -> Array:
