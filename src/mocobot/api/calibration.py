@@ -1,8 +1,8 @@
 """Calibrate the robots of a team from recordings of the payloads that they carry, or a single robot from joint logs.
 
 Folder of a single robot: as_found.xml with its assets, parameters.csv, calibration.json (see
-``discrepancy.joints.calibrated``), report.txt, torques.png, what is left of torques, and for robots that are known by
-their commands actuators.json (see ``discrepancy.joints.actuators``). Folder of a team:
+``discrepancy.joints.calibrated``), report.txt, torques.png or forecasts.png, what predictions leave, and for robots
+that are known by their commands actuators.json (see ``discrepancy.joints.actuators``). Folder of a team:
 
 calibration.json           see ``estimator.calibrate.json``
 report.txt                 text that the command prints
@@ -118,7 +118,7 @@ class JointCalibration(Folder):
     """A single robot as its joint logs have it; prints as text, writes a folder.
 
     Attributes:
-        found: parameters with standard errors, and torques predicted for logs that were not fitted.
+        found: parameters with standard errors, and torques or positions predicted for logs that were not fitted.
         drives: drives of logs whose torques no sensor measured; empty for others.
     """
 
@@ -155,9 +155,9 @@ class JointCalibration(Folder):
         """
         as_given = calibrated.write_into(self.found, folder, self.drives, **more)
         if pictures and draws_plots():
-            from mocobot_report.plots_calibration import save_torques
+            from mocobot_report.plots_calibration import save_left
 
-            save_torques(calibrated.from_dict(self.to_dict(), ""), folder / "torques.png")
+            save_left(calibrated.from_dict(self.to_dict(), ""), folder)
         return as_given
 
 
