@@ -11,7 +11,7 @@ combinations        list of {terms, model, value, se}: what the logs determine w
                     parameter; terms are lists of {place, parameter, factor}, inertial ones about the link's frame
 predicts            torque, or position where commands alone tell the drives
 held_out            {joint: {model, least_squares, calibrated, noise, torque}}: rms of what predictions from other parts
-                    leave, of the noise and of the torque [N m or N]. Of positions: of forecasts over one second from
+                    leave, of the noise and of the torque [N m or N]. For positions: of forecasts over one second from
                     commands alone, of the readings' noise, and standard deviation of the position [rad or m];
                     least_squares is null
 forecasts           of positions only: {part, time_s, joints: {joint: {command, measured, model, calibrated,
