@@ -92,7 +92,7 @@ def _forecast(told: calibrated.Told, joint: int) -> list[Chart]:
         ]),
     ]  # fmt: skip
     label = f"Commanded, measured and simulated position of {name} over time, and errors of the simulations."
-    note = "every second begins at the measured state; nothing but commands is known from there on"
+    note = "every second begins at the estimated motion; commands alone are known from there on"
     over_time = stacked_chart(f"{name}: {own.part}", label, panels, keys=keys, note=note)
     frequency, *gains = own.responses[joint].T
     if not len(frequency):
