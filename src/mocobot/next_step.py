@@ -12,8 +12,8 @@ from typing import Any
 from discrepancy.result.read import EXTENDED, NAME
 from mocobot.options import Calibrate, Diagnose, Watch
 
-CALIBRATED, AS_FOUND, NEW = Path("calibrated"), "as_found.xml", "NEW"
-"""Folder of the suggested calibration, its model, and name of a log that the user still has to record."""
+CALIBRATED, AS_FOUND, MAP, NEW = Path("calibrated"), "as_found.xml", "log.toml", "NEW"
+"""Folder of the suggested calibration, its model and map, and name of a log that the user still has to record."""
 KEPT = ("model", "map", "calibration", "tolerances", "exclude", "reference")
 """Options of a diagnosis that the next one needs, too."""
 
@@ -33,7 +33,8 @@ def after_calibration(options: Calibrate) -> str:
     """Return two lines: try the model of a calibrated robot on a log that it was not fitted to."""
     assert options.out is not None
     new = _free(options.rec[0].with_name(f"{NEW}{options.rec[0].suffix}"))
-    map_ = [] if options.map is None else ["--map", options.map]
+    found = options.out / MAP
+    map_ = ["--map", found] if found.is_file() else [] if options.map is None else ["--map", options.map]
     command = command_line(["diagnose", new, "--model", options.out / AS_FOUND, *map_])
     return f"\nNext, log another motion as {new}, and see what is left to explain:\n    {command}"
 

@@ -66,6 +66,50 @@ def _fade(count: int, samples: float) -> Array:
     return np.asarray(np.sin(0.5 * np.pi * np.minimum(np.minimum(place, place[::-1]) / samples, 1.0)) ** 2)
 
 
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Rows of some columns in single precision. Each channel holds only the columns that are not zero in it.
+
+    Attributes:
+        count: number of columns k.
+        at: for each channel, increasing indices of its columns, shape (k_c,).
+        X: for each channel, rows of these columns, sorted by band, shape (n, k_c).
+    """
+
+    count: int
+    at: Sequence[NDArray[np.intp]]
+    X: Sequence[NDArray[np.float32]]
+
+    @classmethod
+    def of(cls, X: NDArray[Any]) -> Columns:
+        """Drop the zeros of columns, shape (C, n, k)."""
+        at = [np.flatnonzero(x.any(axis=0)) for x in X]
+        return cls(X.shape[2], at, [x[:, k].astype(np.float32) for x, k in zip(X, at, strict=True)])
+
+    @classmethod
+    def joined(cls, each: Sequence[Columns]) -> Columns:
+        """Append columns to one another."""
+        first = np.cumsum([0, *(e.count for e in each)])
+        places = [[k + at for at in e.at] for k, e in zip(first, each, strict=False)]
+        at = [np.concatenate(own) for own in zip(*places, strict=True)]
+        X = [np.concatenate(own, axis=1) for own in zip(*(e.X for e in each), strict=True)]
+        return cls(int(first[-1]), at, X)
+
+    def part(self, own: slice) -> Columns:
+        """Some successive columns."""
+        ends = [slice(*np.searchsorted(at, [own.start, own.stop])) for at in self.at]
+        at = [at[k] - own.start for at, k in zip(self.at, ends, strict=True)]
+        return Columns(own.stop - own.start, at, [x[:, k] for x, k in zip(self.X, ends, strict=True)])
+
+    @property
+    def dense(self) -> NDArray[Any]:
+        """The columns with their zeros, shape (C, n, k)."""
+        out = np.zeros((len(self.X), len(self.X[0]), self.count), dtype=np.float32)
+        for own, at, x in zip(out, self.at, self.X, strict=True):
+            own[:, at] = x
+        return out
+
+
 @dataclass(eq=False)
 class Channel:
     """The rows of one channel.
@@ -145,22 +189,22 @@ class Cells:
             for c, x in one.items():
                 seen.setdefault(c, []).append((first + k, self.bands.spectrum(x, c)[self.order]))
         for c, found in seen.items():
-            self._append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
+            self.append(self.channels[c], [i for i, _ in found], np.column_stack([x for _, x in found]))
         self.count += len(series)
         return list(range(first, self.count))
 
-    def add_rows(self, X: NDArray[Any]) -> list[int]:
-        """Append columns given as rows in each channel, sorted by band, shape (C, n, k); return their indices."""
+    def add_rows(self, columns: Columns) -> list[int]:
+        """Append columns, and return their indices."""
         first, self._last = self.count, None
-        for channel, own in zip(self.channels, X, strict=True):
-            seen = np.flatnonzero(own.any(axis=0))
-            if len(seen):
-                self._append(channel, (first + seen).tolist(), own[:, seen].astype(np.float64))
-        self.count += X.shape[2]
+        for channel, at, X in zip(self.channels, columns.at, columns.X, strict=True):
+            if len(at):
+                self.append(channel, (first + at).tolist(), X.astype(np.float64))
+        self.count += columns.count
         return list(range(first, self.count))
 
     @staticmethod
-    def _append(channel: Channel, indices: list[int], X: Array) -> None:
+    def append(channel: Channel, indices: list[int], X: Array) -> None:
+        """Append columns to one channel, given by their indices and rows sorted by band, shape (n, k)."""
         old, new = channel.X.shape[1], X.shape[1]
         grams = np.zeros((len(channel.starts) - 1, old + new, old + new))
         products = np.zeros((len(channel.starts) - 1, old + new))

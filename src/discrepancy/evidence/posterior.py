@@ -229,7 +229,7 @@ class Posterior:
     @cached_property
     def variances(self) -> Array:
         """Posterior variances, shape (K,)."""
-        own, out = np.zeros(len(self.active)), np.zeros(len(self.prior))
+        own, out = self.prior[self.active], np.zeros(len(self.prior))  # a column without rows keeps it
         for block, channel in zip(self._blocks, self._own.channels, strict=True):
             own[channel.columns] = np.diag(block)
         out[self.active] = own

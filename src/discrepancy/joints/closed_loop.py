@@ -142,7 +142,8 @@ class ClosedLoop:
         ones = np.ones(q.shape, dtype=bool)
         return replace(
             self.signals, rate_hz=1.0 / h, time=time, q=q, dq=dq, ddq=ddq, torque=torque, usable=ones,
-            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, enabled=None, spoilt=None,
+            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, by_command=None, enabled=None,
+            spoilt=None,
         )  # fmt: skip
 
     def gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
@@ -242,23 +243,31 @@ class ClosedLoop:
         """
         loop, J = filtered.loop, self.q.shape[1]
         speed, off = (np.ascontiguousarray(x.T) for x in (self.dq[:: self.every] ** 2, self.off))
-        seen = np.isfinite(loop.R).all(axis=1)
         for j in range(J):
             at = [j, J + j]
             A, B = (np.ascontiguousarray(x) for x in (loop.A[:, at][:, :, at], loop.B[:, at, j]))
             rest, start = loop.Q[:, j] - self.torque[j] / self.step_s, loop.start[at]
-            own = A, B, rest, seen, speed[j], off[j], np.ascontiguousarray(lacking[:, j]), start
+            own = (
+                A,
+                B,
+                rest,
+                np.ascontiguousarray(loop.R[:, j]),
+                speed[j],
+                off[j],
+                np.ascontiguousarray(lacking[:, j]),
+                start,
+            )
             self.reading[j], self.jitter[j], self.torque[j] = self._likeliest(j, own)
 
     def _likeliest(self, j: int, own: tuple[Array, ...]) -> Array:
         """Variances of reading, jitter and torque that maximise the likelihood of one joint, shape (3,)."""
-        A, B, rest, seen, speed, off, lacking, start = own
+        A, B, rest, told, speed, off, lacking, start = own
         now = np.log([self.reading[j], self.jitter[j], self.torque[j]])
         most, least = now + LARGEST, np.maximum(now - LARGEST, [np.log(self.least[j]), -np.inf, -np.inf])
 
         def left(x: Array) -> float:
             read, jitter, torque = np.exp(np.clip(x, least, most))
-            R = np.where(seen, read + jitter * speed, np.inf)
+            R = np.where(np.isfinite(told), read + jitter * speed, np.inf)
             return float(cost(A, B, rest + torque / self.step_s, R, self.every, start, lacking, off))
 
         simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
@@ -336,5 +345,9 @@ def cells_of(
                     torque[:, j, k] = x[t]
             own[:, :, some] = f.innovations(torque)
         rows.append(dct(bands.faded(own, t), axis=0, norm="ortho")[: len(bands.of_trial(t))])
-    cells.add_rows(np.concatenate(rows)[cells.order].swapaxes(0, 1))
+    kept = [k for k, own in enumerate(series) if own]
+    X = np.concatenate(rows)[cells.order][:, :, kept]
+    for c, channel in enumerate(cells.channels):
+        cells.append(channel, kept, X[:, c])
+    cells.count = len(series)
     return cells

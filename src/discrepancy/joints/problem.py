@@ -404,7 +404,15 @@ class _Builder:
         of = lambda what: np.array([v.get(f"{n} {what}", 0.0) for n in self.names])  # noqa: E731
         torque = s.torque
         late = of("delay_s")
-        if late.any() and s.by_delay is None:
+        by_delay = s.by_delay
+        if late.any() and s.by_command is not None and by_delay is not None:
+            then = s.time[:, None] - late
+            told, by_delay = (
+                np.column_stack([np.interp(at, s.time, x) for at, x in zip(then.T, own.T, strict=True)])
+                for own in (s.by_command, by_delay)
+            )
+            torque = torque + told - s.by_command
+        elif late.any() and by_delay is None:
             torque = np.column_stack([
                 CubicSpline(s.time, torque[:, j])(np.clip(s.time + late[j], s.time[0], s.time[-1]))
                 for j in range(self.J)
@@ -413,7 +421,7 @@ class _Builder:
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
         load = s.inverse - self.given.armature * s.ddq
         load = low_pass(load, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))  # filter: noise has no direction
-        by_delay = -np.gradient(torque, step, axis=0) if s.by_delay is None else s.by_delay
+        by_delay = -np.gradient(torque, step, axis=0) if by_delay is None else by_delay
         for j in range(self.J):
             own = (x[:, j] for x in (s.q, s.dq, s.ddq, side, load, asked, torque, by_delay))
             self.joints[j].append(JointSignals(*own, t=s.time, span=self.spans[j]))

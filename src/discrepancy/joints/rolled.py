@@ -131,7 +131,12 @@ class LoggedTorques:
         assert log.torque is not None
         on = np.ones(len(log.time)) if log.enabled is None else log.enabled.astype(float)
         torque = log.torque.copy()
-        for j in np.flatnonzero(readings.delay_s):  # undo the delay
+        late = log.by_command and log.drive.command == "position"
+        for j in np.flatnonzero(readings.delay_s):
+            if late and log.command is not None:  # the command acts late
+                told = log.drive.position_gain[j] * log.command[:, j]
+                torque[:, j] += np.interp(log.time - readings.delay_s[j], log.time, told) - told
+                continue
             good = np.isfinite(log.torque[:, j])
             torque[:, j] = np.interp(log.time + readings.delay_s[j], log.time[good], log.torque[good, j])
         braking = on[:, None] * readings.braking if readings.braking.any() else None
@@ -377,7 +382,7 @@ class LoopDrive:
         commanded: the loops.
         logged: torques of the other joints; None if all joints have loops.
         readings: relation between logged torques and torques at the joints. It also applies to the torque of a duty.
-            Delays are ignored because a loop does not know its past torque.
+            Delays of logged torques are ignored because a loop does not know its past torque.
     """
 
     commanded: Commanded
@@ -388,7 +393,9 @@ class LoopDrive:
     def of(cls, log: JointLog, servos: Sequence[Servo], readings: Readings) -> LoopDrive:
         """Build the drives of one log."""
         every = len(servos) == log.q.shape[1]
-        return cls(Commanded.of(log, servos), None if every else LoggedTorques.of(log, readings), readings)
+        late = readings.delay_s if log.by_command else np.zeros(log.q.shape[1])
+        commanded = Commanded.of(log, servos, late + np.nan_to_num(log.drive.delay_s))
+        return cls(commanded, None if every else LoggedTorques.of(log, readings), readings)
 
     def __call__(self, time: float, q: Array, dq: Array) -> Array:
         """Torques at the joints, shape (J,)."""

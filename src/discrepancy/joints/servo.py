@@ -381,6 +381,7 @@ class Commanded:
         command: held from sample to sample, shape (Q, J).
         supply_V: shape (Q,); 1 if no servo needs it.
         on: whether the drives are on, shape (Q,).
+        late: delay of the commands, shape (J,) [s].
     """
 
     servos: tuple[Servo, ...]
@@ -388,15 +389,17 @@ class Commanded:
     command: Array
     supply_V: Array
     on: Array
+    late: Array
 
     @classmethod
-    def of(cls, log: JointLog, servos: Sequence[Servo]) -> Commanded:
-        """Build from the commands of a log."""
+    def of(cls, log: JointLog, servos: Sequence[Servo], late: Array | None = None) -> Commanded:
+        """Build from the commands of a log; ``late`` has their delays, none if it is missing."""
         assert log.command is not None
         count = len(log.time)
         on = np.ones(count) if log.enabled is None else log.enabled.astype(float)
         supply = np.ones(count) if log.drive.supply_V is None else log.drive.supply_V
-        return cls(tuple(servos), log.time, log.command, supply, on)
+        late = np.zeros(log.q.shape[1]) if late is None else late
+        return cls(tuple(servos), log.time, log.command, supply, on, late)
 
     def sample(self, time: float) -> int:
         """Index of the sample held at a time."""
@@ -409,7 +412,8 @@ class Commanded:
         k, out = self.sample(time), np.zeros(len(q))
         for servo in self.servos:
             j = servo.joint
-            output = servo.per_rad * (self.command[k, j] - q[j]) - servo.damping * dq[j]
+            command = self.command[self.sample(time - self.late[j]), j]
+            output = servo.per_rad * (command - q[j]) - servo.damping * dq[j]
             output = min(max(output, -servo.limit), servo.limit)
             out[j] = self.on[k] * servo.torque * output * (self.supply_V[k] if servo.by_supply else 1.0)
         return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,6 +54,8 @@ class Signals:
         held: intervals of the log in which an encoder holds its last value.
         spoilt: samples that these intervals change by more than noise, shape (W,); None: no such samples.
         by_delay: residual torque per second of delay of the commands, shape (W, J); None: torques are logged.
+        by_command: part of the torque that comes with the command, gain times command, shape (W, J); None: torques are
+            logged, or a closed loop has the delays.
     """
 
     log: JointLog
@@ -72,6 +74,7 @@ class Signals:
     held: tuple[Held, ...] = ()
     spoilt: NDArray[np.bool_] | None = None
     by_delay: Array | None = None
+    by_command: Array | None = None
 
     @classmethod
     def of(cls, log: JointLog, tree: Tree, inverse_torque: Callable[[Array, Array, Array], Array]) -> Signals:
@@ -98,7 +101,17 @@ class Signals:
         return cls(
             log, tree, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical, cutoff_hz(rate),
             None if log.enabled is None else log.enabled[here], held, spoilt,
-        )  # fmt: skip
+        )._with_commands()  # fmt: skip
+
+    def _with_commands(self) -> Signals:
+        """Add what a delay of the commands does, if they make all torques."""
+        log, d = self.log, self.log.drive
+        if log.command is None or not log.by_command or d.command != "position":
+            return self
+        told = low_pass(d.position_gain * log.command, log.rate_hz, smoothing_hz(log.rate_hz))
+        rate = differentiate(told, log.rate_hz)
+        step = work_step(log.rate_hz)
+        return replace(self, by_command=told[::step], by_delay=rate[::step])
 
     @cached_property
     def motion(self) -> Motion:

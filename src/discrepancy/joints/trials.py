@@ -144,7 +144,10 @@ def held_in(model: SerialModel, trials: Trials) -> list[HeldReadings]:
 def part_of(s: Signals, at: slice) -> Signals:
     """Cut a range of samples from the signals."""
     own = {name: getattr(s, name)[at] for name in ("time", "q", "dq", "ddq", "torque", "usable", "inverse")}
-    more = {name: x if (x := getattr(s, name)) is None else x[at] for name in ("enabled", "spoilt")}
+    more = {
+        name: x if (x := getattr(s, name)) is None else x[at]
+        for name in ("enabled", "spoilt", "by_delay", "by_command")
+    }
     return replace(s, **own, **more)
 
 

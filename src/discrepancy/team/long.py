@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -71,8 +72,9 @@ def _parts(recording: Recording, longest_s: float) -> list[Recording]:
 SEARCHED_PARTS, SHORTEST_PART_S = 4, 40.0
 """Least number of parts, and their least length [s]. Chosen: parts cross-validate each other."""
 
-SEARCHED_S, SEARCHED_POWER = 480.0, 1.4
-"""Duration that is searched with three robots [s]; N robots scale it by (3 / N)^power. Chosen."""
+WHOLE_S, SEARCHED_S, SEARCHED_POWER = 480.0, 180.0, 1.4
+"""Duration of three robots up to which everything is searched, and that is searched of longer recordings [s]; N robots
+scale both by (3 / N)^power. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ class Choice:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], *, whole: bool = False) -> Choice:
-        """Select every part, or evenly spread parts if the recordings are longer than ``searched_s``.
+        """Select every part, or evenly spread parts if ``searched_s`` is less than the recordings last.
 
         The cost of a search grows with the length of the data, while more of the same motion adds little information.
 
@@ -101,7 +103,8 @@ class Choice:
             recordings: of one team.
             whole: whether to select all parts, however long.
         """
-        most_s, total_s = searched_s(recordings[0].metadata.robots), seconds(recordings)
+        total_s = seconds(recordings)
+        most_s = searched_s(recordings[0].metadata.robots, total_s)
         everything = whole or total_s <= most_s
         longest_s = PART_S
         if not everything:
@@ -144,9 +147,10 @@ class Choice:
         )
 
 
-def searched_s(robots: int) -> float:
-    """Duration of recordings that is searched [s]; it falls with the number of robots, which makes minutes costlier."""
-    return SEARCHED_S * (3.0 / robots) ** SEARCHED_POWER
+def searched_s(robots: int, total_s: float = math.inf) -> float:
+    """Duration that is searched of recordings [s]; it falls with the number of robots, which makes minutes costlier."""
+    scale = (3.0 / robots) ** SEARCHED_POWER
+    return total_s if total_s <= WHOLE_S * scale else SEARCHED_S * scale
 
 
 ODD_CHANCE, ODD_FACTOR = 0.01, 1.5

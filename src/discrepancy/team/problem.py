@@ -16,7 +16,7 @@ from scipy.fft import dct, idct
 from scipy.special import logsumexp
 
 from discrepancy.candidate import Candidate, Transient
-from discrepancy.evidence.cells import Bands, Cells, Series
+from discrepancy.evidence.cells import Bands, Cells, Columns, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.team.candidates import in_shapes, origin_of, shape_steps
@@ -91,28 +91,27 @@ class Listed:
     """Candidate causes whose columns are kept outside the problem.
 
     Attributes:
+        rig: the rig whose linearisation gives the columns.
         groups: the candidates, without column indices.
-        X: columns of all groups in every channel, rows in the order of the cells, shape (C, n, k).
+        columns: of all groups.
     """
 
+    rig: TeamRig
     groups: Sequence[Group]
-    X: NDArray[np.float32]
+    columns: Columns
 
-    @classmethod
-    def together(cls, each: list[Listed]) -> Listed:
-        """Join several listings. The list is emptied on the way, so that memory holds only one copy."""
-        widths = [e.X.shape[2] for e in each]
-        groups, X = (
-            [g for e in each for g in e.groups],
-            np.empty((*each[0].X.shape[:2], sum(widths)), np.float32),
-        )
-        for first, width in zip(np.cumsum([0, *widths]), widths, strict=False):
-            X[..., first : first + width] = each.pop(0).X
-        return cls(groups, X)
+    def of(self, group: Group) -> Columns | None:
+        """Columns of a group, or None if it is not listed."""
+        k = self._index.get(group.identity)
+        return None if k is None else self.columns.part(self.spans[k])
 
-    @property
+    @cached_property
+    def _index(self) -> dict[Hashable, int]:
+        return {g.identity: k for k, g in enumerate(self.groups)}
+
+    @cached_property
     def spans(self) -> list[slice]:
-        """Columns of each group in ``X``."""
+        """Columns of each group in ``columns``."""
         ends = np.cumsum([len(g.slab) for g in self.groups])
         return [slice(e - len(g.slab), e) for e, g in zip(ends, self.groups, strict=True)]
 
@@ -133,6 +132,7 @@ class TeamProblem:
         candidates: candidate of every group, by the group's identity.
         catalogue: columns that stay the same during the search.
         there: parameter values at the linearisation point, shape (K,).
+        near: neighbours of the shape that was refined last, and their columns.
     """
 
     rig: TeamRig
@@ -149,6 +149,7 @@ class TeamProblem:
     candidates: dict[Hashable, Candidate] = field(default_factory=dict)
     catalogue: Catalogue | None = None
     there: Array = field(default_factory=lambda: np.zeros(0))
+    near: Listed | None = None
 
     @property
     def bands(self) -> RowBands:
@@ -178,27 +179,26 @@ class TeamProblem:
         """Columns of a candidate, shape (n, C, k) a trial."""
         return self.rows_of(self.rig.columns(candidate))
 
-    def spectra(self, columns: Sequence[Array]) -> Array:
-        """Turn columns (n, 3 C, k), one array a trial, into rows of the cells, shape (C, n, k)."""
-        bands, order = self.bands, self.cells.order
-        return np.stack([
-            bands.spectrum([x[:, k : k + 3] for x in columns])[order] for k in range(0, columns[0].shape[1], 3)
-        ])  # fmt: skip
+    def spectra(self, columns: Sequence[Array]) -> Columns:
+        """Turn columns (n, 3 C, k), one array a trial, into rows of the cells."""
+        bands, order, columns = self.bands, self.cells.order, list(columns)
+        there = np.any([x.any(axis=0) for x in columns], axis=0)
+        at = [np.flatnonzero(there[c : c + 3].any(axis=0)) for c in range(0, len(there), 3)]
+        X = [bands.spectrum([x[:, 3 * c : 3 * c + 3, k] for x in columns]) for c, k in enumerate(at)]
+        return Columns(there.shape[1], at, [x[order].astype(np.float32) for x in X])
 
     def add(self, columns: Sequence[Array]) -> list[int]:
         """Append columns (n, 3 C, k), one array a trial, and return their indices."""
         return self.cells.add_rows(self.spectra(columns))
 
-    def beside(self, X: NDArray[Any]) -> NDArray[Any]:
-        """Whiten rows of the cells, shape (C, n, k), against the latent states of the chosen causes."""
-        if self.opened is None:
-            return X
-        out = np.empty_like(X)
-        for first in range(0, X.shape[2], BLOCK):
-            out[..., first : first + BLOCK] = self._beside(X[..., first : first + BLOCK])
-        return out
+    def beside(self, columns: Columns) -> Columns:
+        """Whiten columns against the latent states of the chosen causes."""
+        if self.opened is None or not columns.count:
+            return columns
+        blocks = [slice(k, min(k + BLOCK, columns.count)) for k in range(0, columns.count, BLOCK)]
+        return Columns.joined([self._beside(columns.part(block).dense) for block in blocks])
 
-    def _beside(self, X: NDArray[Any]) -> NDArray[Any]:
+    def _beside(self, X: NDArray[Any]) -> Columns:
         bands, order = self.bands, self.cells.order
         plain = np.empty_like(X)
         plain[:, order] = X
@@ -215,8 +215,8 @@ class TeamProblem:
         groups, each = [], []
         for c in candidates:
             groups.append(self.group_of(c, -math.log(c.among or count)))
-            each.append(self.spectra(self.columns_of(c)).astype(np.float32))
-        return Listed(groups, np.concatenate(each, axis=2))
+            each.append(self.spectra(self.columns_of(c)))
+        return Listed(self.rig, groups, Columns.joined(each))
 
     def group_of(self, candidate: Candidate, log_prior: float, columns: Sequence[int] = ()) -> Group:
         """Turn a candidate into a group of the search and register it."""
@@ -252,6 +252,10 @@ class TeamProblem:
         if group.late:
             pairs = zip(self.rig.whitening, self.laws_of.columns(self.laws_of.of(group)), strict=True)
             return replace(group, columns=tuple(self.add(self.rows_of([w(x) for w, x in pairs]))))
+        for listed in filter(None, (self.listed, self.near)):
+            known = listed.of(group) if listed.rig is self.rig else None
+            if known is not None:
+                return replace(group, columns=tuple(self.cells.add_rows(known)))
         return replace(group, columns=tuple(self.add(self.columns_of(self.candidates[group.identity]))))
 
     # --- proposals
@@ -300,19 +304,23 @@ class TeamProblem:
         active = posterior.active
         at = np.full(cells.count, -1)
         at[active] = np.arange(len(active))
-        K = listed.X.shape[2]
+        K = listed.columns.count
         G, b, squares = (
             np.zeros((len(active), K)),
             np.zeros(K),
             [np.zeros((len(g.slab),) * 2) for g in listed.groups],
         )
-        for channel, own, X in zip(cells.channels, posterior.variance, listed.X, strict=True):
+        each = zip(cells.channels, posterior.variance, listed.columns.at, listed.columns.X, strict=True)
+        for channel, own, there, X in each:
             weight = np.repeat(1.0 / own, np.diff(channel.starts)).astype(np.float32)[:, None]
             keep = np.flatnonzero(at[channel.columns] >= 0)
-            G[at[channel.columns[keep]]] += (channel.X[:, keep].astype(np.float32) * weight).T @ X
-            b += X.T @ (weight[:, 0] * channel.y)
-            for square, k in zip(squares, spans, strict=True):
-                square += (X[:, k] * weight).T @ X[:, k]
+            Y = channel.X[:, keep].astype(np.float32) * weight
+            G[at[channel.columns[keep], None], there] += Y.T @ X
+            b[there] += X.T @ (weight[:, 0] * channel.y)
+            ends = np.searchsorted(there, [[k.start, k.stop] for k in spans])
+            for square, k, (low, high) in zip(squares, spans, ends, strict=True):
+                x, place = X[:, low:high], there[low:high] - k.start
+                square[place[:, None], place] += (x * weight).T @ x
         U = L.forward(s[:, None] * G)
         Q, scales = b - U.T @ z, 0.5 ** np.arange(octaves)
         value, widths = np.empty((len(spans), octaves)), np.array([len(g.slab) for g in listed.groups])
@@ -429,7 +437,7 @@ class TeamProblem:
             base = self.prior((), None)
             for k in group.columns:
                 prior[k] = base[k] if k < len(base) else 0.0
-            listed = self.listing(near, 1)
+            listed = self.near = self.listing(near, 1)
             listed = replace(listed, groups=[replace(g, log_prior=-math.log(c.among or math.exp(-group.log_prior)))
                                              for g, c in zip(listed.groups, near, strict=True)])  # fmt: skip
             gains = self.gains(Posterior(self.cells, prior, posterior.variance), listed)
@@ -528,7 +536,7 @@ class Catalogue:
         groups: causes in their first shapes; column indices start at zero.
         labels, tolerance: of every column, as in ``TeamProblem``.
         kinds: column indices by cause.
-        X: the columns, shape (C, n, k).
+        columns: of all groups.
         listed: all other shapes.
         apart: for each candidate, columns that describe how its other shapes differ from the first.
         candidates: candidate of every group, by the group's identity.
@@ -539,9 +547,9 @@ class Catalogue:
     labels: list[tuple[Candidate, int] | None]
     tolerance: list[float]
     kinds: Mapping[str, list[int]]
-    X: NDArray[np.float32]
+    columns: Columns
     listed: Listed
-    apart: Mapping[Hashable, Array]
+    apart: Mapping[Hashable, Columns]
     candidates: Mapping[Hashable, Candidate]
 
     @classmethod
@@ -556,45 +564,47 @@ class Catalogue:
         rig = plain.rig
         groups: list[Group] = []
         labels: list[tuple[Candidate, int] | None] = []
-        none = np.zeros((len(plain.cells.channels), len(plain.cells.order), 0), dtype=np.float32)
+        none = Columns.of(np.zeros((len(plain.cells.channels), len(plain.cells.order), 0)))
         tolerance, kinds, rows = list[float](), dict[str, list[int]](), [none]
-        others = [Listed([], none)]
-        apart: dict[Hashable, Array] = {}
+        others = [Listed(rig, [], none)]
+        apart: dict[Hashable, Columns] = {}
         for candidate in rig.candidates():
             shapes = in_shapes(candidate, CAUSES[candidate.cause].shapes, len(rig.linear))
             count, first = 1 + len(shapes), len(labels)
             if not any(candidate.tolerant):
                 others += [] if near else [plain.listing([candidate, *shapes], count)]
                 continue
-            X = plain.spectra(rig.columns(candidate))
-            shown = np.flatnonzero(X.any(axis=(0, 1)))
+            own = plain.spectra(rig.columns(candidate))
+            shown = np.unique(np.concatenate(own.at))
             g = plain.group_of(candidate, -math.log(count), range(first, first + len(shown)))
             least = tuple(g.least[k] for k in shown) if g.least else ()
             groups.append(replace(g, slab=tuple(g.slab[k] for k in shown), least=least))
             labels += [(candidate, int(k)) for k in shown]
             tolerance += [candidate.parameters[k].tolerance for k in shown]
-            rows.append(X[..., shown].astype(np.float32))
+            rows.append(Columns(len(shown), [np.searchsorted(shown, at) for at in own.at], own.X))
             if shapes:
                 if near:
                     apart[candidate.key] = near.apart[candidate.key]
                 else:
                     others.append(plain.listing(shapes, count))
                     firsts = [span.start for span in others[-1].spans]
-                    apart[candidate.key] = _apart(X[..., 0], others[-1].X[..., firsts].astype(float))
-                rows.append(apart[candidate.key].astype(np.float32))
-                tolerance += [candidate.parameters[0].tolerance] * rows[-1].shape[2]
-                labels += [None] * rows[-1].shape[2]
+                    more = others[-1].columns.dense[..., firsts].astype(float)
+                    apart[candidate.key] = _apart(own.dense[..., :1], more)
+                rows.append(apart[candidate.key])
+                tolerance += [candidate.parameters[0].tolerance] * rows[-1].count
+                labels += [None] * rows[-1].count
             kinds.setdefault(candidate.cause, []).extend(range(first, len(labels)))
-        listed = near.listed if near else Listed.together(others)
+        every = [g for e in others for g in e.groups]
+        listed = near.listed if near else Listed(rig, every, Columns.joined([e.columns for e in others]))
         known = {**near.candidates, **plain.candidates} if near else plain.candidates
-        return cls(rig, groups, labels, tolerance, kinds, np.concatenate(rows, axis=2), listed, apart, known)
+        return cls(rig, groups, labels, tolerance, kinds, Columns.joined(rows), listed, apart, known)
 
 
-def _apart(first: Array, others: Array, most: int = 2) -> Array:
-    """Main directions in which other shapes of a healthy part differ from its first shape, shape (C, n, k)."""
-    apart = others - first[..., None]
+def _apart(first: Array, others: Array, most: int = 2) -> Columns:
+    """Main directions in which other shapes of a healthy part, (C, n, s), differ from its first shape, (C, n, 1)."""
+    apart = others - first
     _, V = np.linalg.eigh(np.einsum("cnk,cnl->kl", apart, apart))
-    return apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2])
+    return Columns.of(apart @ V[:, ::-1][:, :most] / math.sqrt(others.shape[2]))
 
 
 def team_problem(
@@ -619,15 +629,15 @@ def team_problem(
     out = TeamProblem(rig, Cells(bands, []), opened=opened, catalogue=catalogue)
     out.candidates = dict(catalogue.candidates)
     out.cells = plain.cells
-    columns = out.beside(catalogue.X)
+    columns = out.beside(catalogue.columns)
     residual = [x.reshape(len(x), -1, 3) for x in out.rows_of(rows)]
     out.cells = Cells.of(bands, residual)
     there = np.zeros(len(catalogue.labels))  # values count from the design, not from the linearisation point
     for k, label in enumerate(catalogue.labels):
         at = None if label is None else origin_of(label[0], rig.origin)
         there[k] = 0.0 if label is None or at is None else at[label[1]]
-    for channel, X in zip(out.cells.channels, columns, strict=True):
-        channel.y += X @ there
+    for channel, at, X in zip(out.cells.channels, columns.at, columns.X, strict=True):
+        channel.y += X @ there[at]
         channel.squares = np.array([channel.y[a:b] @ channel.y[a:b] for a, b in pairwise(channel.starts)])
 
     def unknown(columns: Sequence[Array]) -> list[int]:
@@ -650,5 +660,5 @@ def team_problem(
     out.groups = [replace(g, columns=tuple(first + k for k in g.columns)) for g in catalogue.groups]
     places = Counter(g.cause for g in catalogue.groups)  # a spread cannot be learnt from a single part
     out.families = [[first + k for k in kind] for cause, kind in catalogue.kinds.items() if places[cause] > 1]
-    out.listed = replace(catalogue.listed, X=out.beside(catalogue.listed.X))
+    out.listed = replace(catalogue.listed, columns=out.beside(catalogue.listed.columns))
     return out

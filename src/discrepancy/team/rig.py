@@ -26,7 +26,6 @@ from discrepancy.team.linear.rest import HEALTHY, limits_of
 from discrepancy.team.linear.rows import Patches, Reduction, Whitening, whitened
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import (
-    OneByOne,
     Sensed,
     as_loud,
     exact_residual,
@@ -38,7 +37,7 @@ from discrepancy.team.linear.start import (
     trial_at,
     without_bases,
 )
-from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.linear.trial_linear import TrialLinear, with_derivatives
 from discrepancy.team.long import LaterPart
 from estimator.arm.motion import PHI, TAU, THETA
 from estimator.arm.unit import ArmUnit
@@ -156,11 +155,7 @@ class TeamRig:
         return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
 
     def columns(self, candidate: Candidate) -> Sequence[Array]:
-        return self._each(lambda t: self._columns(t, candidate), len(self.linear))
-
-    def _each(self, of: Callable[[int], Array], count: int) -> Sequence[Array]:
-        """Compute several arrays; those of long recordings are computed at each access."""
-        return OneByOne(of, count) if is_filed(self.linear[0]) else list(map(of, range(count)))
+        return [self._columns(t, candidate) for t in range(len(self.linear))]
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:
         linear = self.linear[trial]
@@ -330,13 +325,15 @@ class TeamRig:
         """
         units, shared = found.units, found.shared
         known = replace(recording, metadata=replace(recording.metadata, units=units))
-        trial = trial_at(known, shared, self.sensed.noise, full=False)
+        trial = trial_at(known, shared, self.sensed.noise)
         own = replace(self, recordings=(known,), linear=(trial,), kept={})
         signals, others = own._without(0, found.causes)
-        rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
+        rows = trial.residual
+        if signals is not trial.signals:
+            rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
         if others:
-            own = replace(own, linear=(trial_at(known, shared, self.sensed.noise, full=True),))
-            rows -= sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
+            own = replace(own, linear=(with_derivatives(trial),))
+            rows = rows - sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
         return trial.reduction, without_bases(trial, rows)
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:

@@ -2,7 +2,8 @@
 
 Folder of a single robot: as_found.xml with its assets, parameters.csv, calibration.json (see
 ``discrepancy.joints.calibrated``), report.txt, torques.png or forecasts.png, what predictions leave, and for robots
-that are known by their commands actuators.json (see ``discrepancy.joints.actuators``). Folder of a team:
+that are known by their commands actuators.json (see ``discrepancy.joints.actuators``) and log.toml, the map with what
+was found of their loops. Folder of a team:
 
 calibration.json           see ``estimator.calibrate.json``
 report.txt                 text that the command prints
@@ -38,7 +39,8 @@ from mocobot.checks import CALIBRATION
 from mocobot.option_types import made
 from mocobot.options import CalibrateOptions
 from mocobot.results import Folder, public
-from mocobot_logs.joints.joint_log import Drive
+from mocobot_logs.joints.joint_log import Drive, JointLog
+from mocobot_logs.joints.map_text import with_control
 
 if TYPE_CHECKING:
     from mocobot.api.joints import GivenLogs, GivenModel
@@ -120,10 +122,12 @@ class JointCalibration(Folder):
     Attributes:
         found: parameters with standard errors, and torques or positions predicted for logs that were not fitted.
         drives: drives of logs whose torques no sensor measured; empty for others.
+        map: text of the logs' map with the gains and delays that were found, empty if nothing of it was.
     """
 
     found: ArmCalibration
     drives: tuple[Drive, ...] = ()
+    map: str = ""
     result = "calibration"
 
     def __str__(self) -> str:
@@ -154,6 +158,8 @@ class JointCalibration(Folder):
             InputError: a file cannot be written, or MuJoCo refuses the model.
         """
         as_given = calibrated.write_into(self.found, folder, self.drives, **more)
+        if self.map:
+            write_text(folder / "log.toml", self.map)
         if pictures and draws_plots():
             from mocobot_report.plots_calibration import save_left
 
@@ -217,9 +223,10 @@ def calibrate(
         say("reading")
         read_from = read_logs(logs, robot, map=chosen.map, episode=chosen.episode)
         drives = tuple(log.drive for log in read_from if log.by_command)
-        return JointCalibration(
-            calibrate_arm(robot, read_from, say), drives if len(drives) == len(read_from) else ()
-        )
+        found = calibrate_arm(robot, read_from, say)
+        if found.predicts == "torque":
+            return JointCalibration(found, drives if len(drives) == len(read_from) else ())
+        return JointCalibration(found, drives, _found_map(found, logs, chosen.map))
     prior = chosen.prior
     assumed = prior if isinstance(prior, Prior) else Prior() if prior is None else read_prior(prior)
     if chosen.tilt and assumed.tilt_rad == 0:
@@ -238,6 +245,26 @@ def calibrate(
         say("flanges")
         found = in_drawing_frames(found)
     return public(Calibration, found)
+
+
+def _found_map(found: ArmCalibration, logs: GivenLogs, given: Path | str | None) -> str:
+    """Text of the first log's map with the delays and roughly known gains that were found; empty without a file."""
+    from mocobot.api.joints import map_path
+
+    first = logs if isinstance(logs, Path | str | JointLog) else next(iter(logs))
+    if isinstance(first, JointLog):
+        return ""
+    path, values = (
+        map_path(found.model, Path(first), given),
+        {(p.place, p.name): p.value for p in found.parameters},
+    )
+    numbers = {
+        "delay_s": {place: max(x, 0.0) for (place, name), x in values.items() if name == "command_delay_s"}
+    }
+    gains = {place: x for (place, name), x in values.items() if name.startswith("position_gain_")}
+    if len(gains) == len(found.joints):
+        numbers["position_gain"] = gains
+    return with_control(path.read_text(encoding="utf-8"), numbers) or ""
 
 
 def read_calibration(path: Path | str) -> Calibration:

@@ -7,7 +7,7 @@ import pytest
 from scipy.fft import dct
 from scipy.stats import multivariate_normal
 
-from discrepancy.evidence.cells import Bands, Cells
+from discrepancy.evidence.cells import Bands, Cells, Columns
 from discrepancy.evidence.posterior import Group, Posterior, prior_root
 
 RATE_HZ, LENGTHS, EDGES_HZ = 20.0, (60, 41), np.array([0.0, 1.0, 2.5, 6.0])
@@ -120,6 +120,27 @@ def test_columns_that_are_taken_away_leave_the_problem_as_it_was(rng: np.random.
     assert Posterior(cells, np.ones(5), variance).log_evidence != before
     cells.truncate(4)
     assert Posterior(cells, prior, variance).log_evidence == before
+
+
+def test_columns_without_their_zeros_are_the_columns(rng: np.random.Generator) -> None:
+    """Joined, taken apart, and in the problem; a column without rows keeps its prior variance."""
+    cells, _, X = problem(rng)
+    wide = np.stack([np.column_stack([x, np.zeros(len(x))]) for x in X]).astype(np.float32)
+    narrow = Columns.joined([Columns.of(wide[..., :2]), Columns.of(wide[..., 2:])])
+    assert [len(at) for at in narrow.at] == [4, 3]  # the first column is in one channel
+    np.testing.assert_array_equal(narrow.dense, wide)
+    np.testing.assert_array_equal(narrow.part(slice(1, 4)).dense, wide[..., 1:4])
+    cells.truncate(0)
+    assert cells.add_rows(narrow) == list(range(5))
+    prior, variance = np.full(5, 0.7), rng.uniform(0.3, 2.0, (2, 3))
+    weights = [
+        np.repeat(1.0 / v, np.diff(c.starts))[:, None] for v, c in zip(variance, cells.channels, strict=True)
+    ]
+    G = sum(x.T @ (w * x) for x, w in zip(wide.astype(float), weights, strict=True))
+    expected = np.diag(np.linalg.inv(G + np.eye(5) / 0.7))
+    found = Posterior(cells, prior, variance)
+    np.testing.assert_allclose(found.variances, expected, rtol=1e-9)
+    assert found.variances[4] == pytest.approx(0.7)
 
 
 def test_covariance_is_the_scatter_of_the_values() -> None:

@@ -40,7 +40,8 @@ def recording():
 @pytest.fixture
 def little_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     for owner, name, value in (
-        (long, "SEARCHED_S", 26.0), (long, "SHORTEST_PART_S", 13.0), (long, "ODD_WINDOW_S", 2.0),
+        (long, "WHOLE_S", 26.0), (long, "SEARCHED_S", 26.0), (long, "SHORTEST_PART_S", 13.0),
+        (long, "ODD_WINDOW_S", 2.0),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, value)
 
@@ -88,6 +89,12 @@ def test_notes_of_recordings_with_one_name(recording, monkeypatch: pytest.Monkey
     assert all("in 5 parts" in note for note in notes)
     monkeypatch.setattr(long, "PART_S", 30.0)
     assert all("in 3 parts" in note for note in Choice.of([recording, recording], whole=True).notes)
+
+
+def test_less_of_longer_recordings() -> None:
+    """All of what lasts eight minutes, a part of what lasts longer."""
+    assert searched_s(3, long.WHOLE_S) == long.WHOLE_S > long.SEARCHED_S
+    assert searched_s(3, long.WHOLE_S + 1.0) == long.SEARCHED_S
 
 
 def test_less_of_many_robots() -> None:
@@ -210,7 +217,7 @@ def test_a_rest_too_short_for_a_row(recording) -> None:
     reduction = Reduction.of(Signals.of(still))
     assert len(reduction.time) == 0
     noise = Noise.of([Signals.of(recording)])
-    trial = trial_at(still, start_shared(estimate_payload([recording])), noise, full=False)
+    trial = trial_at(still, start_shared(estimate_payload([recording])), noise)
     rows = without_bases(trial, trial.residual)
     left = Left.of(reduction, rows)
     assert len(left.means) == len(left.holds) == 0

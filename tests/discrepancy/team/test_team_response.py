@@ -113,7 +113,8 @@ def test_models_to_take_away(tmp_path) -> None:
 def test_what_is_in_another_part_calls_for_its_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """A torque is wrong in the last part only, which was not searched at first."""
     for owner, name, value in (
-        (long, "SEARCHED_S", 16.0), (long, "SHORTEST_PART_S", 8.0), (long, "ODD_WINDOW_S", 2.0),
+        (long, "WHOLE_S", 16.0), (long, "SEARCHED_S", 16.0), (long, "SHORTEST_PART_S", 8.0),
+        (long, "ODD_WINDOW_S", 2.0),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, value)
     recording = mocobot.simulate("b", "random", vias=16, seed=6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import cast, overload
+from typing import cast
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -231,24 +231,6 @@ def rested(trial: TrialLinear) -> None:
         given_back(*_arrays(trial), *(x for x in (trial.__dict__.get("by_wrist"),) if x is not None))
 
 
-class OneByOne(Sequence[Array]):
-    """A sequence of arrays that computes each array when it is indexed."""
-
-    def __init__(self, of: Callable[[int], Array], count: int) -> None:
-        self._of, self._count = of, count
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, at: int) -> Array: ...
-    @overload
-    def __getitem__(self, at: slice) -> list[Array]: ...
-    def __getitem__(self, at: int | slice) -> Array | list[Array]:
-        where = range(self._count)[at]
-        return self._of(where) if isinstance(where, int) else [self._of(k) for k in where]
-
-
 def _reduction(reduction: Reduction) -> Reduction:
     of = reduction.operator
     if is_stored(of.data):
@@ -264,19 +246,18 @@ def _arrays(trial: TrialLinear) -> Iterator[NDArray[np.generic]]:
     yield from (data.R_bi, data.p_bi, data.twist, data.twist_dot, data.wrench)
 
 
-def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) -> TrialLinear:
-    """Linearise a trial at given shared unknowns, with bases that fit its poses.
+def trial_at(recording: Recording, shared: Shared, noise: Noise) -> TrialLinear:
+    """Linearise a trial by the bases alone, at given shared unknowns and with bases that fit its poses.
 
     Args:
         recording: the trial.
         shared: the shared unknowns, which stay fixed.
         noise: resolution of the sensors.
-        full: whether to compute derivatives by the robots' signals.
     """
     signals, arms = noise.known_to(Signals.of(recording)), recording.metadata.arms
     angles = signals.phi[signals.keep], signals.theta[signals.keep]
     bases = start_bases(*poses(*angles, arms), shared)
-    return linearise(signals, shared, bases, arms, Reduction.of(signals), full=full, known=True)
+    return linearise(signals, shared, bases, arms, Reduction.of(signals), full=False, known=True)
 
 
 def without_bases(trial: TrialLinear, rows: Array) -> Array:

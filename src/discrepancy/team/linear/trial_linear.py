@@ -394,12 +394,18 @@ def linearise(
     residual = reduction(np.concatenate([pose, balance(data, shared)[0]], axis=1))
     moved = np.zeros((*residual.shape, 0)) if known else reduction(by_shared(data, shared, bases))
     columns = moved, reduction(by_bases(data, shared, bases))
-    at = s, data
-    if full and signals.chatters:  # chatter would alias in J, which is interpolated between knots
-        calm = filtered(replace(signals, pre_hz=CHATTER_JACOBIAN_HZ))
-        at = calm, grasp_data(calm, arms, signals.rate_hz)
-    J = by_signals(*at, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
-    return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
+    J = BySignals.none(s.shape[1], 6 * s.shape[1])
+    out = TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
+    return with_derivatives(out) if full else out
+
+
+def with_derivatives(trial: TrialLinear) -> TrialLinear:
+    """Add the derivatives by the robots' signals to a trial."""
+    s, data, signals = trial.s, trial.data, trial.signals
+    if signals.chatters:  # chatter would alias in J, which is interpolated between knots
+        s = filtered(replace(signals, pre_hz=CHATTER_JACOBIAN_HZ))
+        data = grasp_data(s, trial.arms, signals.rate_hz)
+    return replace(trial, J=by_signals(s, data, trial.shared, trial.bases, trial.arms))
 
 
 def filtered(signals: Signals) -> Array:
