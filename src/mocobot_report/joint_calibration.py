@@ -7,7 +7,7 @@ import numpy as np
 
 from discrepancy.joints import calibrated
 from estimator.statistics import rms
-from mocobot_report.charts import Chart, Key, dots, log_axis, row_layout
+from mocobot_report.charts import Chart, Key, Line, Panel, dots, line, log_axis, row_layout, stacked_chart
 from mocobot_report.numbers import counted, percent, plain, spelled
 from mocobot_report.tables import Entry, measurement, table, value
 
@@ -20,7 +20,9 @@ LEFT = (
     Key("calibrated", "calibrated", "after", "square"),
     Key("noise", "noise", "text", "x"),
 )
-"""Legend of torques left; groups are attributes of ``HeldOut``."""
+"""Legend of what predictions leave; groups are attributes of ``HeldOut``."""
+COMMAND, MEASURED = Key("command", "command", "line"), Key("measured", "measured", "text")
+SIMULATED = Key("before", "given model", "before"), Key("after", "calibrated", "after")
 MOMENTS = "m: mass; mx, my, mz: first moments; xx, ..., yz: moments of inertia; all about the link's frame"
 
 
@@ -29,9 +31,10 @@ def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
     say("calibration")
     told: calibrated.Told = result.found
     known, torque = told.determined, np.maximum(told.rms("torque"), 1e-12)
-    tiles = [
-        (f"torque left, {k.label}", percent(rms(told.rms(k.group) / torque)), "of rms torque") for k in LEFT
-    ]
+    left, of = (
+        ("torque left", "of rms torque") if told.predicts == "torque" else ("forecast error", "of the motion")
+    )
+    tiles = [(f"{left}, {k.label}", percent(rms(told.rms(k.group) / torque)), of) for k in keys_of(told)]
     count = len(told.combinations)
     share, more = (
         f"{len(known) - count} of {len(told.parameters)}",
@@ -46,18 +49,61 @@ def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
         "title": f"Calibration of {told.model.path.name} from {counted(len(told.logs), 'log')} of its joints",
         "told": told, "gain": calibrated.gain(told.found),
         "findings": calibrated.findings(told.found), "tiles": tiles, "left": _chart(told),
+        "forecasts": [_forecast(told, j) for j in told.joints] if told.forecasts else [],
+        "names": [told.model.joints[j] for j in told.joints],
         "tables": [table(name, head, own, note=notes.get(name, ""), stack=True) for name, own in rows.items()],
         "pictures": [],
     }  # fmt: skip
 
 
+def keys_of(told: calibrated.Told) -> list[Key]:
+    """Legend of what this calibration tells: positions have no ordinary least squares."""
+    return [key for key in LEFT if key.group != "least_squares" or told.predicts == "torque"]
+
+
 def _chart(told: calibrated.Told) -> Chart:
-    """Plot the torque left of every joint."""
-    names, left, data = told.names, [told.rms(key.group).tolist() for key in LEFT], []
-    for key, x in zip(LEFT, left, strict=True):
+    """Plot what predictions leave of every joint."""
+    keys = keys_of(told)
+    names, left, data = told.names, [told.rms(key.group).tolist() for key in keys], []
+    for key, x in zip(keys, left, strict=True):
         text = [f"{name}, {key.label}: {plain(number)}" for name, number in zip(names, x, strict=True)]
         data.append(dots(x, range(len(names)), key, text))
-    across = log_axis("rms torque", [number for x in left for number in x])
+    what = "rms torque" if told.predicts == "torque" else "rms error over 1 s"
+    across = log_axis(what, [number for x in left for number in x])
     which = "parts that were not fitted" if told.validated else "the only part, which was fitted"
     label = "Torque that given model, least squares and calibrated model leave of every joint, and noise."
-    return Chart(f"Torque left of {which}", label, data, keys=LEFT, **row_layout(names, across, row_px=36))
+    title = f"Torque left of {which}"
+    if told.predicts == "position":
+        label = "Errors of forecasts by given and calibrated model of every joint, and the readings' noise."
+        title = f"Errors of forecasts from commands alone over one second: {which}"
+    return Chart(title, label, data, keys=keys, **row_layout(names, across, row_px=36))
+
+
+def _forecast(told: calibrated.Told, joint: int) -> list[Chart]:
+    """Plot one joint over time, commanded, measured and simulated, and the response of its loop."""
+    assert told.forecasts is not None
+    own, name, scale = told.forecasts, told.model.joints[joint], calibrated.scale_of(told.found)
+    columns, unit = own.positions[joint].T, "m" if told.model.slides[joint] else "rad"
+    keys = COMMAND, MEASURED, *SIMULATED
+    panels = [
+        Panel("position", unit, [Line(k, own.time, x) for k, x in zip(keys, columns, strict=True)]),
+        Panel("error", calibrated.unit_of(told.found, joint), [
+            Line(k, own.time, scale * (x - columns[1])) for k, x in zip(SIMULATED, columns[2:], strict=True)
+        ]),
+    ]  # fmt: skip
+    label = f"Commanded, measured and simulated position of {name} over time, and errors of the simulations."
+    note = "every second begins at the estimated motion; commands alone are known from there on"
+    over_time = stacked_chart(f"{name}: {own.part}", label, panels, keys=keys, note=note)
+    frequency, *gains = own.responses[joint].T
+    if not len(frequency):
+        return [over_time]
+    data = [
+        line(frequency, x, k, f"{k.label}<br>%{{x:.2f}} Hz: %{{y:.3g}}")
+        for k, x in zip(keys[1:], gains, strict=True)
+    ]
+    layout = {
+        "xaxis": log_axis("frequency [Hz]", frequency), "margin": {"l": 74},
+        "yaxis": log_axis("position over command", [float(x) for one in gains for x in one]),
+    }  # fmt: skip
+    label = f"Amplitude of the position of {name} over that of its command against frequency, measured and simulated."
+    return [over_time, Chart(f"{name}: response to its command", label, data, layout, 260, keys[1:])]

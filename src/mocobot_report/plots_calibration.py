@@ -1,4 +1,4 @@
-"""Pictures of calibrations: parameters, misfit and information of each recording; torques left of joints."""
+"""Pictures of calibrations: parameters, misfit and information of each recording; what predictions leave of joints."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,7 +13,7 @@ from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.text import SHOWN, shown_groups
 from mocobot_report.calibration import COLOURS, FITS, fits_of, kind_names, shares_of
 from mocobot_report.charts import Key
-from mocobot_report.joint_calibration import LEFT
+from mocobot_report.joint_calibration import keys_of
 from mocobot_report.numbers import short_names
 from mocobot_report.palette import LIGHT
 from mocobot_sim.plots_plain import plain_numbers, plain_words
@@ -88,13 +88,15 @@ def _recordings(calibration: Calibration) -> Figure:
     return figure
 
 
-def save_torques(told: Told, path: Path) -> None:
-    """Draw the torque that is left of every joint."""
+def save_left(told: Told, folder: Path) -> None:
+    """Draw what predictions leave of every joint: ``torques.png`` or ``forecasts.png``."""
+    torques = told.predicts == "torque"
     figure = Figure(figsize=(9.0, 0.38 * len(told.names) + 1.5), layout="constrained")
     axis = figure.subplots()
-    _rows(axis, told.names, "rms torque left", {key: dict(enumerate(told.rms(key.group))) for key in LEFT})
+    what = "rms torque left" if torques else "rms error of forecasts over 1 s"
+    _rows(axis, told.names, what, {key: dict(enumerate(told.rms(key.group))) for key in keys_of(told)})
     figure.legend(loc="outside upper right", ncols=4, frameon=False, fontsize=9)
-    figure.savefig(path, dpi=110)
+    figure.savefig(folder / ("torques.png" if torques else "forecasts.png"), dpi=110)
 
 
 def _shares(calibration: Calibration) -> Figure:

@@ -17,7 +17,7 @@ CEILINGS = {
     "mocobot_sim": 5_764,
     "discrepancy": 13_500,
     "mocobot_view": 2_144,
-    "mocobot_report": 2_781,
+    "mocobot_report": 2_823,
     "mocobot": 4_853,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""

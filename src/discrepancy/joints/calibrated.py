@@ -11,9 +11,13 @@ combinations        list of {terms, model, value, se}: what the logs determine w
                     parameter; terms are lists of {place, parameter, factor}, inertial ones about the link's frame
 predicts            torque, or position where commands alone tell the drives
 held_out            {joint: {model, least_squares, calibrated, noise, torque}}: rms of what predictions from other parts
-                    leave, of the noise and of the torque [N m or N]. Of positions: of forecasts over one second from
+                    leave, of the noise and of the torque [N m or N]. For positions: of forecasts over one second from
                     commands alone, of the readings' noise, and standard deviation of the position [rad or m];
                     least_squares is null
+forecasts           of positions only: {part, time_s, joints: {joint: {command, measured, model, calibrated,
+                    response}}}: positions in the middle of the first part [rad or m], simulated ones in windows of one
+                    second; response {frequency_Hz, measured, model, calibrated}: amplitude of the position over that
+                    of the command
 validated           false if the only part was predicted from itself
 notes               sentences
 """
@@ -34,15 +38,17 @@ import numpy as np
 
 from discrepancy.joints import actuators
 from discrepancy.joints.calibration import ArmCalibration, Combination, HeldOut, Parameter
-from discrepancy.joints.causes import SHOWN, joint_in_words, link_in_words, titled
 from discrepancy.joints.causes import WORDS as CAUSES
+from discrepancy.joints.causes import joint_in_words, link_in_words, titled
 from discrepancy.joints.effects import numbered
+from discrepancy.joints.forecast import RESPONSE, SERIES, Forecasts
 from discrepancy.joints.problem import MOMENTS
+from discrepancy.joints.quantities import UNITS, WORDS, described
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.statistics import measured, rms
-from estimator.strict import Fields
+from estimator.strict import Fields, is_number
 from mocobot_logs.joints.joint_log import Drive
 from mocobot_sim.model_check import check_named
 from mocobot_sim.serial.effects import RobotEffect
@@ -52,26 +58,15 @@ from mocobot_sim.serial.mjcf import keep_inertials, real_inertia, servo, set_ine
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
 KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
-OPTIONAL = "provenance", "predicts"
+OPTIONAL = "provenance", "predicts", "forecasts"
 PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
-WORDS = {
-    "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
-    "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "command": "command", "zero": "zero",
-    "position": "frame position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
-    "com": "centre of mass", "inertia": "inertia",
-}  # fmt: skip
-UNITS = {
-    "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m",
-    "N_per_m": "N/m", "rad": "rad", "kg": "kg", "m": "m", "N": "N", "s": "s",
-}  # fmt: skip
 QUANTITY = {"parameter": (
     "a quantity with its unit, such as coulomb_Nm", lambda name: name == "gain" or (isinstance(name, str)
     and name.partition("_")[0] in WORDS and name.endswith(tuple(f"_{unit}" for unit in UNITS))),
 )}  # fmt: skip
-SMALL = {"rad": ("mrad", 1e3), "m": ("mm", 1e3), "s": ("ms", 1e3)}
-WIDTH = 100
-"""Width of the text."""
+WIDTH, LABEL, MOST_LABEL = 100, 52, 64
+"""Width of the text, least and most of labels of rows."""
 COMBINED = "Determined in combination only"
 Quantity = tuple[str, str, str, float, float, float]
 """Title of its kind, words, unit, given and found value, standard error."""
@@ -107,9 +102,24 @@ def to_dict(found: ArmCalibration) -> dict[str, Any]:
             found.model.joints[j]: {n: None if np.isnan(x := _mean(found.held_out, n, j)) else x for n in HELD_OUT}
             for j in found.joints
         },
+        **({} if found.forecasts is None else {"forecasts": _forecasts(found, found.forecasts)}),
         "validated": found.validated,
         "notes": list(found.notes),
     }  # fmt: skip
+
+
+def _forecasts(found: ArmCalibration, of: Forecasts) -> dict[str, Any]:
+    def lists(names: Sequence[str], table: Array) -> dict[str, Any]:
+        return {
+            n: [None if np.isnan(x) else round(float(x), 7) for x in own]
+            for n, own in zip(names, table.T, strict=True)
+        }
+
+    joints = {
+        found.model.joints[j]: lists(SERIES, of.positions[j]) | {"response": lists(RESPONSE, of.responses[j])}
+        for j in found.joints
+    }
+    return {"part": of.part, **lists(["time_s"], of.time[:, None]), "joints": joints}
 
 
 def _mean(held: Sequence[HeldOut], name: str, joint: int) -> float:
@@ -154,35 +164,35 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
     yield from findings(found)
     yield ""
     yield from _left(found)
+    shown = [p for p in found.parameters if p.determined]
+    width = min(max([LABEL, *(len(_label(found, p)) for p in shown)]), MOST_LABEL)
     for title, wanted in (
         ("Determined, in the model (clearest change first)", True),
         ("Determined, of the log", False),
     ):
-        own = [p for p in found.parameters if p.determined and p.in_model == wanted]
+        own = [p for p in shown if p.in_model == wanted]
         own.sort(key=lambda p: -abs(p.value - p.model) / p.se)
         if own:
             yield ""
-            yield f" {title:<53}{'given':>10}   found"
-            yield from (_row(found, p) for p in own[:MOST_ROWS])
+            yield f" {title:<{width + 1}}{'given':>10}   found"
+        for p in own[:MOST_ROWS]:
+            scale = described(p.name)[2]
+            yield from _row(_label(found, p), scale * p.model, scale * p.value, scale * p.se, width)
         if len(own) > MOST_ROWS:
             yield f"  {len(own) - MOST_ROWS} more are in {TABLE}."
     if found.combinations:
         yield ""
-        yield f" {'Determined in combination only':<53}{'given':>10}   found"
+        yield f" {COMBINED:<{width + 1}}{'given':>10}   found"
         for c in found.combinations[:MOST_COMBINATIONS]:
-            value, se = measured(c.value, c.se)
-            formula = f"  {_formula(c)}"
-            if len(formula) > 54:
-                yield from textwrap.wrap(formula, WIDTH, initial_indent="  ", subsequent_indent="    ")
-                formula = ""
-            yield f"{formula:<54}{c.model:>10.4g}   {value} +- {se}"
+            yield from _row(_formula(c), c.model, c.value, c.se, width)
         if len(found.combinations) > MOST_COMBINATIONS:
             yield f"  {len(found.combinations) - MOST_COMBINATIONS} more are in {NAME}."
     unknown = [p for p in found.parameters if not p.determined]
     if unknown:
         yield ""
         yield f"Not determined by these logs, so near the given values ({MODEL} holds the likeliest ones):"
-        yield from (f"  {line}" for line in _unknown(found, unknown))
+        for line in _unknown(found, unknown):
+            yield from textwrap.wrap(line, WIDTH, initial_indent="  ", subsequent_indent="    ")
         yield "Faster motion in more poses determines more; a known weight determines the common factor of all torques."
     if found.notes:
         yield ""
@@ -196,12 +206,17 @@ def _left(found: ArmCalibration) -> Iterator[str]:
         ("rms torque", "measured") if found.predicts == "torque" else ("rms error over 1 s", "motion")
     )
     heads = {"torque": first, "model": "model", "least_squares": "least sq."}
-    yield f" {what:<24}" + "".join(f"{heads.get(n, n):>12}" for n in names)
-    for j in found.joints:
-        cells = "".join(
-            f"{1e3 ** (found.predicts == 'position') * _mean(found.held_out, n, j):>12.3g}" for n in names
-        )
-        yield f" {f'{found.model.joints[j]} [{unit_of(found, j)}]':<24.24}{cells}"
+    rows = {j: f"{found.model.joints[j]} [{unit_of(found, j)}]" for j in found.joints}
+    width = min(max([24, *map(len, rows.values())]), WIDTH - 1 - 12 * len(names))
+    yield f" {what:<{width}}" + "".join(f"{heads.get(n, n):>12}" for n in names)
+    for j, row in rows.items():
+        cells = "".join(f"{scale_of(found) * _mean(found.held_out, n, j):>12.3g}" for n in names)
+        yield f" {row:<{width}.{width}}{cells}"
+
+
+def scale_of(found: ArmCalibration) -> float:
+    """Factor from SI units to those of ``unit_of``."""
+    return 1e3 if found.predicts == "position" else 1.0
 
 
 def unit_of(found: ArmCalibration, joint: int) -> str:
@@ -239,28 +254,18 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
-def _row(found: ArmCalibration, p: Parameter) -> str:
-    what, unit, scale = described(p.name)
-    value, se = measured(scale * p.value, scale * p.se)
-    return f"  {f'{what} of {place_in_words(found, p.place)} [{unit}]':<52}{scale * p.model:>10.4g}   {value} +- {se}"
+def _label(found: ArmCalibration, p: Parameter) -> str:
+    what, unit, _ = described(p.name)
+    return f"{what} of {place_in_words(found, p.place)} [{unit}]"
 
 
-def described(name: str) -> tuple[str, str, float]:
-    """A parameter in words, its unit and the factor to it."""
-    stem, _, rest = name.partition("_")
-    if stem == "gain":
-        return f"{WORDS[stem]} error", "%", 100.0
-    suffix = next(s for s in UNITS if name.endswith(f"_{s}"))
-    if name.startswith("position_gain_"):
-        return "position gain", UNITS[suffix], 1.0
-    words, middle = WORDS[stem], rest.removesuffix(suffix).strip("_").replace("_", " ")
-    unit, scale = SMALL.get(UNITS[suffix], (UNITS[suffix], 1.0))
-    middle = "delay" if stem == "command" else WORDS.get(middle, middle)
-    return (
-        f"{words} {middle}".strip(),
-        SHOWN.get(unit, unit) if unit == "N m" and suffix == "N" else unit,
-        scale,
-    )
+def _row(label: str, given: float, value: float, se: float, width: int) -> Iterator[str]:
+    """A line of a table, below its label if that is longer than ``width``."""
+    if len(label) > width:
+        yield from textwrap.wrap(label, WIDTH, initial_indent="  ", subsequent_indent="    ")
+        label = ""
+    found, error = measured(value, se)
+    yield f"  {label:<{width}}{given:>10.4g}   {found} +- {error}"
 
 
 def place_in_words(found: ArmCalibration, place: str) -> str:
@@ -415,6 +420,7 @@ class Told:
     logs: tuple[str, ...]
     notes: tuple[str, ...]
     predicts: str
+    forecasts: Forecasts | None = None
 
     @property
     def found(self) -> ArmCalibration:
@@ -445,11 +451,11 @@ class Told:
     @property
     def names(self) -> list[str]:
         """Name and unit of every joint with torque."""
-        return [f"{self.model.joints[j]} [{'N' if self.model.slides[j] else 'N m'}]" for j in self.joints]
+        return [f"{self.model.joints[j]} [{unit_of(self.found, j)}]" for j in self.joints]
 
     def rms(self, name: str) -> Array:
-        """Return an attribute of ``HeldOut`` of the joints with torque, shape (K,) [N m or N]."""
-        return getattr(self.held_out[0], name)[list(self.joints)]
+        """Return an attribute of ``HeldOut`` of the joints with torque, in the units of ``names``, shape (K,)."""
+        return scale_of(self.found) * getattr(self.held_out[0], name)[list(self.joints)]
 
 
 def from_dict(values: Mapping[str, Any], where: str) -> Told:
@@ -481,7 +487,27 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
     return Told(
         SimpleNamespace(path=Path(file.words("model")), joints=joints, slides=slides), known, parameters, combinations,
         (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"), predicts,
+        _read_forecasts(file, [joints[j] for j in known], known) if "forecasts" in file else None,
     )  # fmt: skip
+
+
+def _read_forecasts(file: Fields, names: Sequence[str], known: Sequence[int]) -> Forecasts:
+    one = file.within("forecasts", ("part", "time_s", "joints"))
+    each = one.within("joints", names)
+
+    def columns(fields: Fields, keys: Sequence[str], length: int) -> Array:
+        for key in keys:
+            if not all(x is None or is_number(x) for x in fields.list(key, length)):
+                fields.refuse(key, "a list of finite numbers and null")
+        return np.array([fields.values[key] for key in keys], dtype=float).T
+
+    time = columns(one, ["time_s"], len(one.list("time_s")))[:, 0]
+    positions, responses = {}, {}
+    for j, name in zip(known, names, strict=True):
+        own = each.within(name, (*SERIES, "response"))
+        positions[j], inner = columns(own, SERIES, len(time)), own.within("response", RESPONSE)
+        responses[j] = columns(inner, RESPONSE, len(inner.list("frequency_Hz")))
+    return Forecasts(one.words("part"), time, positions, responses)
 
 
 def _parameter(one: Fields) -> Parameter:

@@ -14,6 +14,7 @@ import numpy as np
 
 from discrepancy.joints.closed_loop import commanded
 from discrepancy.joints.fit import Combination, Fit, HeldOut, Parameter
+from discrepancy.joints.forecast import Forecasts
 from discrepancy.joints.loop_fit import LoopFit, with_gains
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
@@ -47,6 +48,7 @@ class ArmCalibration:
         servos: what MJCF can hold of each joint's position loop, shape (J, 4); None unless positions are predicted:
             position gain, velocity gain with negative damping, torque added to it, and largest torque.
         covariance: posterior covariance of ``parameters``, in their order, shape (P, P).
+        forecasts: of the first part; None unless positions are predicted.
     """
 
     model: SerialModel
@@ -65,6 +67,7 @@ class ArmCalibration:
     predicts: Literal["torque", "position"] = "torque"
     covariance: Array | None = None
     servos: Array | None = None
+    forecasts: Forecasts | None = None
 
 
 def calibrate_arm(
@@ -106,5 +109,5 @@ def calibrate_arm(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
         len(trials.parts) > 1, names, tuple(notes), "position" if positions else "torque", fit.covariances(),
-        fit.servos(),
+        fit.servos(), fit.forecasts if isinstance(fit, LoopFit) else None,
     )  # fmt: skip

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
 import mujoco
 import numpy as np
+from scipy.signal import coherence, csd, welch
 
 from discrepancy.joints.closed_loop import ClosedLoop
 from discrepancy.joints.mechanics import Tree
@@ -21,6 +24,66 @@ WINDOW_S = 1.0
 """Length of a forecast [s]."""
 LOST = 3.0
 """Error at which a forecast is lost [rad or m]; it counts with that error from there on. Chosen: half a turn."""
+SERIES = "command", "measured", "model", "calibrated"
+RESPONSE = "frequency_Hz", *SERIES[1:]
+POINTS, MOST_HZ = 300, 50.0
+"""Most instants of a forecast that are kept, and most of them a second. Chosen: an oscillation of 10 Hz has a form."""
+SEGMENT_S, COHERENT = 4.0, 0.8
+"""Length of the spectra's segments [s], and least coherence of command and measured position. Chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecasts:
+    """Positions of one part of the logs, and what the given and the calibrated model make of its commands.
+
+    Attributes:
+        part: name of the part.
+        time: instants in its middle, shape (K,) [s].
+        positions: by joint, columns ``SERIES``, simulated ones in windows of one second, shape (K, 4) [rad or m].
+        responses: by joint, columns ``RESPONSE``: frequency [Hz] and amplitude of the position over that of the
+            command, simulated ones of the whole part without a new start, shape (F, 4).
+    """
+
+    part: str
+    time: Array
+    positions: Mapping[int, Array]
+    responses: Mapping[int, Array]
+
+    @classmethod
+    def of(
+        cls, part: str, loop: ClosedLoop, steps: slice, off: Sequence[Array], whole: Sequence[Array]
+    ) -> Forecasts:
+        """Keep what a page shows of a part.
+
+        Args:
+            part: its name.
+            loop: the log with its estimated motion.
+            steps: steps of the grid.
+            off: results of ``errors`` for both models in windows of one second.
+            whole: the same in one window.
+        """
+        log, first = loop.signals.log, loop.first
+        assert log.command is not None
+        rows = np.arange(-(-steps.start // loop.every) + 1, steps.stop // loop.every)
+        thin = max(1, round(log.rate_hz / MOST_HZ))
+        kept = rows[(len(rows) - min(POINTS * thin, len(rows))) // 2 :][: POINTS * thin : thin]
+        positions, responses = {}, {}
+        for j in range(len(log.joints)):
+            command, q = log.command[first:, j], loop.measured[:, j]
+            positions[j] = np.column_stack([x[kept] for x in (command, q, *(q + x[:, j] for x in off))])
+            q = log.q[first:, j]
+            moved = [q[rows], *(q[rows] + np.nan_to_num(x[rows, j]) for x in whole)]
+            responses[j] = _response(log.rate_hz, command[rows], moved)
+        return cls(part, log.time[first + kept], positions, responses)
+
+
+def _response(rate_hz: float, command: Array, moved: Sequence[Array]) -> Array:
+    """Amplitudes of positions over that of a command where the first follows it, columns ``RESPONSE``."""
+    cut = {"fs": rate_hz, "nperseg": min(len(command), round(SEGMENT_S * rate_hz))}
+    frequency, power = welch(command, **cut)
+    seen = (coherence(command, moved[0], **cut)[1] > COHERENT) & (power > 0.0) & (frequency > 0.0)
+    gains = [np.abs(csd(command, x, **cut)[1][seen] / power[seen]) for x in moved]
+    return np.column_stack([frequency[seen], *gains])
 
 
 def machine(model: SerialModel, given: Tree, found: Tree) -> mujoco.MjModel:
@@ -74,7 +137,7 @@ def errors(
     command, added = loop.told(late)
     added = added * (kp / loop.gains(1)[0]) + more
     out = np.full(loop.measured.shape, np.nan)
-    long = max(loop.every, round(window_s / h / loop.every) * loop.every)
+    long = max(loop.every, round(min(window_s / h, len(loop.q)) / loop.every) * loop.every)
     begin = -(-steps.start // loop.every) * loop.every
     for first in range(begin, steps.stop - loop.every + 1, long):
         mujoco.mj_resetData(m, data)

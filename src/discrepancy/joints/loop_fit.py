@@ -9,10 +9,11 @@ import numpy as np
 
 from discrepancy.joints.closed_loop import ClosedLoop
 from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
-from discrepancy.joints.forecast import errors, machine
+from discrepancy.joints.forecast import WINDOW_S, Forecasts, errors, machine
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import MOMENTS, REST, JointProblem
+from discrepancy.joints.quantities import described
 from discrepancy.joints.servo import with_torques
 from discrepancy.joints.trials import Trials
 from estimator.arrays import Array
@@ -67,9 +68,11 @@ class LoopFit(Fit):
         loops: closed loops of the runs.
         steps: steps done.
         widened: factor on the standard errors by quantity, see ``widen``.
+        forecasts: what ``held_out`` keeps of the first part.
     """
 
     late_s = LATE_S
+    forecasts: Forecasts | None = None
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
         self.loops, self.steps = [ClosedLoop.of(s) for s in trials.runs], 0
@@ -193,10 +196,13 @@ class LoopFit(Fit):
                 self.zero(),
                 self.each("delay_s"),
             )
-            off = (
-                errors(plain, self.model, loop, loop.plain, none, none, steps),
-                errors(fitted, self.model, loop, self.servos(), zero, late, steps),
+            pair = (plain, loop.plain, none, none), (fitted, self.servos(), zero, late)
+            off, *whole = (
+                [errors(m, self.model, loop, gains, at, by, steps, long_s) for m, gains, at, by in pair]
+                for long_s in (WINDOW_S, np.inf)[: 1 + (t == 0)]
             )
+            if whole:
+                self.forecasts = Forecasts.of(self.trials.names[t], loop, steps, off, *whole)
             model, best = (np.sqrt(np.nanmean(x**2, axis=0)) for x in off)
             rows = loop.measured[steps.start // loop.every : steps.stop // loop.every]
             read, size = np.sqrt(loop.reading), np.nanstd(rows, axis=0)
@@ -219,7 +225,8 @@ class LoopFit(Fit):
             )
         wide = {name: factor for name, factor in self.widened.items() if factor > WIDE}
         if wide:
-            listed = ", ".join(f"{name} {factor:.1f}" for name, factor in wide.items())
+            told = {described("command_delay_s" if n == "delay_s" else n)[0]: x for n, x in wide.items()}
+            listed = ", ".join(f"{name} {factor:.1f}" for name, factor in told.items())
             yield (
                 "Parts of the logs differ by more than their standard errors, so something acts that no parameter is. "
                 f"Standard errors count that scatter; they are wider by a factor of: {listed}."

@@ -1,9 +1,9 @@
 """Calibrate the robots of a team from recordings of the payloads that they carry, or a single robot from joint logs.
 
 Folder of a single robot: as_found.xml with its assets, parameters.csv, calibration.json (see
-``discrepancy.joints.calibrated``), report.txt, torques.png, what is left of torques, and for robots that are known by
-their commands actuators.json (see ``discrepancy.joints.actuators``) and log.toml, the map with what was found of their
-loops. Folder of a team:
+``discrepancy.joints.calibrated``), report.txt, torques.png or forecasts.png, what predictions leave, and for robots
+that are known by their commands actuators.json (see ``discrepancy.joints.actuators``) and log.toml, the map with what
+was found of their loops. Folder of a team:
 
 calibration.json           see ``estimator.calibrate.json``
 report.txt                 text that the command prints
@@ -120,7 +120,7 @@ class JointCalibration(Folder):
     """A single robot as its joint logs have it; prints as text, writes a folder.
 
     Attributes:
-        found: parameters with standard errors, and torques predicted for logs that were not fitted.
+        found: parameters with standard errors, and torques or positions predicted for logs that were not fitted.
         drives: drives of logs whose torques no sensor measured; empty for others.
         map: text of the logs' map with the gains and delays that were found, empty if nothing of it was.
     """
@@ -161,9 +161,9 @@ class JointCalibration(Folder):
         if self.map:
             write_text(folder / "log.toml", self.map)
         if pictures and draws_plots():
-            from mocobot_report.plots_calibration import save_torques
+            from mocobot_report.plots_calibration import save_left
 
-            save_torques(calibrated.from_dict(self.to_dict(), ""), folder / "torques.png")
+            save_left(calibrated.from_dict(self.to_dict(), ""), folder)
         return as_given
 
 

@@ -12,6 +12,11 @@ from mocobot_logs.joints.joint_log import JointLog
 
 SMOOTH_HZ, SMOOTH_SHARE = 60.0, 0.2
 """Cut-off of positions before their derivative [Hz], and its upper limit over the rate. Chosen: as in the diagnosis."""
+FREE = (
+    " The position gains are free, so the torques are those with which the model's masses explain the motion best.",
+    " The velocity gains are free, so they count as viscous friction.",
+)
+"""What is said where position and velocity gains are free."""
 
 
 def with_asked_torques(log: JointLog) -> JointLog:
@@ -37,9 +42,11 @@ def with_asked_torques(log: JointLog) -> JointLog:
     names = ", ".join(name for name, is_told in zip(log.joints, told, strict=True) if is_told)
     how = "commanded" if drive.command == "torque" else "asked for by the position loop with the map's gains"
     note = f"Torques of {names} are those {how}; no sensor measured them."
-    rough = drive.gain_within[told].max(initial=1.0)
-    if drive.command == "position" and rough > 1.0:
-        note += f" The gains are known within a factor of {rough:g}, and so are these torques."
+    if drive.command == "position":
+        free = drive.gain_free[told]
+        note += "".join(said for said, is_free in zip(FREE, free.any(axis=0), strict=True) if is_free)
+        if (rough := drive.gain_within[told][~free].max(initial=1.0)) > 1.0:
+            note += f" The gains are known within a factor of {rough:g}, and so are these torques."
     return replace(log, torque=np.where(told, asked, torque), notes=(*log.notes, note), asked=told)
 
 
