@@ -11,9 +11,9 @@ combinations        list of {terms, model, value, se}: what the logs determine w
                     parameter; terms are lists of {place, parameter, factor}, inertial ones about the link's frame
 predicts            torque, or position where commands alone tell the drives
 held_out            {joint: {model, least_squares, calibrated, noise, torque}}: rms of what predictions from other parts
-                    leave, of the noise and of the torque [N m or N]. Of positions: of forecasts over one second from
-                    commands alone, of the readings' noise, and standard deviation of the position [rad or m];
-                    least_squares is null
+                    leave, of the noise and of the torque [N m or N]. If it predicts positions: rms of forecasts over
+                    one second from commands alone, of the readings' noise, and standard deviation of the position
+                    [rad or m]; least_squares is null
 validated           false if the only part was predicted from itself
 notes               sentences
 """
@@ -62,8 +62,8 @@ WORDS = {
     "com": "centre of mass", "inertia": "inertia",
 }  # fmt: skip
 UNITS = {
-    "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "N_per_m": "N/m", "kgm2": "kg m^2", "Nm": "N m", "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m",
-    "N": "N", "s": "s",
+    "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "N_per_m": "N/m", "kgm2": "kg m^2", "Nm": "N m",
+    "Ns_per_m": "N s/m", "rad": "rad", "kg": "kg", "m": "m", "N": "N", "s": "s",
 }  # fmt: skip
 QUANTITY = {"parameter": (
     "a quantity with its unit, such as coulomb_Nm", lambda name: name == "gain" or (isinstance(name, str)

@@ -54,7 +54,6 @@ def machine(model: SerialModel, given: Tree, found: Tree) -> mujoco.MjModel:
 
 def errors(
     m: mujoco.MjModel, model: SerialModel, loop: ClosedLoop, servos: Array, zero: Array, late: Array, steps: slice,
-    window_s: float = WINDOW_S,
 ) -> Array:  # fmt: skip
     """Forecast minus measured positions in consecutive windows, shape (M, J); NaN where none was measured.
 
@@ -65,7 +64,6 @@ def errors(
         servos: position gain, velocity gain, torque added, and largest torque of each loop, shape (J, 4).
         zero, late: joint zeros and delays of the commands [s], shape (J,).
         steps: steps of the grid to forecast.
-        window_s: length of a window [s].
     """
     h, data, own = loop.step_s, mujoco.MjData(m), model.coupling.own
     dof, every = m.jnt_dofadr[own], max(1, int(np.ceil(loop.step_s / STEP_S - 1e-9)))
@@ -74,7 +72,7 @@ def errors(
     command, added = loop.told(late)
     added = added * (kp / loop.gains(1)[0]) + more
     out = np.full(loop.measured.shape, np.nan)
-    long = max(loop.every, round(window_s / h / loop.every) * loop.every)
+    long = max(loop.every, round(WINDOW_S / h / loop.every) * loop.every)
     begin = -(-steps.start // loop.every) * loop.every
     for first in range(begin, steps.stop - loop.every + 1, long):
         mujoco.mj_resetData(m, data)

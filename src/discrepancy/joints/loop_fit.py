@@ -123,8 +123,8 @@ class LoopFit(Fit):
     def widen(self) -> None:
         """Widen standard errors by the scatter between parts, by quantity (R. T. Birge, Phys. Rev. 40, 1932).
 
-        Values of one part differ from those of all by as much as their covariances differ, if the model holds. Where its
-        laws do not, such as those of friction, other motions give other values.
+        Values of one part differ from those of all by as much as their covariances differ, if the model holds. Where
+        its laws do not, such as those of friction, other motions give other values.
         """
         parts, n = range(len(self.normals)), self.first
         names = [s.name for s in self.scalars]

@@ -37,7 +37,8 @@ def with_asked_torques(log: JointLog) -> JointLog:
     names = ", ".join(name for name, is_told in zip(log.joints, told, strict=True) if is_told)
     how = "commanded" if drive.command == "torque" else "asked for by the position loop with the map's gains"
     note = f"Torques of {names} are those {how}; no sensor measured them."
-    rough = drive.gain_within[told].max(initial=1.0)
+    within = drive.gain_within[told]
+    rough = within[np.isfinite(within)].max(initial=1.0)
     if drive.command == "position" and rough > 1.0:
         note += f" The gains are known within a factor of {rough:g}, and so are these torques."
     return replace(log, torque=np.where(told, asked, torque), notes=(*log.notes, note), asked=told)
