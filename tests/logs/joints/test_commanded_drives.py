@@ -178,7 +178,11 @@ unit = "rad/s"
 
 
 def test_gains_that_nobody_knows_ask_for_no_torque(tmp_path) -> None:
-    assert log_of(tmp_path, commanded('position_gain = 20\nvelocity_gain = "free"')).torque is None
+    assert log_of(tmp_path, commanded('position_gain = "free"\nvelocity_gain = 1')).torque is None
+    sum_only = log_of(tmp_path, commanded('position_gain = 20\nvelocity_gain = "free"'))
+    bare = log_of(tmp_path, commanded("position_gain = 20"))
+    np.testing.assert_array_equal(sum_only.torque, bare.torque)  # the rest counts as viscous friction
+    assert not any("factor of" in note for note in sum_only.notes)
     rough = log_of(tmp_path, commanded("position_gain = 20\ngain_known_within = 2"))
     assert rough.torque is not None
     assert "The gains are known within a factor of 2, and so are these torques." in rough.notes[-1]
