@@ -260,7 +260,7 @@ class ClosedLoop:
         def left(x: Array) -> float:
             read, jitter, torque = np.exp(np.clip(x, least, most))
             R = np.where(np.isfinite(told), read + jitter * speed, np.inf)
-            return float(cost(A, B, rest + torque / self.step_s, R, self.every, start, lacking, off))
+            return float(cost((A, B, rest + torque / self.step_s), R, self.every, start, lacking, off))
 
         simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
         options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1}
