@@ -40,8 +40,8 @@ class Options:
     Attributes:
         folder: where sets are written, a folder each.
         first: seed of the first set of legs, and of arms; the others follow.
-        leg_200, leg_500, arm_50, arm_30: how many sets, by the rate of their logs [Hz].
-        show: print what the folder has, and make nothing.
+        leg_200, leg_500, arm_50, arm_30: how many sets, by rate [Hz].
+        show: print what the folder has.
     """
 
     folder: tyro.conf.Positional[Path]
@@ -55,8 +55,8 @@ class Options:
 
 def calibrated(folder: Path) -> dict[str, Any]:
     """Run the program; its exit code, CPU [s], peak memory [MiB] and last line of errors."""
-    options = "fit_0.csv fit_1.csv --model model.xml --map log.toml --out out --force".split()
-    command = [sys.executable, "-m", "mocobot", "calibrate", *options]
+    command = [sys.executable, "-m", "mocobot", "calibrate", "fit_0.csv", "fit_1.csv", "--model", "model.xml"]
+    command += ["--map", "log.toml", "--out", "out", "--force"]
     with (folder / "calibrate.txt").open("w", encoding="utf-8") as said:
         ran = subprocess.Popen(command, stdout=said, stderr=subprocess.STDOUT, cwd=folder)
         _, status, used = os.wait4(ran.pid, 0)
@@ -100,9 +100,9 @@ def one(folder: Path, kind: Any, rate_hz: int, seed: int) -> None:
 def table(kind: str, sets: list[dict[str, Any]]) -> str:
     """The sets of a kind, a column each, and all of them: together, or median and worst."""
     good = [s for s in sets if s["exit"] == 0]
-    failed = [f"- seed {s['seed']}: {s['error']}\n" for s in sets if s["exit"]]
+    failed = [f"- seed {s['seed']}: {s['error']}" for s in sets if s["exit"]]
     if not good:
-        return f"## {kind}\n\n{''.join(failed)}"
+        return "\n".join(failed)
     own = [[p for p in s["parameters"] if p["name"] in PHYSICAL and p["determined"]] for s in good]
     pooled = [*own, [p for some in own for p in some]]
     rows = {"set": [f"{s['seed']}, {s['law']}" for s in good] + ["all"], "---": ["---"] * len(pooled)}
@@ -111,8 +111,7 @@ def table(kind: str, sets: list[dict[str, Any]]) -> str:
         z = [np.array([p["z"] for p in some if name in ("", p["name"])]) for some in pooled]
         cells = [f"{np.mean(np.abs(x) < 3.0):.0%}, {rms(x):.3g}" if x.size else "-" for x in z]
         rows[f"{name or 'all'}: within 3 standard errors, rms of error over standard error"] = cells
-    missed = [len(s["missed"]) for s in good]
-    rows["not determined, oracle below 10 %"] = [str(x) for x in (*missed, sum(missed))]
+    rows["not determined, oracle below 10 %"] = [*(str(len(s["missed"])) for s in good), ""]
     numbers = {f"friction curve, {of.__name__}": [of(s["curve"]) for s in good] for of in (rms, max)}
     numbers |= {f"forecast, {over}": [s["over"][over] for s in good] for over in good[0]["over"]}
     numbers |= {name: [s[name] for s in good] for name in ("cpu_s", "peak_MiB")}
