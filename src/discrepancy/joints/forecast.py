@@ -125,7 +125,7 @@ def errors(
         loop: the log with its estimated motion, from which every window starts.
         servos: position gain, velocity gain, torque added, and largest torque of each loop, shape (J, 4).
         zero, late: joint zeros and delays of the commands [s], shape (J,).
-        steps: steps of the grid to forecast.
+        steps: steps of the grid to forecast; its step is the length of a window, one second if missing.
     """
     h, data, own = loop.step_s, mujoco.MjData(m), model.coupling.own
     (kp, kd, more, limit), on = servos.T, loop.gains(len(loop.q) - 1)[3] > 0.0
@@ -140,7 +140,7 @@ def errors(
     kind = mujoco.mjtIntegrator
     m.opt.integrator = int(kind.mjINT_RK4 if slow else kind.mjINT_IMPLICITFAST)
     out = np.full(loop.measured.shape, np.nan)
-    long = max(loop.every, round(WINDOW_S / h / loop.every) * loop.every)
+    long = max(loop.every, (steps.step or round(WINDOW_S / h)) // loop.every * loop.every)
     begin = -(-steps.start // loop.every) * loop.every
     for first in range(begin, steps.stop - loop.every + 1, long):
         mujoco.mj_resetData(m, data)

@@ -9,7 +9,7 @@ import numpy as np
 
 from discrepancy.joints.closed_loop import ClosedLoop
 from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
-from discrepancy.joints.forecast import WINDOW_S, Forecasts, errors, machine
+from discrepancy.joints.forecast import Forecasts, errors, machine
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import MOMENTS, REST, JointProblem
@@ -198,8 +198,8 @@ class LoopFit(Fit):
             )
             pair = (plain, loop.plain, none, none), (fitted, self.servos(), zero, late)
             off, *whole = (
-                [errors(m, self.model, loop, gains, at, by, steps, long_s) for m, gains, at, by in pair]
-                for long_s in (WINDOW_S, np.inf)[: 1 + (t == 0)]
+                [errors(m, self.model, loop, gains, at, by, run) for m, gains, at, by in pair]
+                for run in (steps, slice(steps.start, steps.stop, len(loop.q)))[: 1 + (t == 0)]
             )
             if whole:
                 self.forecasts = Forecasts.of(self.trials.names[t], loop, steps, off, *whole)
