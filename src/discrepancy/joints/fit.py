@@ -589,7 +589,7 @@ class Fit:
 
     def notes(self) -> Iterator[str]:
         """Sentences on what the fit holds fixed."""
-        if len(self.free) < len(self.known):
+        if any(self.gain_prior(j) == GAIN for j in self.known):
             yield (
                 "The mean torque gain is held at 1: without a known weight, torques determine masses, inertias and "
                 "friction only up to a common factor."

@@ -18,7 +18,7 @@ from discrepancy.joints.actuators import quantity_of, to_dict
 from discrepancy.joints.calibration import Parameter
 from estimator.errors import InputError
 
-KP, KD, LIMIT_NM, RATE_HZ, STEP_S = 20.0, 1.5, 23.7, 500.0, 2e-4
+KP, KD, LIMIT_NM, RATE_HZ, SECONDS, STEP_S = 20.0, 1.5, 23.7, 500.0, 12.0, 2e-4
 ROTOR_KGM2, DRY_NM, VISCOUS = (0.012, 0.03), (0.25, 0.5), (0.2, 0.15)
 HEADER = "t,hip q,knee q,hip command,knee command"
 LEG = """<mujoco><compiler angle="radian"/><worldbody>
@@ -59,8 +59,8 @@ def leg(tmp_path_factory) -> Path:
     spec.option.timestep, spec.option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = spec.compile()
     data, every, rng = mujoco.MjData(model), round(1.0 / RATE_HZ / STEP_S), np.random.default_rng(4)
-    t = np.arange(round(30.0 * RATE_HZ)) / RATE_HZ
-    sweep = 2.0 * np.pi * (0.2 * t + 0.5 * 2.8 / 30.0 * t**2)
+    t = np.arange(round(SECONDS * RATE_HZ)) / RATE_HZ
+    sweep = 2.0 * np.pi * (0.2 * t + 0.5 * 2.8 / SECONDS * t**2)
     command = np.column_stack([0.5 + 0.4 * np.sin(sweep), -1.0 + 0.5 * np.sin(1.13 * sweep + 0.4)])
     data.qpos[:] = command[0]
     q = np.empty_like(command)
@@ -223,7 +223,7 @@ def test_ranges_covariance_and_a_motor(leg):
     parameters = [
         replace(p, determined=True, value=0.3, se=0.1) if p.name == "coulomb_Nm"
         else replace(p, determined=True, value=0.0, se=0.02) if p.name == "viscous_Nms_per_rad"
-        else replace(p, determined=True, value=-0.004, se=0.0007) if p.name == "delay_s" else p
+        else replace(p, determined=True, value=0.004, se=0.0007) if p.name == "command_delay_s" else p
         for p in (*calibration.found.parameters, *more)
     ]  # fmt: skip
     found = replace(calibration.found, parameters=tuple(parameters))
