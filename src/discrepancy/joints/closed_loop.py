@@ -30,10 +30,10 @@ STEP_S = 2e-3
 """Longest step of the grid [s]. Derived: the midpoint rule errs by a thousandth at 10 Hz."""
 MATRICES_HZ = 100.0
 """Rate at which inertias and stiffnesses of the arm are computed. Chosen: ten times the fastest motion."""
-SHARE = 0.4
-"""Cut-off of the first guess of the motion over the log's rate. Chosen."""
-MOTION_HZ = 20.0
-"""Highest frequency of the motion about which the loop is linear [Hz]: noise in it would make inertias too small."""
+SHARE, MOTION_HZ = 0.4, 20.0
+"""Highest frequency of the motion that readings tell, over the log's rate and at most [Hz]. Chosen."""
+FAR = 1.0
+"""Least deviation of a model from the motion at which it runs away without readings [rad or m]. Chosen."""
 DELAY_STEP_S = 1e-3
 """Half the step of the derivative by the delay [s]. Chosen: commands are held for longer."""
 START_RAD, START_RAD_PER_S = 0.02, 1.0
@@ -268,17 +268,23 @@ class ClosedLoop:
         return np.exp(np.clip(best.x, least, most))
 
     def move(self, filtered: Filtered, lacking: Array) -> None:
-        """Move the motion to its likeliest course.
+        """Move the motion to its likeliest course, above ``MOTION_HZ`` to that of the model if it stays near the motion.
+
+        Noise in the motion would make inertias and friction too small; the model tells what friction does at reversals.
 
         Args:
             filtered: filter around the present motion.
             lacking: torque that the model lacks there, shape (N, J).
         """
-        J = self.q.shape[1]
-        way = filtered.smoothed(np.ascontiguousarray(lacking), self.off)
-        rate = 1.0 / self.step_s
-        cutoff = min(MOTION_HZ, SHARE * self.signals.log.rate_hz)
-        self.q, self.dq = (low_pass(x, rate, cutoff) for x in (self.q + way[:, :J], self.dq + way[:, J:]))
+        J, lacking = self.q.shape[1], np.ascontiguousarray(lacking)
+        rate, cutoff = 1.0 / self.step_s, min(MOTION_HZ, SHARE * self.signals.log.rate_hz)
+        blind = replace(filtered, gain=np.zeros_like(filtered.gain), root=np.zeros_like(filtered.root))
+        modelled, way = blind.smoothed(lacking, self.off), filtered.smoothed(lacking, self.off)
+        if np.abs(modelled[:, :J]).max() < FAR:
+            way = modelled + low_pass(way - modelled, rate, cutoff)
+            self.q, self.dq = self.q + way[:, :J], self.dq + way[:, J:]
+        else:
+            self.q, self.dq = (low_pass(x, rate, cutoff) for x in (self.q + way[:, :J], self.dq + way[:, J:]))
 
 
 def _reading(log: JointLog) -> Array:

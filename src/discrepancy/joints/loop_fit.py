@@ -221,7 +221,8 @@ class LoopFit(Fit):
         if names:
             yield (
                 f"Velocity gain and viscous friction of {', '.join(names)} have the same effect: only their sum is "
-                "determined. The viscous friction is told for the velocity gain of the map, 0 where it is free."
+                "determined. The viscous friction is told for the velocity gain of the map, 0 where it is free, which "
+                "is off by the same factor as the position gain."
             )
         wide = {name: factor for name, factor in self.widened.items() if factor > WIDE}
         if wide:

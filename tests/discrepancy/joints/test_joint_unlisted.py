@@ -19,7 +19,7 @@ def signals(seed: int) -> JointSignals:
     rng, t = np.random.default_rng(seed), np.linspace(0.0, 60.0, SAMPLES)
     q, v = 0.8 * np.sin(0.7 * t + seed) + 0.1 * rng.standard_normal(SAMPLES), 1.5 * np.sin(1.9 * t)
     load = 4.0 + 3.0 * np.sin(0.31 * t)
-    return JointSignals(q, v, np.gradient(v, t), np.sign(v), load, load, load, t, SPAN)
+    return JointSignals(q, v, np.gradient(v, t), np.sign(v), load, load, load, load, t, SPAN)
 
 
 def told(name: str, error: Array, own: JointSignals, before: JointSignals) -> Law:
