@@ -247,16 +247,8 @@ class ClosedLoop:
             at = [j, J + j]
             A, B = (np.ascontiguousarray(x) for x in (loop.A[:, at][:, :, at], loop.B[:, at, j]))
             rest, start = loop.Q[:, j] - self.torque[j] / self.step_s, loop.start[at]
-            own = (
-                A,
-                B,
-                rest,
-                np.ascontiguousarray(loop.R[:, j]),
-                speed[j],
-                off[j],
-                np.ascontiguousarray(lacking[:, j]),
-                start,
-            )
+            told, torque = (np.ascontiguousarray(x[:, j]) for x in (loop.R, lacking))
+            own = A, B, rest, told, speed[j], off[j], torque, start
             self.reading[j], self.jitter[j], self.torque[j] = self._likeliest(j, own)
 
     def _likeliest(self, j: int, own: tuple[Array, ...]) -> Array:
@@ -268,7 +260,7 @@ class ClosedLoop:
         def left(x: Array) -> float:
             read, jitter, torque = np.exp(np.clip(x, least, most))
             R = np.where(np.isfinite(told), read + jitter * speed, np.inf)
-            return float(cost(A, B, rest + torque / self.step_s, R, self.every, start, lacking, off))
+            return float(cost((A, B, rest + torque / self.step_s), R, self.every, start, lacking, off))
 
         simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
         options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.1}

@@ -19,7 +19,7 @@ from estimator.arrays import Array
 from mocobot_sim.serial.mjcf import SOLIMP, SOLREF
 
 STEP_S = 1e-3
-"""Longest integration step [s]. Chosen: a thirtieth of the fastest loop's period."""
+"""Longest integration step [s]. Chosen: errors of the integration are then as small as those of encoders."""
 WINDOW_S = 1.0
 """Length of a forecast [s]."""
 LOST = 3.0
@@ -109,15 +109,13 @@ def machine(model: SerialModel, given: Tree, found: Tree) -> mujoco.MjModel:
     off = mujoco.mjtDisableBit
     for bit in (off.mjDSBL_CONTACT, off.mjDSBL_LIMIT, off.mjDSBL_ACTUATION, off.mjDSBL_AUTORESET):
         m.opt.disableflags |= int(bit)
-    m.opt.integrator, m.opt.gravity = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST), found.gravity
-    m.dof_solref[:], m.dof_solimp[:] = SOLREF, SOLIMP
+    m.opt.gravity, m.dof_solref[:], m.dof_solimp[:] = found.gravity, SOLREF, SOLIMP
     mujoco.mj_setConst(m, mujoco.MjData(m))
     return m
 
 
 def errors(
     m: mujoco.MjModel, model: SerialModel, loop: ClosedLoop, servos: Array, zero: Array, late: Array, steps: slice,
-    window_s: float = WINDOW_S,
 ) -> Array:  # fmt: skip
     """Forecast minus measured positions in consecutive windows, shape (M, J); NaN where none was measured.
 
@@ -127,17 +125,22 @@ def errors(
         loop: the log with its estimated motion, from which every window starts.
         servos: position gain, velocity gain, torque added, and largest torque of each loop, shape (J, 4).
         zero, late: joint zeros and delays of the commands [s], shape (J,).
-        steps: steps of the grid to forecast.
-        window_s: length of a window [s].
+        steps: steps of the grid to forecast; its step is the length of a window, one second if missing.
     """
     h, data, own = loop.step_s, mujoco.MjData(m), model.coupling.own
-    dof, every = m.jnt_dofadr[own], max(1, int(np.ceil(loop.step_s / STEP_S - 1e-9)))
-    m.opt.timestep = h / every
-    (kp, kd, more, limit), on = servos.T, loop.gains(len(loop.q) - 1)[3]
+    (kp, kd, more, limit), on = servos.T, loop.gains(len(loop.q) - 1)[3] > 0.0
     command, added = loop.told(late)
-    added = added * (kp / loop.gains(1)[0]) + more
+    target = command + zero + (added / loop.gains(1)[0] + more / kp)
+    at, dof = m.jnt_qposadr[own], m.jnt_dofadr[own]
+    stiffness, spring, damping = m.jnt_stiffness[own], m.qpos_spring[at], m.dof_damping[dof]
+    every = max(1, int(np.ceil(h / STEP_S - 1e-9)))
+    m.opt.timestep = h / every
+    # RK4 is stable if its step is shorter than the fastest decay.
+    slow = bool(np.all(m.dof_invweight0[dof] * (damping + kd) * m.opt.timestep < 1.0))
+    kind = mujoco.mjtIntegrator
+    m.opt.integrator = int(kind.mjINT_RK4 if slow else kind.mjINT_IMPLICITFAST)
     out = np.full(loop.measured.shape, np.nan)
-    long = max(loop.every, round(min(window_s / h, len(loop.q)) / loop.every) * loop.every)
+    long = max(loop.every, (steps.step or round(WINDOW_S / h)) // loop.every * loop.every)
     begin = -(-steps.start // loop.every) * loop.every
     for first in range(begin, steps.stop - loop.every + 1, long):
         mujoco.mj_resetData(m, data)
@@ -148,12 +151,18 @@ def errors(
             for _ in range(every):
                 if lost:
                     break
-                at, rate = data.qpos[own] - zero, data.qvel[dof]
-                torque = np.clip(kp * (command[n] - at) + added[n] - kd * rate, -limit, limit) * on[n]
-                data.qfrc_applied[dof] = torque
+                asked = kp * (target[n] - data.qpos[at]) - kd * data.qvel[dof]
+                free = on[n] & (np.abs(asked) < limit)
+                # Springs and dampers act within a step, too, and not only between steps.
+                m.jnt_stiffness[own], m.dof_damping[dof] = stiffness + free * kp, damping + free * kd
+                m.qpos_spring[at] = np.where(
+                    free, (stiffness * spring + kp * target[n]) / (stiffness + kp), spring
+                )
+                data.qfrc_applied[dof] = np.where(free, 0.0, on[n] * np.clip(asked, -limit, limit))
                 mujoco.mj_step(m, data)
-                lost = not np.abs(data.qpos[own] - loop.q[n]).max() < LOST
+                lost = not np.abs(data.qpos[at] - loop.q[n]).max() < LOST
             if (n + 1) % loop.every == 0:
                 row = (n + 1) // loop.every
-                out[row] = LOST if lost else data.qpos[own] - zero - loop.measured[row]
+                out[row] = LOST if lost else data.qpos[at] - zero - loop.measured[row]
+    m.jnt_stiffness[own], m.qpos_spring[at], m.dof_damping[dof] = stiffness, spring, damping
     return np.where(np.isnan(loop.measured), np.nan, out)

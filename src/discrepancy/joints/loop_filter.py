@@ -61,7 +61,7 @@ class Filtered:
         M, J = loop.R.shape
         gain, root = np.zeros((M, 2 * J, J)), np.zeros((M, J, J))
         spread = np.zeros((len(loop.A) + 1, 2 * J, 2 * J))
-        _gains(loop.A, loop.B, loop.Q, loop.R, loop.every, loop.start, gain, root, spread)
+        _gains((loop.A, loop.B, loop.Q), loop.R, loop.every, loop.start, (gain, root, spread))
         return cls(loop, gain, root, spread)
 
     def innovations(self, torque: Array, position: Array | None = None) -> Array:
@@ -72,18 +72,9 @@ class Filtered:
             position: measurements of the first series, shape (M, J); None: 0.
         """
         M, J = self.loop.R.shape
-        out = np.zeros((M, J, torque.shape[2]))
+        out, loop = np.zeros((M, J, torque.shape[2])), self.loop
         y = np.zeros((M, J)) if position is None else position
-        _filter(
-            self.loop.A,
-            self.loop.B,
-            self.gain,
-            self.root,
-            self.loop.every,
-            np.ascontiguousarray(torque),
-            y,
-            out,
-        )
+        _filter((loop.A, loop.B), (self.gain, self.root), loop.every, np.ascontiguousarray(torque), y, out)
         return out
 
     def smoothed(self, torque: Array, position: Array) -> Array:
@@ -95,14 +86,15 @@ class Filtered:
         """
         loop, out = self.loop, np.zeros((len(self.loop.A) + 1, self.loop.A.shape[1]))
         _smooth(
-            loop.A, loop.B, self.gain, self.root, self.spread, loop.every, np.ascontiguousarray(torque),
+            (loop.A, loop.B), (self.gain, self.root, self.spread), loop.every, np.ascontiguousarray(torque),
             np.ascontiguousarray(position), out,
         )  # fmt: skip
         return out
 
 
 @compiled
-def _gains(A, B, Q, R, every, start, gain, root, spread):
+def _gains(steps, R, every, start, out):
+    (A, B, Q), (gain, root, spread) = steps, out
     N, twice, J = B.shape
     P = np.diag(start)
     for n in range(N + 1):
@@ -129,7 +121,8 @@ def _gains(A, B, Q, R, every, start, gain, root, spread):
 
 
 @compiled
-def _filter(A, B, gain, root, every, torque, position, out):
+def _filter(steps, gains, every, torque, position, out):
+    (A, B), (gain, root) = steps, gains
     N, twice, J = B.shape
     x = np.zeros((twice, torque.shape[2]))
     for n in range(N + 1):
@@ -144,7 +137,8 @@ def _filter(A, B, gain, root, every, torque, position, out):
 
 
 @compiled
-def _smooth(A, B, gain, root, spread, every, torque, position, out):
+def _smooth(steps, gains, every, torque, position, out):
+    (A, B), (gain, root, spread) = steps, gains
     N, twice, J = B.shape
     x, white = np.zeros(twice), np.zeros((len(gain), J))
     for n in range(N + 1):
@@ -168,8 +162,9 @@ def _smooth(A, B, gain, root, spread, every, torque, position, out):
 
 
 @compiled
-def cost(A, B, Q, R, every, start, torque, position):
+def cost(steps, R, every, start, torque, position):
     """Negative log likelihood of one joint, up to a constant: as above with J = 1, in one pass and without matrices."""
+    A, B, Q = steps
     p, v = 0.0, 0.0
     P, C, V = start[0], 0.0, start[1]
     out = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from discrepancy.joints.closed_loop import ClosedLoop
 from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
-from discrepancy.joints.forecast import WINDOW_S, Forecasts, errors, machine
+from discrepancy.joints.forecast import Forecasts, errors, machine
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import MOMENTS, REST, JointProblem
@@ -167,9 +167,8 @@ class LoopFit(Fit):
         """Position gain, velocity gain with negative damping, torque added, and largest torque, shape (J, 4)."""
         kp, kd, limit, _ = self.loops[0].gains(1)
         true = 1.0 / (1.0 + self.each("scale"))
-        return np.column_stack(
-            [kp * true, kd * true + np.minimum(self.tree.viscous, 0.0), -self.offset * true, limit]
-        )
+        damping = kd * true + np.minimum(self.tree.viscous, 0.0)
+        return np.column_stack([kp * true, damping, -self.offset * true, limit * true])
 
     @property
     def offset(self) -> Array:
@@ -199,8 +198,8 @@ class LoopFit(Fit):
             )
             pair = (plain, loop.plain, none, none), (fitted, self.servos(), zero, late)
             off, *whole = (
-                [errors(m, self.model, loop, gains, at, by, steps, long_s) for m, gains, at, by in pair]
-                for long_s in (WINDOW_S, np.inf)[: 1 + (t == 0)]
+                [errors(m, self.model, loop, gains, at, by, run) for m, gains, at, by in pair]
+                for run in (steps, slice(steps.start, steps.stop, len(loop.q)))[: 1 + (t == 0)]
             )
             if whole:
                 self.forecasts = Forecasts.of(self.trials.names[t], loop, steps, off, *whole)

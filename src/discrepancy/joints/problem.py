@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import fftconvolve
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
@@ -31,6 +30,7 @@ from discrepancy.joints.mechanics import (
 )
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import gravity_at, ways
+from discrepancy.joints.pushes import Pushes
 from discrepancy.joints.signals import Signals, along
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
@@ -88,11 +88,6 @@ FORM = 0.1
 """Prior standard deviation of the error of the model's friction law, as a share of that friction."""
 PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
-PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
-PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
-"""Pushes: durations to try [s], prior force [N], frequency of the noise for ranking [Hz], number of proposals."""
-BEGIN_S = 1.0
-"""Earliest start of a push [s]. Free vibration at the start of a log looks like a push."""
 READ_RAD = 0.02
 """Prior standard deviation of an unlisted position error [rad]."""
 UNLISTED_NATS = 5.0
@@ -104,7 +99,7 @@ Values = Mapping[str, float]
 
 
 @dataclass(eq=False)
-class JointProblem:
+class JointProblem(Pushes):
     """A linear problem that implements ``evidence.search.Linear``.
 
     Attributes:
@@ -149,10 +144,6 @@ class JointProblem:
     dry_in_all: dict[int, int] = field(default_factory=dict)
     mount: Array | None = None
 
-    def rows(self, series: Sequence[Series]) -> list[Series]:
-        """Convert columns from joints to channels. Joints without torques have no channel."""
-        return [{self.channel[j]: x for j, x in by.items() if j in self.channel} for by in series]
-
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Prior variances without the chosen causes; friction at rest scales with Coulomb friction."""
         S = np.array(self.tolerance) ** 2
@@ -189,62 +180,6 @@ class JointProblem:
             )
         return S
 
-    def proposals(self, posterior: Posterior, *, late: bool = False) -> list[Group]:
-        """Find the likeliest push for each duration: a half-sine force on the last link along the world axes."""
-        scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
-        middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
-        weight = 1.0 / posterior.variance[:, middle]
-        found, windows = [], 0
-        for t, score in enumerate(scores[: self.changed] if self.pushed else ()):
-            force, rate = self.pushed[t][:, list(self.channel)], self.cells.bands.rates_hz[t]
-            Q = np.einsum("wck,wc->wk", force, score)
-            R = np.einsum("wck,wcl,c->wkl", force, force, weight)
-            ridge = 1e-9 * np.trace(R.sum(axis=0)) * np.eye(3)
-            for seconds in PUSH_S:
-                n = round(seconds * rate)
-                if n < 3 or max(4 * n, n + BEGIN_S * rate) > len(score):
-                    continue
-                sine = np.sin(np.pi * (np.arange(n) + 0.5) / n)
-                q = fftconvolve(Q, sine[:, None], mode="valid", axes=0)
-                r = fftconvolve(R, (sine**2)[:, None, None], mode="valid", axes=0) + ridge
-                gain = 0.5 * np.einsum("wk,wk->w", q, np.linalg.solve(r, q[..., None])[..., 0])
-                gain[: round(BEGIN_S * rate)] = 0.0
-                windows += len(gain) * 4 // n
-                best = int(np.argmax(gain))
-                found.append((float(gain[best]), t, best, n))
-        return [
-            self._window(t, first, n, -math.log(windows))
-            for _, t, first, n in sorted(found, reverse=True)[:EVENTS]
-        ]
-
-    def _window(self, trial: int, first: int, n: int, log_prior: float) -> Group:
-        rate = self.cells.bands.rates_hz[trial]
-        shape = (("trial", float(trial)), ("start_s", first / rate), ("duration_s", n / rate))
-        place = f"last link from {first / rate:.1f} s of log {trial + 1}"
-        return Group("push", place, (), (PUSH_N,) * 3, log_prior, shape, event=True)
-
-    def place(self, group: Group) -> Group:
-        """Add the columns of a push: a half-sine force along each world axis."""
-        columns = self.cells.add(self.rows([self._push(group, np.eye(3)[k], 1) for k in range(3)]))
-        return replace(group, columns=tuple(columns))
-
-    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
-        """Variants of a push: slightly earlier, later, shorter and longer."""
-        if not group.event:
-            return []
-        shape = dict(group.shape)
-        trial = int(shape["trial"])
-        rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
-        middle, n = (shape["start_s"] + 0.5 * shape["duration_s"]) * rate, shape["duration_s"] * rate
-        out = []
-        shifts = ((-0.15, 1.0), (0.15, 1.0), (0.0, 0.75), (0.0, 1.33), (-0.15, 1.33), (0.15, 1.33))
-        for shift, stretch in shifts:
-            length = round(stretch * n)
-            first = round(middle + shift * n - 0.5 * length)
-            if length > 2 and first >= BEGIN_S * rate and first + length <= most:
-                out.append(self._window(trial, first, length, group.log_prior))
-        return out
-
     def _swaying(self, group: Group, compliance: float) -> list[Series]:
         """Free vibrations of an elastic joint at the start of each log, scaled by its deflection under load."""
         joint, out = self.model.joints.index(group.place), []
@@ -265,19 +200,6 @@ class JointProblem:
             c: [m[:, c] for m in moved] for c in range(len(self.joints)) if any(m[:, c].any() for m in moved)
         }
 
-    def _push(self, group: Group, force: Array, wave: int) -> Series:
-        """Torques of a push whose force profile has ``wave`` half sines."""
-        shape = dict(group.shape)
-        trial = int(shape["trial"])
-        rate = self.cells.bands.rates_hz[trial]
-        first, n = round(shape["start_s"] * rate), round(shape["duration_s"] * rate)
-        window = np.sin(wave * np.pi * (np.arange(n) + 0.5) / n)
-        by: dict[int, list[Array]] = {}
-        for c in range(self.pushed[trial].shape[1]):
-            by[c] = [np.zeros(len(f)) for f in self.pushed]
-            by[c][trial][first : first + n] = -(self.pushed[trial][first : first + n, c] @ force) * window
-        return by
-
     def forms(self, group: Group, values: Array) -> list[Series]:
         """Columns for the error of a cause's law: its trace times smooth functions of the joint state.
 
@@ -286,7 +208,7 @@ class JointProblem:
         """
         if group.event:
             force = 3.0 * values[list(group.columns)]
-            return self.rows([self._push(group, force, wave) for wave in (2, 3, 4)])
+            return self.rows([self.push(group, force, wave) for wave in (2, 3, 4)])
         if group.cause == "joint_zero":
             joint, zero = self.model.joints.index(group.place), float(values[group.columns[0]])
             turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]

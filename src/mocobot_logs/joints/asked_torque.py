@@ -44,7 +44,9 @@ def with_asked_torques(log: JointLog) -> JointLog:
     note = f"Torques of {names} are those {how}; no sensor measured them."
     if drive.command == "position":
         free = drive.gain_free[told]
-        note += "".join(said for said, is_free in zip(FREE, free.any(axis=0), strict=True) if is_free)
+        note += "".join(
+            said for said, is_free in zip(FREE, np.any(free, axis=0).tolist(), strict=True) if is_free
+        )
         if (rough := drive.gain_within[told][~free].max(initial=1.0)) > 1.0:
             note += f" The gains are known within a factor of {rough:g}, and so are these torques."
     return replace(log, torque=np.where(told, asked, torque), notes=(*log.notes, note), asked=told)

@@ -97,7 +97,7 @@ def joint_logs_of(
     """
     samples, log_map, without = _with_values(name, samples, log_map)
     held = np.array(log_map.held, dtype=bool)
-    samples = _with_commands(samples, held)
+    samples, told = _with_commands(samples, held)
     channels = tuple(label(*key) for key in log_map.channels)
     at = [k for k, (quantity, _) in enumerate(log_map.channels) if QUANTITIES[quantity].kind == "position"]
     positions, turned = unwrapped(samples.values[:, at], [channels[k] for k in at])
@@ -108,7 +108,7 @@ def joint_logs_of(
     control = log_map.control_of(Path(name).name)
     logs = [
         _joint_log(part, log_map, name, control, (*notes, *without, *turned))
-        for part in _even_parts(name, channels, samples, log_map.rate_hz, held)
+        for part in _even_parts(name, channels, samples, log_map.rate_hz, (held, *told))
     ]
     if len(logs) == 1:
         return logs
@@ -143,17 +143,21 @@ def _with_values(name: str, samples: Samples, log_map: JointMap) -> tuple[Sample
     return samples, log_map, [f"No row has a value of {each}; it is left out." for each in told]
 
 
-def _with_commands(samples: Samples, held: NDArray[np.bool_]) -> Samples:
-    """Let each command hold until the next one; drop rows before the first command, and rows of commands alone."""
+def _with_commands(samples: Samples, held: NDArray[np.bool_]) -> tuple[Samples, tuple[Stamps, Array]]:
+    """Let each command hold until the next one; drop rows before the first command, and rows of commands alone.
+
+    Returns what is left, and the stamps and commands of all rows from the first command on.
+    """
     gaps = np.isnan(samples.values[:, held])
     if not gaps.any():
-        return samples
+        return samples, (samples.stamp_ns, samples.values[:, held])
     last = np.maximum.accumulate(np.where(gaps, -1, np.arange(len(gaps))[:, None]), axis=0)
     values = samples.values.copy()
     values[:, held] = np.take_along_axis(values[:, held], np.maximum(last, 0), axis=0)
     alone = np.isnan(values[:, ~held]).all(axis=1)
-    keep = np.flatnonzero((last >= 0).all(axis=1) & ~alone)
-    return rows_of(replace(samples, values=values), keep)
+    known = (last >= 0).all(axis=1)
+    rows = rows_of(replace(samples, values=values), np.flatnonzero(known & ~alone))
+    return rows, (samples.stamp_ns[known], values[known][:, held])
 
 
 def empty_channels(values: Array, log_map: JointMap) -> list[tuple[str, str]]:
@@ -190,16 +194,21 @@ class _Even:
 
 
 def _even_parts(
-    name: str, channels: tuple[str, ...], samples: Samples, rate_hz: float | None, held: NDArray[np.bool_]
+    name: str,
+    channels: tuple[str, ...],
+    samples: Samples,
+    rate_hz: float | None,
+    told: tuple[NDArray[np.bool_], Stamps, Array],
 ) -> list[_Even]:
     """Split a log at gaps too long to be bridged and resample each part to ``rate_hz`` [Hz] or the log's own rate.
 
-    Channels that are ``held``, shape (C,), are not interpolated: each instant has the mean of what held for one period
-    of the log from there on, which is the value itself on the log's own stamps.
+    Channels that are held (``told``: which, shape (C,), all their stamps and values) are not interpolated: each instant
+    has the mean of what held for one period of the log from there on, also where a row lacks other values.
     """
     _check_values(name, channels, samples.values)
     screen = Screen(name, channels)
     time_ns, values = screen.keep(samples)
+    told = told[0], told[1] - (screen.first_ns or 0), told[2]
     if len(time_ns) < LEAST_ROWS:
         again = f" ({repeated(screen.repeats)})" if screen.repeats else ""
         raise InputError(f"{name}: has {len(time_ns)} samples{again}; at least {LEAST_ROWS} are needed")
@@ -224,7 +233,7 @@ def _even_parts(
         if length_s < SHORTEST_S or end - first < LEAST_ROWS:
             lost_s += length_s
             continue
-        parts.append(_even(time_ns[first:end], values[first:end], period_ns, rate_hz, held))
+        parts.append(_even(time_ns[first:end], values[first:end], period_ns, rate_hz, told))
     if not parts:
         raise InputError(
             f"{name}: no part of it has samples for {SHORTEST_S:g} s without a gap of more than {MAX_GAP_S:g} s"
@@ -239,11 +248,16 @@ def _even_parts(
 
 
 def _even(
-    time_ns: Stamps, values: Array, period_ns: float, rate_hz: float | None, held: NDArray[np.bool_]
+    time_ns: Stamps,
+    values: Array,
+    period_ns: float,
+    rate_hz: float | None,
+    told: tuple[NDArray[np.bool_], Stamps, Array],
 ) -> _Even:
     """Resample one part without long gaps."""
     first_ns = int(time_ns[0])
-    time_ns = time_ns - first_ns
+    stamped_ns = time_ns = time_ns - first_ns
+    held, told_ns, commands = told
     found = _own_grid(time_ns, period_ns)
     native_hz = (len(time_ns) - 1) / (float(time_ns[-1]) * NS)
     grid, k, wanted, notes = None, 1, rate_hz, []
@@ -278,7 +292,13 @@ def _even(
             )
     out, lead = on_grid(time_ns, values, grid, k)
     at_ns = (lead + np.arange(len(out))) / wanted / NS
-    out[:, held] = held_means(time_ns, values[:, held], at_ns, at_ns + period_ns)
+    # Stamps that count as even move, and those of commands between them move along.
+    told_ns = (
+        told_ns
+        - first_ns
+        + np.rint(np.interp(told_ns - first_ns, stamped_ns, time_ns - stamped_ns)).astype(int)
+    )
+    out[:, held] = held_means(told_ns, commands, at_ns, at_ns + period_ns)
     usable = _between_samples(at_ns, time_ns, grid.period_ns)
     if not usable.all():
         notes.append(f"{np.sum(~usable)} of {len(out)} samples are bridged gaps and are left out.")
