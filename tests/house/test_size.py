@@ -12,13 +12,13 @@ from source_tree import SRC, module_files
 
 CEILINGS = {
     "estimator": 6_652,
-    "mocobot_logs": 7_440,
+    "mocobot_logs": 7_500,
     "mocobot_inspect": 2_960,
     "mocobot_sim": 5_783,
-    "discrepancy": 13_730,
+    "discrepancy": 13_900,
     "mocobot_view": 2_144,
     "mocobot_report": 2_823,
-    "mocobot": 4_853,
+    "mocobot": 4_890,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700

@@ -268,7 +268,7 @@ class ClosedLoop:
         return np.exp(np.clip(best.x, least, most))
 
     def move(self, filtered: Filtered, lacking: Array) -> None:
-        """Move the motion to its likeliest course, above ``MOTION_HZ`` to that of the model if it stays near the motion.
+        """Move the motion to its likeliest course, above ``MOTION_HZ`` to that of the model if it stays near.
 
         Noise in the motion would make inertias and friction too small; the model tells what friction does at reversals.
 

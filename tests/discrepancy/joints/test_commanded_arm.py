@@ -246,7 +246,7 @@ def test_gravity_tells_a_free_position_gain(tmp_path):
 
 @pytest.mark.slow
 def test_errors_over_standard_errors_are_one(tmp_path):
-    """Noise of twelve logs; friction may deviate from its law, so its errors are smaller than told where it does not."""
+    """Noise of twelve logs; friction may deviate from its law: its errors are smaller than told where it does not."""
     rate_hz, off = 50, {"armature": [], "command": [], "friction": []}
     t = np.arange(8 * rate_hz) / rate_hz
     told = TWO.commands(t)
