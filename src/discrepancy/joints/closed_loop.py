@@ -240,7 +240,7 @@ class ClosedLoop:
         """
         loop, J = filtered.loop, self.q.shape[1]
         speed, off = (np.ascontiguousarray(x.T) for x in (self.dq[:: self.every] ** 2, self.off))
-        seen = np.asarray(np.isfinite(loop.R).all(axis=1))
+        seen = np.isfinite(loop.R).all(axis=1).astype(float)
         for j in range(J):
             at = [j, J + j]
             A, B = (np.ascontiguousarray(x) for x in (loop.A[:, at][:, :, at], loop.B[:, at, j]))
@@ -256,7 +256,7 @@ class ClosedLoop:
 
         def left(x: Array) -> float:
             read, jitter, torque = np.exp(np.clip(x, least, most))
-            R = np.where(seen, read + jitter * speed, np.inf)
+            R = np.where(seen > 0.0, read + jitter * speed, np.inf)
             return float(cost((A, B, rest + torque / self.step_s), R, self.every, start, lacking, off))
 
         simplex = now + np.vstack([np.zeros(3), 2.0 * np.eye(3)])
