@@ -143,8 +143,13 @@ def test_commands_have_rows_of_their_own(tmp_path) -> None:
     (log,) = read(write_csv(tmp_path / "log.csv", values), commanded("position_gain = 20"))
     rows = goal[0] < TIME
     np.testing.assert_allclose(log.q, motion(TIME[rows])[0], rtol=0, atol=1e-12)
-    last = np.searchsorted(goal, TIME[rows], side="right") - 1
-    np.testing.assert_array_equal(log.command, told[last])  # rows are at the positions' stamps
+    # Each sample has the mean of what holds for its period.
+    ends = np.append(goal, 3.1)
+    passed = np.concatenate([np.zeros((1, 3)), np.cumsum(told * np.diff(ends)[:, None], axis=0)])
+    a, b = (
+        np.column_stack([np.interp(t, ends, x) for x in passed.T]) for t in (TIME[rows], TIME[rows] + 0.002)
+    )
+    np.testing.assert_allclose(log.command, (b - a) / 0.002, rtol=0, atol=1e-9)
     assert not log.resampled
 
 
