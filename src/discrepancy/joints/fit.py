@@ -153,8 +153,6 @@ class Fit:
         self.links = tuple(body.body for body in self.bodies)
         self.problem = self.linear()
         self.scalars = list(self._scalars())
-        names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
-        self.options = replace(self.options, wanted=frozenset([*names, *(s.label for s in self.scalars)]))
         self.first = 10 * len(self.bodies)  # number of inertial parameters; scalars follow
         n, basis = self.first, self._gain_basis()
         self.basis = np.zeros((n + len(self.scalars), n + basis.shape[1]))

@@ -53,6 +53,7 @@ class Given:
         inertias: whether every link has a column for each of its ten inertial parameters.
         mount: gravity of another mount of the base than the model's [m/s^2], shape (3,); None: the model's.
         loops: closed position loop and its filter for each log, if rows are positions; empty: rows are torques.
+        wanted: labels of the columns that have rows, beside deviations of friction's law; empty: all.
     """
 
     changed: int | None = None
@@ -357,7 +358,8 @@ class _Builder:
     # --- columns
 
     def add(self, label: str, tolerance: float, by: Series) -> int:
-        self.out.series.append(by)
+        kept = not self.more.wanted or label in self.more.wanted or " form " in label
+        self.out.series.append(by if kept else {})
         self.out.labels.append(label)
         self.out.tolerance.append(float(tolerance))
         return len(self.out.labels) - 1
@@ -413,10 +415,7 @@ class _Builder:
         if self.more.changed is not None:
             self._apart(self.more.changed)
         if self.more.loops:
-            out.cells = cells_of(self.more.loops, self.residual, [
-                own if label in self.more.wanted or " form " in label else {}
-                for label, own in zip(out.labels, out.series, strict=True)
-            ])  # fmt: skip
+            out.cells = cells_of(self.more.loops, self.residual, out.series if self.more.wanted else [])
         else:
             out.cells = self._cells(self.residual)
             out.cells.add(out.rows(out.series))
