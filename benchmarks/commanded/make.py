@@ -42,7 +42,7 @@ WRONG, WRONG_MASS = 3.0, 0.1
 LEG_KP, LEG_KD, LEG_MOST = 20.0, 1.5, np.array([23.7, 23.7, 45.43] * 2)
 LEG_ARMATURE = np.array([0.010, 0.018, 0.036] * 2)
 KT, OHM, VOLT, ARMATURE = 1.2116, 2.676, 7.4, 0.0284
-"""Of an STS3215, at the joint: torque constant [N m/A], resistance, supply, rotor's inertia [kg m^2] (Rhoban/bam)."""
+"""An STS3215 at the joint: torque constant [N m/A], resistance, supply, rotor's inertia [kg m^2] (Rhoban/bam)."""
 DUTY_PER_RAD, DUTY_MOST = 0.166, 0.97
 """Duty by error and firmware gain, and its limit (the same)."""
 COUNTS = {"leg": 16384, "arm": 4096}

@@ -17,7 +17,7 @@ COUPLED = "[drive]\ncoupling.elbow = { shoulder = 1 }\n"
 DRY_NM, VISCOUS_NMS = 0.8, 0.4
 FORE = '<inertial mass="2" pos="0.02 0 0.15" diaginertia="0.02 0.02 0.005"/>'
 AT_END = '<geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.03" mass="0"/>'
-"""Of the fore arm."""
+"""Numbers of the fore arm."""
 
 
 @pytest.fixture(scope="module")
