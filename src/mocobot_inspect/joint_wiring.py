@@ -377,9 +377,7 @@ def _columns(asked: Array, dq: Array, ddq: Array) -> Array:
 def _nonnegative(columns: Array, y: Array) -> tuple[Array, Array]:
     """Return the non-negative least-squares solution and its residual; the first of parallel columns explains them."""
     # A single slide's rotor acts as its mass, and rounding would choose.
-    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12) * (
-        1.0 + 1e-6 * (np.arange(columns.shape[1]) > 0)
-    )
+    size = np.linalg.norm(columns, axis=0).clip(1e-12) * np.linspace(1.0, 1.0 + 1e-6, columns.shape[1])
     short = np.asarray(np.linalg.qr(np.column_stack([columns / size, y]), mode="r"))
     values = nnls(short[:, :-1], short[:, -1], maxiter=30 * len(size))[0] / size
     return values, y - columns @ values
