@@ -233,6 +233,10 @@ def findings(found: ArmCalibration) -> tuple[str, ...]:
         out.append(
             "It predicts worse than the given model: do not use it. Longer logs in more poses may mend that."
         )
+    if found.predicts == "position" and share["calibrated"] > 1.0:
+        out.append(
+            "It does not follow the motion at all; `mocobot inspect` looks for wrong signs and exchanged joints."
+        )
     if found.predicts == "torque" and share["calibrated"] > MISFIT * share["noise"]:
         out.append(
             "Much more than noise is left, so something else acts, too; `mocobot diagnose` looks for it."

@@ -20,8 +20,11 @@ from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.trials import at_limits, notes_of, resting, trials_of
 from estimator.arrays import Array
+from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import JointLog
 
+LEAST_TRAVEL = 0.01
+"""Least travel of a joint of a robot that is known by its commands [rad or m]. Chosen: ten times play and noise."""
 ROUNDS, SETTLED = 8, 0.1
 """Most linearisations, and the largest step [standard errors] at which they end. Chosen."""
 
@@ -86,6 +89,11 @@ def calibrate_arm(
     say("smoothing the logs")
     logs = with_gains(model, logs)
     positions = all(map(commanded, logs))
+    if positions and max(float(np.ptp(log.q, axis=0).max()) for log in logs) < LEAST_TRAVEL:
+        raise InputError(
+            f"{logs[0].name}: no joint moves by {1e3 * LEAST_TRAVEL:g} mrad or mm; commands and positions tell nothing "
+            "of a robot at rest"
+        )
     trials = trials_of(model, logs)
     fit, moved, unsettled = (LoopFit if positions else Fit)(model, trials), np.inf, []
     for k in range(ROUNDS):

@@ -40,9 +40,9 @@ START_RAD, START_RAD_PER_S = 0.02, 1.0
 """Standard deviations of the first state. Chosen: far above the encoders' errors."""
 REST_S = 0.05
 """Correlation time of friction at rest [s], where it is any torque up to the Coulomb friction. Chosen."""
-FIRST_SHARE, FIRST_JITTER_S, LARGEST, LEAST_RAD = 0.5, 1e-4, 10.0, 1e-6
+FIRST_SHARE, FIRST_JITTER_S, LARGEST, LEAST_RAD, LEAST_NM = 0.5, 1e-4, 10.0, 1e-6, 1e-6
 """First guesses of the torque that nothing explains, over the rms torque, and of the stamps' jitter [s]; the largest
-change of a variance's logarithm in one step; the least error of a reading [rad]. Chosen."""
+change of a variance's logarithm in one step; the least error of a reading [rad] and rms torque [N m]. Chosen."""
 BANDS = np.array([0.0, 0.02, 0.04, 0.08, 0.15, 0.25, 0.35, 0.5])
 """Edges of the bands of the innovations over the log's rate."""
 CHUNK = 64
@@ -91,8 +91,8 @@ class ClosedLoop:
         way = CubicSpline(log.time, low_pass(log.q, log.rate_hz, min(MOTION_HZ, SHARE * log.rate_hz)), axis=0)
         time = log.time[first] + np.arange((last - first) * every + 1) * log.period_s / every
         measured = np.where(log.usable[here, None], log.q[here], np.nan)
-        noise = np.maximum(log.position_step**2 / 12.0, _reading(log))
-        size = np.mean(s.torque**2, axis=0)
+        noise = np.maximum(log.position_step**2 / 12.0 + LEAST_RAD**2, _reading(log))
+        size = np.mean(s.torque**2, axis=0) + LEAST_NM**2
         return cls(
             s, first, every, way(time), way(time, 1), measured, noise,
             np.full(len(size), FIRST_JITTER_S**2), FIRST_SHARE**2 * size * log.period_s,
@@ -288,11 +288,10 @@ class ClosedLoop:
 
 
 def _reading(log: JointLog) -> Array:
-    """Variance of the readings' white noise, from differences of high order, shape (J,)."""
-    order = 4
-    white = np.diff(log.q, order, axis=0)
-    factor = 70.0  # sum of the squared binomial coefficients of order 4
-    return np.median(white**2, axis=0) / 0.455 / factor
+    """Variance of the readings' white noise, from fourth differences, shape (J,)."""
+    white = np.diff(log.q, 4, axis=0)
+    # A squared normal variable has the median 0.455; the squared binomial coefficients of order 4 add up to 70.
+    return np.median(white**2, axis=0) / 0.455 / 70.0
 
 
 def _matrices(tree: Tree, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array, Array]:

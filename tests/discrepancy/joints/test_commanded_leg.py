@@ -283,3 +283,33 @@ def test_a_delay_is_that_of_the_drive(leg, tmp_path):
         told = to_dict(found.found, found.drives)["joints"]
         for joint in ("hip", "knee"):
             assert told[joint]["delay"]["mean"] == pytest.approx(0.008, abs=3e-4)
+
+
+def test_the_diagnosis_names_late_commands_until_the_map_has_the_delay_found(leg, tmp_path):
+    columns = np.genfromtxt(leg / "log.csv", delimiter=",", skip_header=1)
+    late = np.column_stack([columns[:-4, :3], columns[4:, 3:]])  # 8 ms
+    np.savetxt(tmp_path / "log.csv", late, delimiter=",", comments="", header=HEADER, fmt="%.8g")
+    found = mocobot.calibrate(tmp_path / "log.csv", leg / "leg.xml", map=leg / "log.toml")
+    found.write(tmp_path / "found")
+    model, told = tmp_path / "found" / "as_found.xml", {}
+    for map_ in (leg / "log.toml", tmp_path / "found" / "log.toml"):
+        verdict = mocobot.diagnose(tmp_path / "log.csv", model, map=map_, closed_loop=False).to_dict()
+        told[map_.parent.name] = {cause["cause"] for cause in verdict["causes"]}
+    assert told.pop("found") == set()
+    assert [*told.values()] == [{"torque_delay"}]
+
+
+def test_a_robot_at_rest_is_refused(leg, tmp_path, capsys):
+    columns = np.genfromtxt(leg / "log.csv", delimiter=",", skip_header=1)
+    columns[:, 1:] = columns[0, 1:]
+    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", comments="", header=HEADER, fmt="%.8g")
+    said = refused(capsys, "calibrate", tmp_path / "log.csv", "--model", leg / "leg.xml")
+    assert "no joint moves by 10 mrad" in said
+
+
+def test_commands_of_the_wrong_sign_are_doubted(leg, tmp_path):
+    columns = np.genfromtxt(leg / "log.csv", delimiter=",", skip_header=1)
+    columns[:, 3:] *= -1.0
+    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", comments="", header=HEADER, fmt="%.8g")
+    found = mocobot.calibrate(tmp_path / "log.csv", leg / "leg.xml", map=leg / "log.toml")
+    assert any(said.startswith("It does not follow the motion") for said in found.findings)
