@@ -56,65 +56,44 @@ _WIDTH = 3  # frequency bins on either side of a line that belong to it, in a Ha
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stuck or clipped stretch.
+    """A stuck or clipped stretch."""
 
-    Attributes:
-        start_s: start after the robot's first stamp [s].
-        duration_s: duration [s].
-        value: constant value of the channel [SI].
-        jumps: whether the channel jumps at the start or the end.
-    """
-
-    start_s: float
-    duration_s: float
-    value: float
-    jumps: bool
+    start_s: float  # start after the robot's first stamp [s]
+    duration_s: float  # duration [s]
+    value: float  # constant value of the channel [SI]
+    jumps: bool  # whether the channel jumps at the start or the end
 
 
 @dataclass(frozen=True)
 class Oscillation:
-    """A line in a channel's spectrum.
+    """A line in a channel's spectrum."""
 
-    Attributes:
-        frequency_hz: frequency at its largest amplitude [Hz]; aliased if above half the rate.
-        amplitude: largest amplitude [SI].
-        duration_s: total duration, in whole windows [s].
-    """
-
-    frequency_hz: float
-    amplitude: float
-    duration_s: float
+    frequency_hz: float  # frequency at its largest amplitude [Hz]; aliased if above half the rate
+    amplitude: float  # largest amplitude [SI]
+    duration_s: float  # total duration, in whole windows [s]
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel of one robot; SI units.
+    """One channel of one robot; SI units."""
 
-    Attributes:
-        name: name of the channel.
-        lowest, highest: extremes of its finite samples, None without any.
-        nans, infinities: number of samples that are not finite.
-        wild: number of finite samples that no sensor reads, see ``wild``.
-        step: quantisation step, or None.
-        noise: standard deviation of white noise; 0 if below the step.
-        stuck, clipped: stretches in which it is constant while others move, the first ``LISTED``.
-        stuck_count, clipped_count: total number of such stretches.
-        oscillation: spectral line above its noise, or None.
-    """
-
-    name: str
+    name: str  # name of the channel
+    # lowest, highest: extremes of its finite samples, None without any
     lowest: float | None
     highest: float | None
+    # nans, infinities: number of samples that are not finite
     nans: int
     infinities: int
-    wild: int
-    step: float | None
-    noise: float
+    wild: int  # number of finite samples that no sensor reads, see ``wild``
+    step: float | None  # quantisation step, or None
+    noise: float  # standard deviation of white noise; 0 if below the step
+    # stuck, clipped: stretches in which it is constant while others move, the first ``LISTED``
     stuck: tuple[Stretch, ...] = ()
     clipped: tuple[Stretch, ...] = ()
+    # stuck_count, clipped_count: total number of such stretches
     stuck_count: int = 0
     clipped_count: int = 0
-    oscillation: Oscillation | None = None
+    oscillation: Oscillation | None = None  # spectral line above its noise, or None
 
     @property
     def white_noise(self) -> float:

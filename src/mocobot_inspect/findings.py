@@ -63,15 +63,10 @@ _UNEXPLAINED = 0.5  # share of a torque, beyond noise, above which the model har
 
 @dataclass(frozen=True)
 class Finding:
-    """A problem of a log.
+    """A problem of a log."""
 
-    Attributes:
-        topic: the subject.
-        sentence: the problem, with the numbers that show it.
-    """
-
-    topic: Topic
-    sentence: str
+    topic: Topic  # the subject
+    sentence: str  # the problem, with the numbers that show it
 
 
 def findings(found: Inspection | JointInspection) -> list[Finding]:

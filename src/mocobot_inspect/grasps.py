@@ -39,76 +39,53 @@ _RANK = 1e-6
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a robot's channels cannot be what the map says.
+    """Why a robot's channels cannot be what the map says."""
 
-    Attributes:
-        share: share of the instants that show it.
-        reason: the reason in words.
-    """
-
-    share: float
-    reason: str
+    share: float  # share of the instants that show it
+    reason: str  # the reason in words
 
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """Quantities that follow from one robot's positions alone.
+    """Quantities that follow from one robot's positions alone."""
 
-    Attributes:
-        legs: geometry at the driven angles.
-        told: geometry of the design at the angles as read; logged wrist positions and forces refer to it.
-        h_dot, h_ddot: velocity and acceleration of the wrist in the arm's own frame [m/s, m/s^2], shape (Q, 3).
-        own_torque: spring torques that move the arm itself [N m], shape (Q, 3).
-        faults: why the positions cannot be right.
-    """
-
-    legs: LegGeometry
+    legs: LegGeometry  # geometry at the driven angles
+    # geometry of the design at the angles as read; logged wrist positions and forces refer to it
     told: LegGeometry
+    # h_dot, h_ddot: velocity and acceleration of the wrist in the arm's own frame [m/s, m/s^2], shape (Q, 3)
     h_dot: Array
     h_ddot: Array
-    own_torque: Array
-    faults: tuple[Fault, ...]
+    own_torque: Array  # spring torques that move the arm itself [N m], shape (Q, 3)
+    faults: tuple[Fault, ...]  # why the positions cannot be right
 
 
 @dataclass(frozen=True, eq=False)
 class Gimbal:
-    """Quantities that follow from one robot's gimbal angles alone.
+    """Quantities that follow from one robot's gimbal angles alone."""
 
-    Attributes:
-        R_bi: orientation of {i} in the arm's own frame, shape (Q, 3, 3).
-        omega, alpha: its angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
-        faults: why the angles cannot be right.
-    """
-
-    R_bi: Array
+    R_bi: Array  # orientation of {i} in the arm's own frame, shape (Q, 3, 3)
+    # omega, alpha: its angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3)
     omega: Array
     alpha: Array
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault, ...]  # why the angles cannot be right
 
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """Motion and force of one robot's grasp frame {i}.
+    """Motion and force of one robot's grasp frame {i}."""
 
-    Attributes:
-        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
-        velocity, acceleration: of the origin of {i} [m/s, m/s^2], in {i}, shape (Q, 3).
-        up: unit vector against gravity in {i}, shape (Q, 3).
-        force: on the payload in {i} [N], shape (Q, 3). The moment that moves the gimbal's own bodies, some mN m, is
-            neglected.
-        lift: vertical force on the payload [N], shape (Q,).
-        rise: vertical acceleration of the wrist [m/s^2], shape (Q,).
-        noise: noise of one component of omega [rad/s], velocity [m/s], force [N] and up [rad], shape (4,).
-    """
-
+    # omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3)
     omega: Array
     alpha: Array
+    # velocity, acceleration: of the origin of {i} [m/s, m/s^2], in {i}, shape (Q, 3)
     velocity: Array
     acceleration: Array
-    up: Array
+    up: Array  # unit vector against gravity in {i}, shape (Q, 3)
+    # on the payload in {i} [N], shape (Q, 3). The moment that moves the gimbal's own bodies, some mN m, is neglected.
     force: Array
-    lift: Array
-    rise: Array
+    lift: Array  # vertical force on the payload [N], shape (Q,)
+    rise: Array  # vertical acceleration of the wrist [m/s^2], shape (Q,)
+    # noise of one component of omega [rad/s], velocity [m/s], force [N] and up [rad], shape (4,)
     noise: Array
 
 
@@ -254,29 +231,21 @@ def _out_of_range(
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Motion of the payload in {1}.
+    """Motion of the payload in {1}."""
 
-    Attributes:
-        R_1i, p_1i: grasp frames, shapes (N, 3, 3), (N, 3) [m].
-        omega, alpha: mean angular velocity [rad/s] and acceleration [rad/s^2], shape (Q, 3).
-        acceleration: mean acceleration of the origin of {1} [m/s^2], shape (Q, 3).
-        up: mean direction against gravity, shape (Q, 3).
-        noise: as in ``Grasp``, the largest of all robots.
-        turns: whether it rotates about two axes, clearly above the noise.
-        spread: disagreements of the robots, each with its signal and its noise; empty for one robot.
-        gravity_mps2: magnitude of gravity.
-    """
-
+    # R_1i, p_1i: grasp frames, shapes (N, 3, 3), (N, 3) [m]
     R_1i: Array
     p_1i: Array
+    # omega, alpha: mean angular velocity [rad/s] and acceleration [rad/s^2], shape (Q, 3)
     omega: Array
     alpha: Array
-    acceleration: Array
-    up: Array
-    noise: Array
-    turns: bool
+    acceleration: Array  # mean acceleration of the origin of {1} [m/s^2], shape (Q, 3)
+    up: Array  # mean direction against gravity, shape (Q, 3)
+    noise: Array  # as in ``Grasp``, the largest of all robots
+    turns: bool  # whether it rotates about two axes, clearly above the noise
+    # disagreements of the robots, each with its signal and its noise; empty for one robot
     spread: dict[str, tuple[float, float, float]]
-    gravity_mps2: float
+    gravity_mps2: float  # magnitude of gravity
 
     @property
     def span(self) -> float:

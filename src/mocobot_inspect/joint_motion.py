@@ -42,24 +42,18 @@ _BLOCKS = 10  # blocks of a log whose errors count as independent
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Smooth motion and torques of J joints at Q samples, all through the same low-pass.
-
-    Attributes:
-        log: the log.
-        q, dq, ddq: positions and their derivatives, shape (Q, J).
-        torque: torques, shape (Q, J), NaN where a joint has none. A joint without a torque has its duty here, which is
-            a torque up to a gain and a term proportional to the speed.
-        torque_noise: noise of the torques after the low-pass, shape (J,).
-        at: indices of the samples in the log, shape (Q,).
-    """
+    """Smooth motion and torques of J joints at Q samples, all through the same low-pass."""
 
     log: JointLog
+    # q, dq, ddq: positions and their derivatives, shape (Q, J)
     q: Array
     dq: Array
     ddq: Array
+    # torques, shape (Q, J), NaN where a joint has none. A joint without a torque has its duty here, which is a torque
+    # up to a gain and a term proportional to the speed.
     torque: Array
-    torque_noise: Array
-    at: NDArray[np.int64]
+    torque_noise: Array  # noise of the torques after the low-pass, shape (J,)
+    at: NDArray[np.int64]  # indices of the samples in the log, shape (Q,)
 
     @property
     def moves(self) -> NDArray[np.bool_]:
@@ -105,23 +99,17 @@ def passed_noise(log: JointLog, raw: Array, smoothed: Array) -> Array:
 
 @dataclass(frozen=True)
 class Follows:
-    """Gain and delay of a channel against the motion.
+    """Gain and delay of a channel against the motion."""
 
-    Attributes:
-        joint: index of the joint in the model, from 0.
-        gain, gain_se: gain of the channel over the motion, and its standard error.
-        delay_s, delay_se_s: delay of the channel behind the motion, NaN if noise hides it, and its standard error [s].
-        correlation: absolute correlation after the delay is removed.
-        possible: largest correlation that the noise allows.
-    """
-
-    joint: int
+    joint: int  # index of the joint in the model, from 0
+    # gain, gain_se: gain of the channel over the motion, and its standard error
     gain: float
     gain_se: float
+    # delay_s, delay_se_s: delay of the channel behind the motion, NaN if noise hides it, and its standard error [s]
     delay_s: float
     delay_se_s: float
-    correlation: float
-    possible: float
+    correlation: float  # absolute correlation after the delay is removed
+    possible: float  # largest correlation that the noise allows
 
     @property
     def strays(self) -> bool:

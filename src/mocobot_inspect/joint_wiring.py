@@ -63,29 +63,21 @@ _STEPS, _SHARPENED = 10, 3  # delays tried on either side, and number of refinem
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """The robot model that an inspection needs, without a simulator.
+    """The robot model that an inspection needs, without a simulator."""
 
-    Attributes:
-        joints: names of its J joints.
-        slides: whether each joint slides, shape (J,); the others turn.
-        lower, upper: range of each joint [rad or m], infinite if unlimited, shape (J,).
-        torque_limit: largest torque of each drive [N m or N], infinite if the model has none, shape (J,).
-        inverse: inverse dynamics without friction: positions and their first two derivatives, (Q, J) each -> (Q, J).
-        regressor: torque regressor of the last link from the same inputs, shape (Q, J, 10). Its inertial parameters are
-            mass, first moments, Ixx, Iyy, Izz, Ixy, Ixz and Iyz about the frame's origin.
-        mass_kg: mass of all moving links.
-        notes: sentences on what was read otherwise than the model's file says.
-    """
-
-    joints: tuple[str, ...]
-    slides: NDArray[np.bool_]
+    joints: tuple[str, ...]  # names of its J joints
+    slides: NDArray[np.bool_]  # whether each joint slides, shape (J,); the others turn
+    # lower, upper: range of each joint [rad or m], infinite if unlimited, shape (J,)
     lower: Array
     upper: Array
-    torque_limit: Array
+    torque_limit: Array  # largest torque of each drive [N m or N], infinite if the model has none, shape (J,)
+    # inverse dynamics without friction: positions and their first two derivatives, (Q, J) each -> (Q, J)
     inverse: Callable[[Array, Array, Array], Array]
+    # torque regressor of the last link from the same inputs, shape (Q, J, 10). Its inertial parameters are mass, first
+    # moments, Ixx, Iyy, Izz, Ixy, Ixz and Iyz about the frame's origin.
     regressor: Callable[[Array, Array, Array], Array]
-    mass_kg: float
-    notes: tuple[str, ...] = ()
+    mass_kg: float  # mass of all moving links
+    notes: tuple[str, ...] = ()  # sentences on what was read otherwise than the model's file says
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -100,15 +92,11 @@ class Robot:
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake in the columns of one joint, of two, or of all.
+    """A mistake in the columns of one joint, of two, or of all."""
 
-    Attributes:
-        kind: see ``Kind``; "position_degrees" means degrees taken for radians. A "payload" is wrong only in the model.
-        joints: indices of the joints in the model, from 0.
-    """
-
+    # see ``Kind``; "position_degrees" means degrees taken for radians. A "payload" is wrong only in the model.
     kind: Kind
-    joints: tuple[int, ...]
+    joints: tuple[int, ...]  # indices of the joints in the model, from 0
 
     @property
     def of_positions(self) -> bool:
@@ -134,40 +122,26 @@ class Mistake:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """A mistake that explains a misfit.
-
-    Attributes:
-        mistake: the mistake.
-        before, after: mean misfit of its joints as they are and with it undone.
-        alternatives: mistakes that share a joint with it and explain the log equally well.
-    """
+    """A mistake that explains a misfit."""
 
     mistake: Mistake
+    # before, after: mean misfit of its joints as they are and with it undone
     before: float
     after: float
-    alternatives: tuple[Mistake, ...]
+    alternatives: tuple[Mistake, ...]  # mistakes that share a joint with it and explain the log equally well
 
 
 @dataclass(frozen=True, eq=False)
 class Wiring:
-    """Result of the comparison of torques and motion.
+    """Result of the comparison of torques and motion."""
 
-    Attributes:
-        misfit: misfit of each joint as it is, NaN without a torque or motion, shape (J,).
-        undone: misfit with all found mistakes undone, shape (J,).
-        found: the mistakes.
-        tried: number of mistakes tried.
-        noise: share of each torque's variance that is noise, shape (J,).
-        gains: gain of the model's torque with all mistakes undone, NaN if unknown, shape (J,).
-        payload: ten inertial parameters of a payload that the model lacks at the last link, or None.
-    """
-
-    misfit: Array
-    undone: Array
-    found: tuple[Found, ...]
-    tried: int
-    noise: Array
-    gains: Array
+    misfit: Array  # misfit of each joint as it is, NaN without a torque or motion, shape (J,)
+    undone: Array  # misfit with all found mistakes undone, shape (J,)
+    found: tuple[Found, ...]  # the mistakes
+    tried: int  # number of mistakes tried
+    noise: Array  # share of each torque's variance that is noise, shape (J,)
+    gains: Array  # gain of the model's torque with all mistakes undone, NaN if unknown, shape (J,)
+    # ten inertial parameters of a payload that the model lacks at the last link, or None
     payload: Array | None
 
     @property

@@ -24,28 +24,17 @@ NAMES: dict[Level, dict[Kind, str]] = {
 
 @dataclass(frozen=True)
 class Mistake:
-    """A possible mistake in some robots' channels.
+    """A possible mistake in some robots' channels."""
 
-    Attributes:
-        kind: name of the mistake in reports.
-        robots: affected robots, from 0.
-        who: the robots in words.
-        channels: affected channels, as in ``CHANNELS[level]``.
-        what: the mistake in words, without the robots.
-        subject: topic in words, shared with the opposite mistake.
-        undo: returns signals with the mistake undone.
-        sizes: its numbers for reports, by name.
-        resized: returns the same mistake with another size, if its size must be fitted.
-    """
-
-    kind: str
-    robots: tuple[int, ...]
-    who: str
-    channels: tuple[str, ...]
-    what: str
-    subject: str
-    undo: Callable[[Signals], Signals] = field(compare=False)
-    sizes: tuple[tuple[str, Any], ...] = ()
+    kind: str  # name of the mistake in reports
+    robots: tuple[int, ...]  # affected robots, from 0
+    who: str  # the robots in words
+    channels: tuple[str, ...]  # affected channels, as in ``CHANNELS[level]``
+    what: str  # the mistake in words, without the robots
+    subject: str  # topic in words, shared with the opposite mistake
+    undo: Callable[[Signals], Signals] = field(compare=False)  # returns signals with the mistake undone
+    sizes: tuple[tuple[str, Any], ...] = ()  # its numbers for reports, by name
+    # returns the same mistake with another size, if its size must be fitted
     resized: Callable[[float], Mistake] | None = field(default=None, compare=False)
 
     @property

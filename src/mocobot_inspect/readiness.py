@@ -28,21 +28,13 @@ _ALONG = np.cos(np.deg2rad(20.0))
 
 @dataclass(frozen=True)
 class Readiness:
-    """What can be estimated.
+    """What can be estimated."""
 
-    Attributes:
-        steps: excitation of every step of the estimate.
-        holds: number of static holds.
-        axes: angular velocity about x, y, z of {1} [rad/s rms], or None.
-        reasons: why each of ``QUANTITIES`` cannot be estimated, None if it can.
-        flags: warnings of the estimate itself.
-    """
-
-    steps: tuple[StepReport, ...]
-    holds: int
-    axes: tuple[float, float, float] | None
-    reasons: dict[str, str | None]
-    flags: tuple[str, ...]
+    steps: tuple[StepReport, ...]  # excitation of every step of the estimate
+    holds: int  # number of static holds
+    axes: tuple[float, float, float] | None  # angular velocity about x, y, z of {1} [rad/s rms], or None
+    reasons: dict[str, str | None]  # why each of ``QUANTITIES`` cannot be estimated, None if it can
+    flags: tuple[str, ...]  # warnings of the estimate itself
 
 
 def readiness(name: str, level: Level, parts: Sequence[tuple[float, Array]], arms: Arms) -> Readiness:

@@ -29,15 +29,10 @@ INSTANTS = 200
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Three channels of every robot.
+    """Three channels of every robot."""
 
-    Attributes:
-        values: filtered samples, rates and accelerations [SI], shape (3, Q, N, 3).
-        noise: white noise of one unfiltered sample [SI], shape (N, 3).
-    """
-
-    values: Array
-    noise: Array
+    values: Array  # filtered samples, rates and accelerations [SI], shape (3, Q, N, 3)
+    noise: Array  # white noise of one unfiltered sample [SI], shape (N, 3)
 
     def mapped(
         self,
@@ -66,19 +61,12 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Channels of a team.
+    """Channels of a team."""
 
-    Attributes:
-        level: joint (phi, theta, tau) or wrist (h, theta, force).
-        position: phi [rad] or h [m].
-        theta: gimbal angles (theta_z, theta_y, theta_x) [rad].
-        effort: tau [N m] or force [N].
-    """
-
-    level: Level
-    position: Group
-    theta: Group
-    effort: Group
+    level: Level  # joint (phi, theta, tau) or wrist (h, theta, force)
+    position: Group  # phi [rad] or h [m]
+    theta: Group  # gimbal angles (theta_z, theta_y, theta_x) [rad]
+    effort: Group  # tau [N m] or force [N]
 
     @property
     def robots(self) -> int:

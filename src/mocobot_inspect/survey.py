@@ -26,38 +26,29 @@ _BIN_S = 10.0
 
 @dataclass
 class Timing:
-    """Stamps of one robot.
+    """Stamps of one robot."""
 
-    Attributes:
-        samples: rows of the log, without those that repeat the previous reading.
-        first_ns, last_ns: first and last stamp in the log's order [ns], None without rows.
-        rate_hz: samples per second between gaps [Hz], or None.
-        jitter_rms_s, jitter_max_s: deviation of intervals from the period, without gaps [s].
-        gaps: number of intervals in which samples are missing.
-        missing: number of missing samples.
-        longest_gap_s, longest_gap_at_s: longest such interval, and its start after the first stamp [s].
-        duplicates: stamps equal to the previous one.
-        repeats: rows that hold the previous reading again under a later stamp; they do not count as samples.
-        backwards: stamps earlier than the previous one.
-        farthest_back_s, farthest_back_at_s: largest backward step, and its start after the first stamp [s].
-        recorder_s: smallest and largest lead of the recorder's time over the stamps [s], or None.
-    """
-
-    samples: int = 0
+    samples: int = 0  # rows of the log, without those that repeat the previous reading
+    # first_ns, last_ns: first and last stamp in the log's order [ns], None without rows
     first_ns: int | None = None
     last_ns: int | None = None
-    rate_hz: float | None = None
+    rate_hz: float | None = None  # samples per second between gaps [Hz], or None
+    # jitter_rms_s, jitter_max_s: deviation of intervals from the period, without gaps [s]
     jitter_rms_s: float = 0.0
     jitter_max_s: float = 0.0
-    gaps: int = 0
-    missing: int = 0
+    gaps: int = 0  # number of intervals in which samples are missing
+    missing: int = 0  # number of missing samples
+    # longest_gap_s, longest_gap_at_s: longest such interval, and its start after the first stamp [s]
     longest_gap_s: float = 0.0
     longest_gap_at_s: float = 0.0
-    duplicates: int = 0
+    duplicates: int = 0  # stamps equal to the previous one
+    # rows that hold the previous reading again under a later stamp; they do not count as samples
     repeats: int = 0
-    backwards: int = 0
+    backwards: int = 0  # stamps earlier than the previous one
+    # farthest_back_s, farthest_back_at_s: largest backward step, and its start after the first stamp [s]
     farthest_back_s: float = 0.0
     farthest_back_at_s: float = 0.0
+    # smallest and largest lead of the recorder's time over the stamps [s], or None
     recorder_s: tuple[float, float] | None = None
 
     @property
@@ -136,20 +127,15 @@ class TimingTally:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Contents of a log.
+    """Contents of a log."""
 
-    Attributes:
-        timing, channels: per robot.
-        excerpt: samples of every robot, of the whole log or of a part.
-        excerpt_s: start and end of the part after the log's first stamp [s], or None for the whole log.
-        whole: stamps of the samples that lack no value, per robot.
-    """
-
+    # timing, channels: per robot
     timing: tuple[Timing, ...]
     channels: tuple[tuple[Channel, ...], ...]
-    excerpt: tuple[Samples, ...]
+    excerpt: tuple[Samples, ...]  # samples of every robot, of the whole log or of a part
+    # start and end of the part after the log's first stamp [s], or None for the whole log
     excerpt_s: tuple[float, float] | None
-    whole: tuple[Timing, ...]
+    whole: tuple[Timing, ...]  # stamps of the samples that lack no value, per robot
 
     @property
     def origin_ns(self) -> int:

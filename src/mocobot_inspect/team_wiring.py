@@ -86,25 +86,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Misfit:
-    """How badly channels fit together.
+    """How badly channels fit together."""
 
-    Attributes:
-        relative: disagreements over their signals (tilt: in rad), by name.
-        scaled: disagreements over tolerance and noise, by name.
-        faults: reasons why the channels cannot be what the map says.
-        determined: whether the payload rotates enough to compare grasps.
-        mass_kg: best-fitting mass, or None.
-        span_m: largest distance of a grasp from the first one, or None.
-        parts: number of disagreements, including those left out.
-    """
-
-    relative: dict[str, float]
-    scaled: dict[str, float]
-    faults: tuple[Fault, ...]
-    determined: bool
-    mass_kg: float | None = None
-    span_m: float | None = None
-    parts: int | None = None
+    relative: dict[str, float]  # disagreements over their signals (tilt: in rad), by name
+    scaled: dict[str, float]  # disagreements over tolerance and noise, by name
+    faults: tuple[Fault, ...]  # reasons why the channels cannot be what the map says
+    determined: bool  # whether the payload rotates enough to compare grasps
+    mass_kg: float | None = None  # best-fitting mass, or None
+    span_m: float | None = None  # largest distance of a grasp from the first one, or None
+    parts: int | None = None  # number of disagreements, including those left out
 
     @property
     def total(self) -> float:
@@ -127,19 +117,12 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Found:
-    """A mistake that explains the misfit.
-
-    Attributes:
-        mistake: the mistake.
-        alternatives: other mistakes that explain the misfit as well.
-        misfit: misfit with all other mistakes undone, but not this one.
-        after: total misfit with this one undone, too.
-    """
+    """A mistake that explains the misfit."""
 
     mistake: Mistake
-    alternatives: tuple[Mistake, ...]
-    misfit: Misfit
-    after: float
+    alternatives: tuple[Mistake, ...]  # other mistakes that explain the misfit as well
+    misfit: Misfit  # misfit with all other mistakes undone, but not this one
+    after: float  # total misfit with this one undone, too
 
     @property
     def before(self) -> float:
@@ -149,21 +132,13 @@ class Found:
 
 @dataclass(frozen=True)
 class Wiring:
-    """Result of the search.
+    """Result of the search."""
 
-    Attributes:
-        as_is: misfit of the log as it is.
-        found: mistakes, the most important first; empty if none is found.
-        undone: misfit with all of them undone.
-        hidden: mistakes that these data could not show.
-        tried: number of mistakes tried.
-    """
-
-    as_is: Misfit
-    found: tuple[Found, ...]
-    undone: Misfit
-    hidden: tuple[Mistake, ...]
-    tried: int
+    as_is: Misfit  # misfit of the log as it is
+    found: tuple[Found, ...]  # mistakes, the most important first; empty if none is found
+    undone: Misfit  # misfit with all of them undone
+    hidden: tuple[Mistake, ...]  # mistakes that these data could not show
+    tried: int  # number of mistakes tried
 
 
 class Team:

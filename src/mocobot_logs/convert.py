@@ -34,42 +34,25 @@ _CSV_ROWS = 10_000
 
 @dataclass(frozen=True)
 class Labels:
-    """User's statements about a log; None leaves an entry to the log.
+    """User's statements about a log; None leaves an entry to the log."""
 
-    Attributes:
-        trial: "random", "periodic", "static" or "free".
-        payload: name of the payload.
-        design: design of the robots.
-        level: level of the output, "joint" or "wrist".
-    """
-
-    trial: str | None = None
-    payload: str | None = None
-    design: OmnidDesign | None = None
-    level: Level | None = None
+    trial: str | None = None  # "random", "periodic", "static" or "free"
+    payload: str | None = None  # name of the payload
+    design: OmnidDesign | None = None  # design of the robots
+    level: Level | None = None  # level of the output, "joint" or "wrist"
 
 
 @dataclass(frozen=True, eq=False)
 class Converted:
-    """A log that became a recording.
+    """A log that became a recording."""
 
-    Attributes:
-        recording: the checked recording, on one grid and one clock.
-        level: level of the log.
-        streams: properties of each robot's stream, and how it was resampled.
-        clocks: differences of the robots' clocks, and whether they were corrected.
-        span: part of the log, after the log's start, or None for all of it.
-        left_out: parts left out on request or because they are unusable.
-        notes: sentences on irregularities of the log.
-    """
-
-    recording: Recording
-    level: Level
-    streams: tuple[StreamReport, ...]
-    clocks: ClockReport
-    span: Span | None
-    left_out: tuple[Omission, ...]
-    notes: tuple[str, ...]
+    recording: Recording  # the checked recording, on one grid and one clock
+    level: Level  # level of the log
+    streams: tuple[StreamReport, ...]  # properties of each robot's stream, and how it was resampled
+    clocks: ClockReport  # differences of the robots' clocks, and whether they were corrected
+    span: Span | None  # part of the log, after the log's start, or None for all of it
+    left_out: tuple[Omission, ...]  # parts left out on request or because they are unusable
+    notes: tuple[str, ...]  # sentences on irregularities of the log
 
 
 def convert(

@@ -81,19 +81,12 @@ WHOLE = Choice()
 
 @dataclass(frozen=True)
 class Omission:
-    """Time of a log that is in no recording.
+    """Time of a log that is in no recording."""
 
-    Attributes:
-        span: time after the log's start.
-        robot: robot whose samples are left out, from 1, or None for all robots.
-        samples: number of these samples, or None if not counted.
-        why: the reason in words.
-    """
-
-    span: Span
-    robot: int | None
-    samples: int | None
-    why: str
+    span: Span  # time after the log's start
+    robot: int | None  # robot whose samples are left out, from 1, or None for all robots
+    samples: int | None  # number of these samples, or None if not counted
+    why: str  # the reason in words
 
 
 def parse_choice(crop: str | None, drops: Iterable[str] = ()) -> Choice:
@@ -192,23 +185,16 @@ class Piece:
 
 @dataclass(frozen=True)
 class Extent:
-    """Time covered by a log, by the robots' stamps, in nanoseconds after its start.
+    """Time covered by a log, by the robots' stamps, in nanoseconds after its start."""
 
-    Attributes:
-        origin_ns: stamp of the start, the earliest first stamp of all robots [ns].
-        chosen: the span that is kept.
-        common: from the latest first to the earliest last kept sample of the robots; None if they share no time.
-        holes: robot (from 1) and time between samples, for each gap too long to be filled.
-        left_out: what the choice leaves out.
-        period_ns: longest period of a robot's samples [ns].
-    """
-
-    origin_ns: int
-    chosen: Span
+    origin_ns: int  # stamp of the start, the earliest first stamp of all robots [ns]
+    chosen: Span  # the span that is kept
+    # from the latest first to the earliest last kept sample of the robots; None if they share no time
     common: Span | None
+    # robot (from 1) and time between samples, for each gap too long to be filled
     holes: tuple[tuple[int, Span], ...]
-    left_out: tuple[Omission, ...]
-    period_ns: float
+    left_out: tuple[Omission, ...]  # what the choice leaves out
+    period_ns: float  # longest period of a robot's samples [ns]
 
 
 def extent_of(

@@ -48,19 +48,12 @@ _RATES_HZ = (10.0, 20_000.0)
 
 @dataclass(frozen=True)
 class Draft:
-    """A draft of a map.
+    """A draft of a map."""
 
-    Attributes:
-        text: the map in TOML.
-        doubtful: number of lines that the user must check.
-        missing: required channels that were not found; the map is incomplete without them.
-        robots: number of robots found.
-    """
-
-    text: str
-    doubtful: int
-    missing: tuple[str, ...]
-    robots: int = 1
+    text: str  # the map in TOML
+    doubtful: int  # number of lines that the user must check
+    missing: tuple[str, ...]  # required channels that were not found; the map is incomplete without them
+    robots: int = 1  # number of robots found
 
 
 def draft_of(path: Path, episode: int | None = None) -> Draft:

@@ -23,25 +23,16 @@ from mocobot_logs.presets import Meaning
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Location of one quantity of all joints.
+    """Location of one quantity of all joints."""
 
-    Attributes:
-        keys: keys of a map with placeholders.
-        values: first finite values of each joint, one for all if the quantity is shared; None if they cannot be read.
-        meaning: unit and comment, where the name is well known.
-        own: keys of single joints that differ.
-        lacks: why a joint has no value.
-        doubts: what the user must check beside.
-        others: other places that may be meant.
-    """
-
-    keys: Mapping[str, Any]
+    keys: Mapping[str, Any]  # keys of a map with placeholders
+    # first finite values of each joint, one for all if the quantity is shared; None if they cannot be read
     values: Sequence[Array | None] = ()
-    meaning: Meaning | None = None
-    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    lacks: Mapping[str, str] = field(default_factory=dict)
-    doubts: tuple[str, ...] = ()
-    others: tuple[Place, ...] = ()
+    meaning: Meaning | None = None  # unit and comment, where the name is well known
+    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # keys of single joints that differ
+    lacks: Mapping[str, str] = field(default_factory=dict)  # why a joint has no value
+    doubts: tuple[str, ...] = ()  # what the user must check beside
+    others: tuple[Place, ...] = ()  # other places that may be meant
 
     @property
     def every(self) -> Array | None:
@@ -133,17 +124,11 @@ LEAST_ROWS, MOST_ROWS, MOST_LEFT = 32, 2000, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Follow:
-    """How a position follows a command: position(t) = slope * command(t - lag_s) + constant.
+    """How a position follows a command: position(t) = slope * command(t - lag_s) + constant."""
 
-    Attributes:
-        lag_s: lag [s].
-        left: share of the variance of the positions that this leaves.
-        slope: of each joint, NaN where the joint or its command rests, shape (J,).
-    """
-
-    lag_s: float
-    left: float
-    slope: Array
+    lag_s: float  # lag [s]
+    left: float  # share of the variance of the positions that this leaves
+    slope: Array  # of each joint, NaN where the joint or its command rests, shape (J,)
 
     def of(self, place: Place, joints: Sequence[str]) -> Place:
         """Return the command's place with what was found as a comment, and its doubts."""

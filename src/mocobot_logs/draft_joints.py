@@ -141,33 +141,20 @@ def draft_joint_map(
 
 @dataclass(eq=False)
 class _Found:
-    """What a log holds of a robot.
+    """What a log holds of a robot."""
 
-    Attributes:
-        joints: joints of the model that it holds, in its order.
-        lost: joints of the model that it does not hold.
-        places: places by quantity.
-        time: lines of [time] and [csv].
-        unused: names of what is not used.
-        doubts: what the user must check.
-        gains: gains of all rows by key of [control], shape (q, J) each.
-        gain_of: what the gains make.
-        known: whether the command is known to be a position.
-        free: whether zeros and signs are the user's choice.
-        spare: places that the map may hold instead, by quantity.
-    """
-
-    joints: Sequence[str]
-    lost: Sequence[str]
-    places: dict[str, Place]
-    time: list[str]
-    unused: list[str]
-    doubts: list[str]
+    joints: Sequence[str]  # joints of the model that it holds, in its order
+    lost: Sequence[str]  # joints of the model that it does not hold
+    places: dict[str, Place]  # places by quantity
+    time: list[str]  # lines of [time] and [csv]
+    unused: list[str]  # names of what is not used
+    doubts: list[str]  # what the user must check
+    # gains of all rows by key of [control], shape (q, J) each
     gains: dict[str, Array] = field(default_factory=dict)
-    gain_of: str = "torque"
-    known: bool = False
-    free: bool = False
-    spare: dict[str, Place] = field(default_factory=dict)
+    gain_of: str = "torque"  # what the gains make
+    known: bool = False  # whether the command is known to be a position
+    free: bool = False  # whether zeros and signs are the user's choice
+    spare: dict[str, Place] = field(default_factory=dict)  # places that the map may hold instead, by quantity
 
 
 def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | None) -> _Found:

@@ -54,23 +54,14 @@ _GLUED = re.compile(r"(f|h|force|theta|ref|gimbal|cmd|pos|p)([xyz])")
 
 @dataclass(frozen=True)
 class Reading:
-    """What a name says.
+    """What a name says."""
 
-    Attributes:
-        group: "phi", "tau", "theta", "h", "force", "ref" or "time".
-        index: joint number as in the name, or axis (x 0, y 1, z 2), or None for time.
-        axis: whether ``index`` is an axis.
-        unit: unit in a map, or None if the name has none.
-        rest: spans of the remaining tokens, one of which may identify the robot.
-        doubt: what is uncertain, or None.
-    """
-
-    group: str
-    index: int | None
-    axis: bool
-    unit: str | None
-    rest: tuple[tuple[int, int], ...]
-    doubt: str | None = None
+    group: str  # "phi", "tau", "theta", "h", "force", "ref" or "time"
+    index: int | None  # joint number as in the name, or axis (x 0, y 1, z 2), or None for time
+    axis: bool  # whether ``index`` is an axis
+    unit: str | None  # unit in a map, or None if the name has none
+    rest: tuple[tuple[int, int], ...]  # spans of the remaining tokens, one of which may identify the robot
+    doubt: str | None = None  # what is uncertain, or None
 
 
 def read_name(name: str, *, element: bool = False) -> Reading | None:
@@ -194,19 +185,12 @@ Place = tuple[str, tuple[int, ...]]
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A number that a log has in every row or message.
+    """A number that a log has in every row or message."""
 
-    Attributes:
-        name: a column; or topic, joint and field, or topic and field, with ``JOINED`` between them.
-        keys: keys of a map for these parts.
-        reading: what the name says.
-        values: first values without NaN, or None if they could not be read.
-    """
-
-    name: str
-    keys: tuple[str, ...]
-    reading: Reading
-    values: Array | None
+    name: str  # a column; or topic, joint and field, or topic and field, with ``JOINED`` between them
+    keys: tuple[str, ...]  # keys of a map for these parts
+    reading: Reading  # what the name says
+    values: Array | None  # first values without NaN, or None if they could not be read
 
     def place(self, name: str) -> dict[str, str]:
         """Return keys and values of a map for the name, or for the name with a placeholder."""
@@ -362,15 +346,11 @@ HOLE = "\0"
 
 @dataclass(frozen=True)
 class Robots:
-    """How names distinguish robots.
+    """How names distinguish robots."""
 
-    Attributes:
-        called: the part of the name that identifies each robot, in order; empty for a single robot.
-        placeholder: placeholder in a map: ``{robot}``, ``{robot0}`` or ``{name}``; "" for a single robot.
-    """
-
+    # the part of the name that identifies each robot, in order; empty for a single robot
     called: tuple[str, ...]
-    placeholder: str
+    placeholder: str  # placeholder in a map: ``{robot}``, ``{robot0}`` or ``{name}``; "" for a single robot
 
 
 Templates = dict[str, dict[str, Candidate]]
@@ -419,19 +399,12 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Found:
-    """Channels and robots found in the names of a log.
+    """Channels and robots found in the names of a log."""
 
-    Attributes:
-        candidates: all candidates.
-        channels: candidates by channel.
-        templates: by channel, how names differ by the robot.
-        robots: how names distinguish robots.
-    """
-
-    candidates: Sequence[Candidate]
-    channels: Mapping[str, list[Candidate]]
-    templates: Mapping[str, Templates]
-    robots: Robots
+    candidates: Sequence[Candidate]  # all candidates
+    channels: Mapping[str, list[Candidate]]  # candidates by channel
+    templates: Mapping[str, Templates]  # by channel, how names differ by the robot
+    robots: Robots  # how names distinguish robots
 
 
 def find_channels(candidates: Sequence[Candidate]) -> Found:

@@ -35,18 +35,12 @@ NS = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of one robot, in the order of the log.
+    """Samples of one robot, in the order of the log."""
 
-    Attributes:
-        stamp_ns: time of sampling by the robot's clock [ns], shape (q,).
-        values: channels of the source [SI], NaN where a message lacked one, shape (q, C).
-        log_ns: time of recording [ns], shape (q,), or None if the format has none.
-        repeats: number of omitted rows after each row that repeat it, shape (q,); zero if not given.
-    """
-
-    stamp_ns: Stamps
-    values: Array
-    log_ns: Stamps | None = None
+    stamp_ns: Stamps  # time of sampling by the robot's clock [ns], shape (q,)
+    values: Array  # channels of the source [SI], NaN where a message lacked one, shape (q, C)
+    log_ns: Stamps | None = None  # time of recording [ns], shape (q,), or None if the format has none
+    # number of omitted rows after each row that repeat it, shape (q,); zero if not given
     repeats: Stamps = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -93,18 +87,14 @@ class LogSource(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A whole log in memory.
+    """A whole log in memory."""
 
-    Attributes:
-        name, level, channels, metadata, notes: as in ``LogSource``.
-        streams: samples of every robot.
-    """
-
+    # name, level, channels, metadata, notes: as in ``LogSource``
     name: str
     level: Level
     channels: tuple[str, ...]
     metadata: RecordingMetadata | None
-    streams: tuple[Samples, ...]
+    streams: tuple[Samples, ...]  # samples of every robot
     notes: tuple[str, ...] = ()
 
     @property

@@ -64,31 +64,21 @@ def units_of(channel: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """Location of one channel of one robot, and its conversion to SI: ``scale * (raw + offset)``.
+    """Location of one channel of one robot, and its conversion to SI: ``scale * (raw + offset)``."""
 
-    Attributes:
-        topic: topic of a bag, or None.
-        joint: name of the joint in a sensor_msgs/msg/JointState, or None.
-        field: ``position``, ``velocity`` or ``effort`` of that joint, or the dotted path in another message.
-        column: column of a table, ``name[i, j]`` inside an array, or None.
-        scale: sign times the size of one raw unit in SI.
-        offset: added before sign and unit apply [raw unit].
-        optional: whether a log may lack the channel: commands of a team; of joints all but positions.
-        bits: width of a signed number that was logged as unsigned (two's complement), or None.
-        counted: whether raw values are counts, whose step is 1.
-        held: whether a value holds until the next one, as commands do; else it is interpolated.
-    """
-
-    topic: str | None = None
-    joint: str | None = None
+    topic: str | None = None  # topic of a bag, or None
+    joint: str | None = None  # name of the joint in a sensor_msgs/msg/JointState, or None
+    # ``position``, ``velocity`` or ``effort`` of that joint, or the dotted path in another message
     field: str | None = None
-    column: str | None = None
-    scale: float = 1.0
-    offset: float = 0.0
+    column: str | None = None  # column of a table, ``name[i, j]`` inside an array, or None
+    scale: float = 1.0  # sign times the size of one raw unit in SI
+    offset: float = 0.0  # added before sign and unit apply [raw unit]
+    # whether a log may lack the channel: commands of a team; of joints all but positions
     optional: bool = False
+    # width of a signed number that was logged as unsigned (two's complement), or None
     bits: int | None = None
-    counted: bool = False
-    held: bool = False
+    counted: bool = False  # whether raw values are counts, whose step is 1
+    held: bool = False  # whether a value holds until the next one, as commands do; else it is interpolated
 
     def apply(self, raw: Array) -> Array:
         """Convert raw samples to SI; return the same array if nothing changes."""
@@ -141,31 +131,20 @@ class CsvMap:
 
 @dataclass(frozen=True)
 class LogMap:
-    """A complete, checked map; all robots share it except for overrides.
+    """A complete, checked map; all robots share it except for overrides."""
 
-    Attributes:
-        name: name of the map in messages.
-        level: whether the log holds angles and torques, or wrist positions and forces.
-        robots: number of robots, or None to count those in the log.
-        trial: kind of trial, or None.
-        time: location of the time.
-        csv: form of a text table.
-        common: every mapped channel in the order of ``Samples.values``, with placeholders.
-        required: channels that every log must have.
-        own: channels that differ, by robot (from 1).
-        called: names of the robots in order, or empty.
-    """
-
-    name: str
-    level: Level
-    robots: int | None
-    trial: str | None
-    time: TimeMap
-    csv: CsvMap
+    name: str  # name of the map in messages
+    level: Level  # whether the log holds angles and torques, or wrist positions and forces
+    robots: int | None  # number of robots, or None to count those in the log
+    trial: str | None  # kind of trial, or None
+    time: TimeMap  # location of the time
+    csv: CsvMap  # form of a text table
+    # every mapped channel in the order of ``Samples.values``, with placeholders
     common: Mapping[str, ChannelMap]
-    required: tuple[str, ...]
+    required: tuple[str, ...]  # channels that every log must have
+    # channels that differ, by robot (from 1)
     own: Mapping[int, Mapping[str, ChannelMap]] = field(default_factory=dict)
-    called: tuple[str, ...] = ()
+    called: tuple[str, ...] = ()  # names of the robots in order, or empty
 
     @property
     def names(self) -> tuple[str, ...]:

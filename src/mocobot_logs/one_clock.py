@@ -32,21 +32,14 @@ _SUSPECT_S = 0.5  # larger clock differences explain why logs end apart
 
 @dataclass(frozen=True, eq=False)
 class ClockReport:
-    """Estimated clocks of the robots, and their effect on the recording.
+    """Estimated clocks of the robots, and their effect on the recording."""
 
-    Attributes:
-        estimate: offsets and drifts of the log before correction, in seconds after the log's ``origin_ns``.
-        corrected: whether the samples were shifted accordingly.
-        start_s: first instant of the recording by the clock of robot 1 after the log's origin [s].
-        lost_s: time of each robot before the first and after the last instant, shape (N, 2) [s].
-        untouched: whether each robot's samples stayed on its own grid.
-    """
-
+    # offsets and drifts of the log before correction, in seconds after the log's ``origin_ns``
     estimate: ClockEstimate
-    corrected: bool
-    start_s: float
-    lost_s: Array
-    untouched: tuple[bool, ...]
+    corrected: bool  # whether the samples were shifted accordingly
+    start_s: float  # first instant of the recording by the clock of robot 1 after the log's origin [s]
+    lost_s: Array  # time of each robot before the first and after the last instant, shape (N, 2) [s]
+    untouched: tuple[bool, ...]  # whether each robot's samples stayed on its own grid
 
 
 def to_recording(

@@ -25,23 +25,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Meaning:
-    """Meaning of a name.
+    """Meaning of a name."""
 
-    Attributes:
-        quantity: quantity of a map, or None for what is no measurement of a joint.
-        unit: unit of a map, or None if the name does not tell.
-        said: comment for the map.
-        doubtful: whether the user must check it.
-        more: further keys of the map.
-        whole: whether it holds for whole numbers alone.
-    """
-
-    quantity: str | None
-    unit: str | None = None
-    said: str = ""
-    doubtful: bool = False
-    more: str = ""
-    whole: bool = False
+    quantity: str | None  # quantity of a map, or None for what is no measurement of a joint
+    unit: str | None = None  # unit of a map, or None if the name does not tell
+    said: str = ""  # comment for the map
+    doubtful: bool = False  # whether the user must check it
+    more: str = ""  # further keys of the map
+    whole: bool = False  # whether it holds for whole numbers alone
 
 
 _NONE = Meaning(None)

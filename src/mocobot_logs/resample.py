@@ -61,44 +61,29 @@ _LOOK = 1024  # number of first rows that determine the native rate
 
 @dataclass(frozen=True)
 class StreamReport:
-    """Properties of one robot's stream, and how it was resampled.
+    """Properties of one robot's stream, and how it was resampled."""
 
-    Attributes:
-        robot: number of the robot, from 1.
-        samples: rows in the log, including duplicates and repeats.
-        first_ns, last_ns: first and last stamp [ns].
-        native_hz: sample rate of the log [Hz], missing samples included.
-        jitter_rms_s, jitter_max_s: deviation of intervals from whole periods [s].
-        gaps: number of intervals in which samples are missing.
-        longest_gap_s: longest time without samples, beyond one period [s].
-        filled: missing samples that were interpolated, at the native rate.
-        blank: rows dropped because a channel is NaN; they count as missing samples.
-        blank_channels: number of NaN rows by channel.
-        duplicates: rows dropped because they equal the previous row in stamp and values.
-        repeats: rows dropped because they hold the previous reading again under a later stamp. They count as missing
-            samples if the native rate is that of the rows.
-        merged: rows closer than a quarter of a period to the previous row; averaged with it.
-        method: resampling method, see the module.
-        steps: rounding step of each sensor channel, 0 for none [SI].
-    """
-
-    robot: int
-    samples: int
+    robot: int  # number of the robot, from 1
+    samples: int  # rows in the log, including duplicates and repeats
+    # first_ns, last_ns: first and last stamp [ns]
     first_ns: int
     last_ns: int
-    native_hz: float
+    native_hz: float  # sample rate of the log [Hz], missing samples included
+    # jitter_rms_s, jitter_max_s: deviation of intervals from whole periods [s]
     jitter_rms_s: float
     jitter_max_s: float
-    gaps: int
-    longest_gap_s: float
-    filled: int
-    blank: int
-    blank_channels: dict[str, int]
-    duplicates: int
+    gaps: int  # number of intervals in which samples are missing
+    longest_gap_s: float  # longest time without samples, beyond one period [s]
+    filled: int  # missing samples that were interpolated, at the native rate
+    blank: int  # rows dropped because a channel is NaN; they count as missing samples
+    blank_channels: dict[str, int]  # number of NaN rows by channel
+    duplicates: int  # rows dropped because they equal the previous row in stamp and values
+    # rows dropped because they hold the previous reading again under a later stamp. They count as missing samples if
+    # the native rate is that of the rows.
     repeats: int
-    merged: int
-    method: Method
-    steps: tuple[float, ...]
+    merged: int  # rows closer than a quarter of a period to the previous row; averaged with it
+    method: Method  # resampling method, see the module
+    steps: tuple[float, ...]  # rounding step of each sensor channel, 0 for none [SI]
 
     @property
     def filled_share(self) -> float:
@@ -112,26 +97,18 @@ class StreamReport:
 
 @dataclass(frozen=True, eq=False)
 class Resampled:
-    """A log on one uniform grid per robot.
+    """A log on one uniform grid per robot."""
 
-    Attributes:
-        name, level, channels, metadata: as in ``LogSource``.
-        rate_hz: rate of all grids [Hz].
-        origin_ns: earliest stamp of the log [ns].
-        start_s: first grid instant of each robot after the origin, by the robot's stamps [s], shape (N,).
-        values: samples [SI] of each robot, N arrays of shape (Q_i, C).
-        reports: one report per robot, N entries.
-    """
-
+    # name, level, channels, metadata: as in ``LogSource``
     name: str
     level: Level
     channels: tuple[str, ...]
     metadata: RecordingMetadata | None
-    rate_hz: float
-    origin_ns: int
-    start_s: Array
-    values: tuple[Array, ...]
-    reports: tuple[StreamReport, ...]
+    rate_hz: float  # rate of all grids [Hz]
+    origin_ns: int  # earliest stamp of the log [ns]
+    start_s: Array  # first grid instant of each robot after the origin, by the robot's stamps [s], shape (N,)
+    values: tuple[Array, ...]  # samples [SI] of each robot, N arrays of shape (Q_i, C)
+    reports: tuple[StreamReport, ...]  # one report per robot, N entries
 
     @property
     def robots(self) -> int:

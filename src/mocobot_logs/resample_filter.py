@@ -197,22 +197,15 @@ _DEGREE = 5
 
 @dataclass(frozen=True)
 class Grid:
-    """Evenly spaced instants after a robot's first stamp.
+    """Evenly spaced instants after a robot's first stamp."""
 
-    Attributes:
-        spacing_ns: spacing of the instants [ns].
-        period_ns: period of the robot's samples [ns].
-        fits: whether the samples lie on the grid, with ``period_ns`` equal to ``spacing_ns``.
-        fitted_rows: number of nearest samples to which a polynomial is fitted at every instant; 0 for a spline through
-            all samples. A spline would amplify the noise of samples that are close together.
-        uneven: whether intervals scatter too much to reveal missing samples.
-    """
-
-    spacing_ns: float
-    period_ns: float
-    fits: bool = False
+    spacing_ns: float  # spacing of the instants [ns]
+    period_ns: float  # period of the robot's samples [ns]
+    fits: bool = False  # whether the samples lie on the grid, with ``period_ns`` equal to ``spacing_ns``
+    # number of nearest samples to which a polynomial is fitted at every instant; 0 for a spline through all samples. A
+    # spline would amplify the noise of samples that are close together.
     fitted_rows: int = 0
-    uneven: bool = False
+    uneven: bool = False  # whether intervals scatter too much to reveal missing samples
 
     def holds(self, time_ns: Stamps) -> bool:
         """Return whether all times [ns] are within ``TOLERANCE_NS`` of distinct instants of the grid."""
@@ -364,16 +357,13 @@ class Resampling:
     """Simulates how one robot's readings become samples of a recording, as ``Sampling`` describes it.
 
     Jitter and gaps are random; the processing is that of ``resample`` and ``one_clock``.
-
-    Attributes:
-        instants_ns: times of the readings in the recording's time [ns], shape (q,).
-        grid, thinned: fine grid and decimation, see ``on_grid``.
-        rate_hz, samples: rate [Hz] and number of samples of the recording.
     """
 
-    instants_ns: Stamps
+    instants_ns: Stamps  # times of the readings in the recording's time [ns], shape (q,)
+    # grid, thinned: fine grid and decimation, see ``on_grid``
     grid: Grid
     thinned: int
+    # rate_hz, samples: rate [Hz] and number of samples of the recording
     rate_hz: float
     samples: int
 

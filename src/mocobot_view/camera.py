@@ -32,16 +32,11 @@ CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 
 @dataclass(frozen=True)
 class Camera:
-    """Pose of MuJoCo's free camera.
+    """Pose of MuJoCo's free camera."""
 
-    Attributes:
-        lookat: point in the middle of the picture [m], three numbers.
-        distance: distance of the camera from that point [m].
-        azimuth, elevation: direction of view [deg].
-    """
-
-    lookat: tuple[float, float, float]
-    distance: float
+    lookat: tuple[float, float, float]  # point in the middle of the picture [m], three numbers
+    distance: float  # distance of the camera from that point [m]
+    # azimuth, elevation: direction of view [deg]
     azimuth: float
     elevation: float
 
@@ -138,34 +133,24 @@ def pixels(camera: Camera, points: ArrayLike, width: float, height: float, fovy_
 
 @dataclass(frozen=True)
 class Label:
-    """A short text at a point.
+    """A short text at a point."""
 
-    Attributes:
-        text: text of a few letters.
-        point: position in the world [m], three numbers.
-        rgb: colour, components from 0 to 255.
-    """
-
-    text: str
-    point: tuple[float, float, float]
-    rgb: tuple[int, int, int]
+    text: str  # text of a few letters
+    point: tuple[float, float, float]  # position in the world [m], three numbers
+    rgb: tuple[int, int, int]  # colour, components from 0 to 255
 
 
 @dataclass
 class Marks:
-    """Lines, arrows, ellipsoids and labels to draw into a picture, in world coordinates.
+    """Lines, arrows, ellipsoids and labels to draw into a picture, in world coordinates."""
 
-    Attributes:
-        lines: rows of two end points [m], radius [m] and colour (red, green, blue, opacity): 11 numbers each.
-        arrows: rows of the same form, for arrows from the first point to the second.
-        ellipsoids: rows of centre [m], rotation matrix row by row, semi-axes [m] and colour: 19 numbers each.
-        labels: texts, drawn in front of everything.
-    """
-
+    # rows of two end points [m], radius [m] and colour (red, green, blue, opacity): 11 numbers each
     lines: list[list[float]] = field(default_factory=list)
+    # rows of the same form, for arrows from the first point to the second
     arrows: list[list[float]] = field(default_factory=list)
+    # rows of centre [m], rotation matrix row by row, semi-axes [m] and colour: 19 numbers each
     ellipsoids: list[list[float]] = field(default_factory=list)
-    labels: list[Label] = field(default_factory=list)
+    labels: list[Label] = field(default_factory=list)  # texts, drawn in front of everything
 
     def path(self, points: ArrayLike, radius_m: float, rgba: Sequence[float]) -> None:
         """Add a line through points [m], shape (K, 3)."""

@@ -36,40 +36,28 @@ _TURN = [1, 2, 3, 0]  # MuJoCo's quaternions are (w, x, y, z), the viewer's (x, 
 
 @dataclass(frozen=True, eq=False)
 class JointReplay:
-    """Data of the replay of one log.
+    """Data of the replay of one log."""
 
-    Attributes:
-        name: root of its entities, unique among the replays shown together.
-        log: the log.
-        joints: names of the J joints.
-        units: units of position and torque of every joint.
-        shapes: shape of every visible body in its frame, by name.
-        time: times of the poses [s], shape (P,).
-        position, quaternion: poses of those bodies in the world, by name: positions [m], shape (P, 3), and
-            quaternions (x, y, z, w), shape (P, 4).
-        reach: centre [m], shape (3,), and radius [m] of a ball that contains the robot in all poses.
-        series_time: times of the series [s], shape (S,).
-        asked: inverse-dynamics torques of the model without friction [N m or N], shape (S, J).
-        every: number of log samples per sample of the series.
-        anchor, axis: place and direction of every joint in the world, shape (P, J, 3) each [m] and [1].
-        found: torques of the model with the causes of a diagnosis at the times of the series, shape (S, J), NaN where
-            they are not known; None without a diagnosis.
-    """
-
-    name: str
+    name: str  # root of its entities, unique among the replays shown together
     log: JointLog
-    joints: tuple[str, ...]
-    units: tuple[tuple[str, str], ...]
-    shapes: Mapping[str, Shape]
-    time: Array
+    joints: tuple[str, ...]  # names of the J joints
+    units: tuple[tuple[str, str], ...]  # units of position and torque of every joint
+    shapes: Mapping[str, Shape]  # shape of every visible body in its frame, by name
+    time: Array  # times of the poses [s], shape (P,)
+    # position, quaternion: poses of those bodies in the world, by name: positions [m], shape (P, 3), and quaternions
+    # (x, y, z, w), shape (P, 4)
     position: Mapping[str, Array]
     quaternion: Mapping[str, Array]
+    # centre [m], shape (3,), and radius [m] of a ball that contains the robot in all poses
     reach: tuple[Array, float]
-    series_time: Array
-    asked: Array
-    every: int
+    series_time: Array  # times of the series [s], shape (S,)
+    asked: Array  # inverse-dynamics torques of the model without friction [N m or N], shape (S, J)
+    every: int  # number of log samples per sample of the series
+    # anchor, axis: place and direction of every joint in the world, shape (P, J, 3) each [m] and [1]
     anchor: Array
     axis: Array
+    # torques of the model with the causes of a diagnosis at the times of the series, shape (S, J), NaN where they are
+    # not known; None without a diagnosis
     found: Array | None = None
 
     @property

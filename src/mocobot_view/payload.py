@@ -33,45 +33,28 @@ SPACING_M = 1.2
 
 @dataclass(frozen=True)
 class Grasps:
-    """Grasp frames in {1}, estimated or true.
+    """Grasp frames in {1}, estimated or true."""
 
-    Attributes:
-        R_1i: orientations, shape (N, 3, 3).
-        p_1i: positions [m], shape (N, 3).
-    """
-
-    R_1i: Array
-    p_1i: Array
+    R_1i: Array  # orientations, shape (N, 3, 3)
+    p_1i: Array  # positions [m], shape (N, 3)
 
 
 @dataclass(frozen=True)
 class Bases:
-    """Base frames {b} in the world.
+    """Base frames {b} in the world."""
 
-    Attributes:
-        R_Wb: orientations, rotated only about z unless a tilt is known, shape (N, 3, 3).
-        p_Wb: positions [m], shape (N, 3).
-    """
-
-    R_Wb: Array
-    p_Wb: Array
+    R_Wb: Array  # orientations, rotated only about z unless a tilt is known, shape (N, 3, 3)
+    p_Wb: Array  # positions [m], shape (N, 3)
 
 
 @dataclass(frozen=True)
 class PayloadMotion:
-    """Motion of the payload's frame {1} in the world, and the gap between each robot's flange and its grasp.
+    """Motion of the payload's frame {1} in the world, and the gap between each robot's flange and its grasp."""
 
-    Attributes:
-        R_W1: orientations, shape (Q, 3, 3).
-        p_W1: positions [m], shape (Q, 3).
-        gap_rotation_rad: angle between flange and grasp frame, shape (Q, N).
-        gap_position_m: distance between them, shape (Q, N).
-    """
-
-    R_W1: Array
-    p_W1: Array
-    gap_rotation_rad: Array
-    gap_position_m: Array
+    R_W1: Array  # orientations, shape (Q, 3, 3)
+    p_W1: Array  # positions [m], shape (Q, 3)
+    gap_rotation_rad: Array  # angle between flange and grasp frame, shape (Q, N)
+    gap_position_m: Array  # distance between them, shape (Q, N)
 
     @property
     def quaternion(self) -> Array:
@@ -156,23 +139,14 @@ THINNEST = 0.02
 
 @dataclass(frozen=True)
 class BodyFacts:
-    """Grasps and inertial parameters of a payload; None marks unknown quantities.
+    """Grasps and inertial parameters of a payload; None marks unknown quantities."""
 
-    Attributes:
-        grasps: grasp frames in {1}.
-        mass_kg: mass.
-        p_1c: centre of mass in {1} [m], shape (3,).
-        R_1c: principal axes in {1}, shape (3, 3).
-        principal_kgm2: principal moments, in the order of the axes, shape (3,).
-        axes_known: False if two moments are too similar to determine the principal axes.
-    """
-
-    grasps: Grasps | None
-    mass_kg: float | None
-    p_1c: Array | None
-    R_1c: Array | None
-    principal_kgm2: Array | None
-    axes_known: bool = True
+    grasps: Grasps | None  # grasp frames in {1}
+    mass_kg: float | None  # mass
+    p_1c: Array | None  # centre of mass in {1} [m], shape (3,)
+    R_1c: Array | None  # principal axes in {1}, shape (3, 3)
+    principal_kgm2: Array | None  # principal moments, in the order of the axes, shape (3,)
+    axes_known: bool = True  # False if two moments are too similar to determine the principal axes
 
     def semi_axes_m(self) -> Array | None:
         """Return the semi-axes of the uniform solid ellipsoid with this mass and inertia [m], shape (3,), or None.

@@ -54,29 +54,20 @@ GHOST = 0.15
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTeam:
-    """A team at one instant of a recording.
+    """A team at one instant of a recording."""
 
-    Attributes:
-        model: robots ``omnid1/`` .. ``omnidN/`` at their bases, and the payload ``payload/`` if its CAD is drawn.
-        qpos: state of the model for the measured angles.
-        time_s: time since the first sample [s].
-        facts: estimated quantities of the payload.
-        R_W1, p_W1: pose of the payload's frame {1} in the world, shapes (3, 3) and (3,) [m]; None if the grasps
-            are unknown.
-        grasps: grasps of the payload, or None.
-        has_cad: whether the model contains the payload's CAD.
-        notes: sentences for the viewer.
-    """
-
+    # robots ``omnid1/`` .. ``omnidN/`` at their bases, and the payload ``payload/`` if its CAD is drawn.
     model: mujoco.MjModel
-    qpos: Array
-    time_s: float
-    facts: BodyFacts
+    qpos: Array  # state of the model for the measured angles
+    time_s: float  # time since the first sample [s]
+    facts: BodyFacts  # estimated quantities of the payload
+    # R_W1, p_W1: pose of the payload's frame {1} in the world, shapes (3, 3) and (3,) [m]; None if the grasps are
+    # unknown
     R_W1: Array | None
     p_W1: Array | None
-    grasps: Grasps | None
-    has_cad: bool
-    notes: tuple[str, ...]
+    grasps: Grasps | None  # grasps of the payload, or None
+    has_cad: bool  # whether the model contains the payload's CAD
+    notes: tuple[str, ...]  # sentences for the viewer
 
     @property
     def robots(self) -> int:

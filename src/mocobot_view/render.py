@@ -29,21 +29,13 @@ REMEDY = "install EGL (Debian and Ubuntu: libegl1) or OSMesa (libosmesa6)"
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """Description of a picture to render.
+    """Description of a picture to render."""
 
-    Attributes:
-        model: model to show.
-        qpos: state of the model, shape (nq,).
-        camera: camera pose.
-        marks: marks to draw into the picture.
-        says: caption of one or two sentences.
-    """
-
-    model: mujoco.MjModel
-    qpos: Array
-    camera: Camera
-    marks: Marks = field(default_factory=Marks)
-    says: str = ""
+    model: mujoco.MjModel  # model to show
+    qpos: Array  # state of the model, shape (nq,)
+    camera: Camera  # camera pose
+    marks: Marks = field(default_factory=Marks)  # marks to draw into the picture
+    says: str = ""  # caption of one or two sentences
 
 
 def render(

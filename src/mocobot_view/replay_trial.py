@@ -42,15 +42,11 @@ CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
 
 @dataclass(frozen=True)
 class Balance:
-    """Residuals of the Newton-Euler equations of the payload, in {1}.
+    """Residuals of the Newton-Euler equations of the payload, in {1}."""
 
-    Attributes:
-        force: sum of the forces minus m (a_c + g) [N], shape (P, 3).
-        moment: sum of the moments about the centre of mass minus I alpha + omega x I omega [N m], shape (P, 3), or
-            None without an inertia.
-    """
-
-    force: Array
+    force: Array  # sum of the forces minus m (a_c + g) [N], shape (P, 3)
+    # sum of the moments about the centre of mass minus I alpha + omega x I omega [N m], shape (P, 3), or None without
+    # an inertia
     moment: Array | None
 
 
@@ -96,39 +92,22 @@ MISFIT_M, MISFIT_RAD = 0.01, 0.03
 
 @dataclass(frozen=True, eq=False)
 class ReplayTrial:
-    """Data of the replay of one recording.
+    """Data of the replay of one recording."""
 
-    Attributes:
-        name: root of its entities, unique among the replays shown together.
-        recording: the recording.
-        time: times since the first sample [s], shape (Q,).
-        bodies: motion of the robots' bodies.
-        bases: poses of the bases.
-        motion: motion of the payload; None if the grasps are unknown.
-        shape: shape of the payload in {1}, or None.
-        data: filtered twists and wrenches, or None.
-        balance: Newton-Euler residuals, or None.
-        estimate: estimate of the payload, or None.
-        facts: quantities of the estimate to draw, or None.
-        truth: true quantities of the payload to draw, or None.
-        diagnosis: diagnosis of the team, or None.
-        notes: sentences for the viewer.
-    """
-
-    name: str
+    name: str  # root of its entities, unique among the replays shown together
     recording: Recording
-    time: Array
-    bodies: BodyMotion
-    bases: Bases
-    motion: PayloadMotion | None
-    shape: Shape | None
-    data: GraspData | None
-    balance: Balance | None
-    estimate: PayloadEstimate | None
-    facts: BodyFacts | None
-    truth: BodyFacts | None
-    diagnosis: WrittenDiagnosis | None
-    notes: tuple[str, ...]
+    time: Array  # times since the first sample [s], shape (Q,)
+    bodies: BodyMotion  # motion of the robots' bodies
+    bases: Bases  # poses of the bases
+    motion: PayloadMotion | None  # motion of the payload; None if the grasps are unknown
+    shape: Shape | None  # shape of the payload in {1}, or None
+    data: GraspData | None  # filtered twists and wrenches, or None
+    balance: Balance | None  # Newton-Euler residuals, or None
+    estimate: PayloadEstimate | None  # estimate of the payload, or None
+    facts: BodyFacts | None  # quantities of the estimate to draw, or None
+    truth: BodyFacts | None  # true quantities of the payload to draw, or None
+    diagnosis: WrittenDiagnosis | None  # diagnosis of the team, or None
+    notes: tuple[str, ...]  # sentences for the viewer
 
     @property
     def robots(self) -> int:

@@ -35,17 +35,11 @@ Links and rods rotate in fixed frames: ``leg`` at the driven axis with x outward
 
 @dataclass(frozen=True)
 class RobotShapes:
-    """Shapes of one robot's bodies.
+    """Shapes of one robot's bodies."""
 
-    Attributes:
-        standing: shape of chassis, wheels and base in {b}.
-        moving: shapes of the bodies in ``PATHS`` in their body frames, by name.
-        base_height_m: height of {b} over the floor [m].
-    """
-
-    standing: Shape
-    moving: dict[str, Shape]
-    base_height_m: float
+    standing: Shape  # shape of chassis, wheels and base in {b}
+    moving: dict[str, Shape]  # shapes of the bodies in ``PATHS`` in their body frames, by name
+    base_height_m: float  # height of {b} over the floor [m]
 
 
 @cache
@@ -110,15 +104,11 @@ def fixed_frames(design: OmnidDesign) -> dict[str, tuple[Array, Array]]:
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """Motion of the bodies of N robots at Q samples.
+    """Motion of the bodies of N robots at Q samples."""
 
-    Attributes:
-        wrist: positions of the platform in the frame of the arm, which equals {b} on a level base [m], (Q, N, 3).
-        turns: quaternions (x, y, z, w) of the links, rods and gimbal bodies in their fixed frames, by name,
-            shape (Q, N, 4).
-    """
-
+    # positions of the platform in the frame of the arm, which equals {b} on a level base [m], (Q, N, 3)
     wrist: Array
+    # quaternions (x, y, z, w) of the links, rods and gimbal bodies in their fixed frames, by name, shape (Q, N, 4)
     turns: dict[str, Array]
 
 

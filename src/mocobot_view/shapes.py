@@ -21,17 +21,11 @@ ALONG = 6
 
 @dataclass(frozen=True)
 class Triangles:
-    """A triangle mesh.
+    """A triangle mesh."""
 
-    Attributes:
-        vertices: corners [m], shape (V, 3).
-        normals: outward unit normals at the corners, shape (V, 3).
-        faces: corners of the triangles, counter-clockwise seen from outside, shape (F, 3).
-    """
-
-    vertices: Array
-    normals: Array
-    faces: NDArray[np.uint32]
+    vertices: Array  # corners [m], shape (V, 3)
+    normals: Array  # outward unit normals at the corners, shape (V, 3)
+    faces: NDArray[np.uint32]  # corners of the triangles, counter-clockwise seen from outside, shape (F, 3)
 
     def moved(self, position: ArrayLike, R: ArrayLike) -> Triangles:
         """Return the mesh rotated by R, shape (3, 3), and then shifted by ``position`` [m], shape (3,)."""
@@ -133,15 +127,10 @@ _PRIMITIVES: dict[mujoco.mjtGeom, Callable[[Array], Triangles]] = {
 
 @dataclass(frozen=True)
 class Shape:
-    """A coloured mesh.
+    """A coloured mesh."""
 
-    Attributes:
-        triangles: mesh in the frame of its body [m].
-        rgba: colours of the vertices, shape (V, 4), uint8.
-    """
-
-    triangles: Triangles
-    rgba: NDArray[np.uint8]
+    triangles: Triangles  # mesh in the frame of its body [m]
+    rgba: NDArray[np.uint8]  # colours of the vertices, shape (V, 4), uint8
 
     @classmethod
     def of(cls, triangles: Triangles, rgba: tuple[float, float, float, float] | Array) -> Shape:

@@ -56,17 +56,11 @@ _GROUP = 8192
 
 @dataclass(frozen=True, eq=False)
 class MessageType:
-    """A message type with the types it contains.
+    """A message type with the types it contains."""
 
-    Attributes:
-        name: such as ``sensor_msgs/msg/JointState``.
-        types: fields of this type and of every type inside it.
-        where: bag and topic in messages.
-    """
-
-    name: str
-    types: Typesdict
-    where: str
+    name: str  # such as ``sensor_msgs/msg/JointState``
+    types: Typesdict  # fields of this type and of every type inside it
+    where: str  # bag and topic in messages
 
     def fields(self, name: str) -> list[tuple[str, FieldDesc]]:
         """Return names and types of a type's fields; a type without fields has one byte, as in ROS 2."""
@@ -342,15 +336,11 @@ class Walk:
 
 @dataclass(frozen=True)
 class Selector:
-    """One number of a message.
+    """One number of a message."""
 
-    Attributes:
-        field: dotted path such as ``point.x`` or ``data[2]``; with a joint, the name of an array of numbers.
-        joint: name of the joint whose number it is, or None.
-    """
-
+    # dotted path such as ``point.x`` or ``data[2]``; with a joint, the name of an array of numbers
     field: str
-    joint: str | None = None
+    joint: str | None = None  # name of the joint whose number it is, or None
 
 
 EMPTY = "has no"

@@ -27,40 +27,24 @@ _STEP = 1 << 20
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag.
+    """A topic of a bag."""
 
-    Attributes:
-        name: such as ``/omnid1/joint/joint_states``.
-        type: such as ``sensor_msgs/msg/JointState``.
-        encoding: serialisation of the messages; only ``cdr`` is read.
-        definition_format: ``ros2msg``, ``ros2idl``, or "" if the bag does not define the type.
-        definition: text of the definition.
-        count: number of messages, None if unknown.
-    """
-
-    name: str
-    type: str
-    encoding: str
-    definition_format: str = ""
-    definition: str = ""
-    count: int | None = None
+    name: str  # such as ``/omnid1/joint/joint_states``
+    type: str  # such as ``sensor_msgs/msg/JointState``
+    encoding: str  # serialisation of the messages; only ``cdr`` is read
+    definition_format: str = ""  # ``ros2msg``, ``ros2idl``, or "" if the bag does not define the type
+    definition: str = ""  # text of the definition
+    count: int | None = None  # number of messages, None if unknown
 
 
 @dataclass(frozen=True, eq=False)
 class Messages:
-    """Serialised messages of one topic inside a block of memory, in the order of the bag.
+    """Serialised messages of one topic inside a block of memory, in the order of the bag."""
 
-    Attributes:
-        block: the memory.
-        start: first byte of each message, shape (q,).
-        size: size of each message [bytes], shape (q,).
-        log_ns: time of recording [ns], shape (q,).
-    """
-
-    block: bytes
-    start: NDArray[np.int64]
-    size: NDArray[np.int64]
-    log_ns: Stamps
+    block: bytes  # the memory
+    start: NDArray[np.int64]  # first byte of each message, shape (q,)
+    size: NDArray[np.int64]  # size of each message [bytes], shape (q,)
+    log_ns: Stamps  # time of recording [ns], shape (q,)
 
     def __len__(self) -> int:
         """Return the number of messages q."""

@@ -364,37 +364,24 @@ def _share(some: Stamps, others: Stamps) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Use:
-    """The use of one topic for one robot.
+    """The use of one topic for one robot."""
 
-    Attributes:
-        robot, part: number of the robot, and of the topic among the robot's topics, from 0.
-        numbers: indices of the channels among the topic's selectors.
-        maps: conversions to SI.
-    """
-
+    # robot, part: number of the robot, and of the topic among the robot's topics, from 0
     robot: int
     part: int
-    numbers: list[int]
-    maps: tuple[ChannelMap, ...]
+    numbers: list[int]  # indices of the channels among the topic's selectors
+    maps: tuple[ChannelMap, ...]  # conversions to SI
 
 
 @dataclass(frozen=True, eq=False)
 class _Topic:
-    """What to read from one topic.
-
-    Attributes:
-        name: its name.
-        kind: type of its messages.
-        selectors: numbers to read, with their meaning (channel and robot).
-        optional: numbers that all messages may lack.
-        uses: uses by robots.
-    """
+    """What to read from one topic."""
 
     name: str
-    kind: MessageType
-    selectors: dict[Selector, str]
-    optional: set[Selector]
-    uses: list[_Use]
+    kind: MessageType  # type of its messages
+    selectors: dict[Selector, str]  # numbers to read, with their meaning (channel and robot)
+    optional: set[Selector]  # numbers that all messages may lack
+    uses: list[_Use]  # uses by robots
 
 
 class BagSource:

@@ -257,17 +257,11 @@ def _values(recording: Recording, part: slice, level: Level) -> Iterator[tuple[A
 
 @dataclass(frozen=True, eq=False)
 class _Stream:
-    """Messages of one topic that differ only in stamps and numbers.
+    """Messages of one topic that differ only in stamps and numbers."""
 
-    Attributes:
-        connection: the topic.
-        template: one message.
-        record: positions of its stamp and numbers.
-    """
-
-    connection: Connection
-    template: bytes
-    record: np.dtype
+    connection: Connection  # the topic
+    template: bytes  # one message
+    record: np.dtype  # positions of its stamp and numbers
 
     def messages(self, stamps: Stamps, *values: Array) -> list[bytes]:
         """Return one message per stamp, with numbers (q, n) for each array of the record after the stamp."""

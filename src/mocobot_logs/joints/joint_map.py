@@ -36,17 +36,11 @@ Kind = Literal["position", "velocity", "effort", "current", "duty", "voltage", "
 
 @dataclass(frozen=True)
 class Quantity:
-    """A kind of column.
+    """A kind of column."""
 
-    Attributes:
-        kind: what it measures.
-        motor: whether it is measured on the motor's side of the gear.
-        shared: whether the robot has one such column, not one per joint.
-    """
-
-    kind: Kind
-    motor: bool = False
-    shared: bool = False
+    kind: Kind  # what it measures
+    motor: bool = False  # whether it is measured on the motor's side of the gear
+    shared: bool = False  # whether the robot has one such column, not one per joint
 
 
 QUANTITIES: dict[str, Quantity] = {
@@ -110,28 +104,18 @@ def units_of(kind: Kind, *, slides: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """How the robot is commanded; unknown numbers are NaN, but for ``supply_V``.
+    """How the robot is commanded; unknown numbers are NaN, but for ``supply_V``."""
 
-    Attributes:
-        command: what the logged commands are: one of ``Command``.
-        position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,); infinity where free.
-        gain_of: what the loop outputs, gain times error: one of ``GainOf``.
-        limit: largest output of the loop, in the quantity of ``gain_of``, shape (J,).
-        supply_V: nominal supply voltage, or None.
-        gain_known_within: factor within which gains that are not free are known, shape (J,).
-        delay_s: see ``joint_log.Drive``, shape (J,).
-        held: whether commands hold until the next one; else they are interpolated.
-    """
-
-    command: Command
+    command: Command  # what the logged commands are: one of ``Command``
+    # position_gain, velocity_gain: see ``joint_log.Drive``, shape (J,); infinity where free
     position_gain: Array
     velocity_gain: Array
-    gain_of: GainOf
-    limit: Array
-    supply_V: float | None
-    gain_known_within: Array
-    delay_s: Array
-    held: bool
+    gain_of: GainOf  # what the loop outputs, gain times error: one of ``GainOf``
+    limit: Array  # largest output of the loop, in the quantity of ``gain_of``, shape (J,)
+    supply_V: float | None  # nominal supply voltage, or None
+    gain_known_within: Array  # factor within which gains that are not free are known, shape (J,)
+    delay_s: Array  # see ``joint_log.Drive``, shape (J,)
+    held: bool  # whether commands hold until the next one; else they are interpolated
 
 
 Channels = dict[tuple[str, str], ChannelMap]
@@ -139,32 +123,20 @@ Channels = dict[tuple[str, str], ChannelMap]
 
 @dataclass(frozen=True, eq=False)
 class JointMap:
-    """A complete, checked map with joints in the model's order.
+    """A complete, checked map with joints in the model's order."""
 
-    Attributes:
-        name: name of the map in messages.
-        joints: names of the J joints in the model.
-        time: location of the time.
-        rate_hz: rate of the grid [Hz], or None for the log's own.
-        csv: form of a text table.
-        channels: by quantity and joint; the joint is "" for a quantity of the whole robot.
-        turns: matrix from joint to motor positions, with gears and coupled drives, shape (J, J).
-        zero: added to positions on the joint's side of the gear [rad or m], shape (J,).
-        torque_constant: torque constants [N m/A], NaN where free, shape (J,).
-        control: how the robot is commanded.
-        overrides: file name patterns with the entries of ``control`` that they change; later ones override.
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    time: TimeMap
-    rate_hz: float | None
-    csv: CsvMap
+    name: str  # name of the map in messages
+    joints: tuple[str, ...]  # names of the J joints in the model
+    time: TimeMap  # location of the time
+    rate_hz: float | None  # rate of the grid [Hz], or None for the log's own
+    csv: CsvMap  # form of a text table
+    # by quantity and joint; the joint is "" for a quantity of the whole robot
     channels: Mapping[tuple[str, str], ChannelMap]
-    turns: Array
-    zero: Array
-    torque_constant: Array
-    control: Control
+    turns: Array  # matrix from joint to motor positions, with gears and coupled drives, shape (J, J)
+    zero: Array  # added to positions on the joint's side of the gear [rad or m], shape (J,)
+    torque_constant: Array  # torque constants [N m/A], NaN where free, shape (J,)
+    control: Control  # how the robot is commanded
+    # file name patterns with the entries of ``control`` that they change; later ones override
     overrides: tuple[tuple[str, Mapping[str, Any]], ...] = ()
 
     def control_of(self, file_name: str) -> Control:
@@ -446,19 +418,12 @@ _RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
 
 @dataclass(frozen=True)
 class _PerJoint:
-    """Reads the numbers of the joints.
+    """Reads the numbers of the joints."""
 
-    Attributes:
-        where: name of the map in messages.
-        named: joints in the map's order.
-        model: joints in the model's order.
-        own: tables of single joints.
-    """
-
-    where: str
-    named: tuple[str, ...]
-    model: tuple[str, ...]
-    own: Mapping[str, Mapping[str, Any]]
+    where: str  # name of the map in messages
+    named: tuple[str, ...]  # joints in the map's order
+    model: tuple[str, ...]  # joints in the model's order
+    own: Mapping[str, Mapping[str, Any]]  # tables of single joints
 
     def read(self, table: Mapping[str, Any], key: str, inside: str) -> Array:
         """Return a value per joint in the model's order, shape (J,).

@@ -170,27 +170,16 @@ def empty_channels(values: Array, log_map: JointMap) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True, eq=False)
 class _Even:
-    """A part of a log on a uniform grid.
+    """A part of a log on a uniform grid."""
 
-    Attributes:
-        start_s: time of the first sample after the log's first stamp [s].
-        rate_hz: rate of the grid [Hz].
-        values: channels [SI], shape (Q, C).
-        usable: False where a gap was bridged, shape (Q,).
-        native_hz: sample rate of the log [Hz].
-        resampled: whether the samples were interpolated or low-passed.
-        raw: samples before resampling, shape (q, C).
-        notes: sentences that say how the samples were processed.
-    """
-
-    start_s: float
-    rate_hz: float
-    values: Array
-    usable: NDArray[np.bool_]
-    native_hz: float
-    resampled: bool
-    raw: Array
-    notes: tuple[str, ...]
+    start_s: float  # time of the first sample after the log's first stamp [s]
+    rate_hz: float  # rate of the grid [Hz]
+    values: Array  # channels [SI], shape (Q, C)
+    usable: NDArray[np.bool_]  # False where a gap was bridged, shape (Q,)
+    native_hz: float  # sample rate of the log [Hz]
+    resampled: bool  # whether the samples were interpolated or low-passed
+    raw: Array  # samples before resampling, shape (q, C)
+    notes: tuple[str, ...]  # sentences that say how the samples were processed
 
 
 def _even_parts(

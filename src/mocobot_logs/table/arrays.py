@@ -44,19 +44,14 @@ Reader = Callable[[int], NDArray]
 
 @dataclass(frozen=True)
 class Stored:
-    """Header of one array in a file.
+    """Header of one array in a file."""
 
-    Attributes:
-        at: location: an entry of an archive, or the first byte in the file.
-        dtype, shape, fortran: as in numpy.
-        start: offset of the numbers from there, unpacked [bytes].
-    """
-
-    at: Any
+    at: Any  # location: an entry of an archive, or the first byte in the file
+    # dtype, shape, fortran: as in numpy
     dtype: np.dtype
     shape: tuple[int, ...]
     fortran: bool
-    start: int
+    start: int  # offset of the numbers from there, unpacked [bytes]
 
     @property
     def size(self) -> int:

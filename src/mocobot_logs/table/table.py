@@ -23,30 +23,20 @@ CELLS = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Consecutive rows of a table.
+    """Consecutive rows of a table."""
 
-    Attributes:
-        columns: values by column name, each of shape (q, ...).
-        clocks: by column name, stamps [ns] and whether each is present, shape (q,) each.
-    """
-
-    columns: Mapping[str, NDArray]
+    columns: Mapping[str, NDArray]  # values by column name, each of shape (q, ...)
+    # by column name, stamps [ns] and whether each is present, shape (q,) each
     clocks: Mapping[str, tuple[Stamps, NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Columns to read from a table.
+    """Columns to read from a table."""
 
-    Attributes:
-        columns: names of columns read as numbers.
-        clocks: names of columns read as time.
-        unit_ns: nanoseconds per unit of time, None for dates.
-    """
-
-    columns: tuple[str, ...]
-    clocks: tuple[str, ...]
-    unit_ns: int | None
+    columns: tuple[str, ...]  # names of columns read as numbers
+    clocks: tuple[str, ...]  # names of columns read as time
+    unit_ns: int | None  # nanoseconds per unit of time, None for dates
 
 
 class Table(ABC):
