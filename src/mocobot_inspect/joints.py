@@ -37,23 +37,38 @@ _NOISES, _MOVES = 4.0, 0.05  # a velocity is motion above this multiple of its n
 
 @dataclass(frozen=True, eq=False)
 class JointInspection:
-    """Results of the inspection of a joint log."""
+    """Results of the inspection of a joint log.
 
-    name: str  # name of the log
-    robot: Robot  # model of the robot
-    log_map: JointMap  # map of the log
-    timing: Timing  # statistics of its stamps
-    channels: tuple[Channel, ...]  # every column of the map, in the map's order
-    signs_lost: tuple[str, ...]  # one sentence for each column that must have been a signed number
-    logs: tuple[JointLog, ...]  # its parts on uniform grids, empty if it cannot be resampled
-    unchecked: str | None  # why motion and torques were not checked, or None
-    moves: NDArray[np.bool_]  # whether each joint moves, shape (J,)
-    wiring: Wiring | None = None  # signs, order and units against the model, or None without torques
-    # velocities, commands: gain and delay of velocities and commands against the motion, of the longest part
+    Attributes:
+        name: name of the log.
+        robot: model of the robot.
+        log_map: map of the log.
+        timing: statistics of its stamps.
+        channels: every column of the map, in the map's order.
+        signs_lost: one sentence for each column that must have been a signed number.
+        logs: its parts on uniform grids, empty if it cannot be resampled.
+        unchecked: why motion and torques were not checked, or None.
+        moves: whether each joint moves, shape (J,).
+        wiring: signs, order and units against the model, or None without torques.
+        velocities, commands: gain and delay of velocities and commands against the motion, of the longest part.
+        crossed: pairs of joints whose commands are exchanged, from 0.
+        delay: delay of the torques, or None.
+    """
+
+    name: str
+    robot: Robot
+    log_map: JointMap
+    timing: Timing
+    channels: tuple[Channel, ...]
+    signs_lost: tuple[str, ...]
+    logs: tuple[JointLog, ...]
+    unchecked: str | None
+    moves: NDArray[np.bool_]
+    wiring: Wiring | None = None
     velocities: tuple[Follows, ...] = ()
     commands: tuple[Follows, ...] = ()
-    crossed: tuple[tuple[int, int], ...] = ()  # pairs of joints whose commands are exchanged, from 0
-    delay: TorqueDelay | None = None  # delay of the torques, or None
+    crossed: tuple[tuple[int, int], ...] = ()
+    delay: TorqueDelay | None = None
 
 
 def inspect_joints(

@@ -62,28 +62,42 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Results of the inspection of a log."""
+    """Results of the inspection of a log.
 
-    # name, level, robots, channel_names: properties of the log
+    Attributes:
+        name, level, robots, channel_names: properties of the log.
+        assumed_design: whether the log lacks the robots' design, so that one was assumed.
+        design: the robots' design.
+        survey: stamps and channels of every robot.
+        checked: checked stretches: start after the log's first stamp and duration [s].
+        unchecked: why motion and forces were not checked, or None.
+        clocks: clocks of the robots, or None.
+        skewed: whether the clocks differ; all results below are then corrected for that.
+        segments: rest and motion, or None.
+        wiring: suspected mistakes, or None.
+        ready: what the log is ready for as it is, or None.
+        ready_undone: the same with all found mistakes undone, or None if there are none.
+        units: the robots as calibrated, or None.
+        free: whether the robots hold nothing; then ``clocks``, ``wiring`` and ``ready`` are None.
+    """
+
     name: str
     level: Level
     robots: int
     channel_names: tuple[str, ...]
-    assumed_design: bool  # whether the log lacks the robots' design, so that one was assumed
-    design: OmnidDesign  # the robots' design
-    survey: Survey  # stamps and channels of every robot
-    # checked stretches: start after the log's first stamp and duration [s]
+    assumed_design: bool
+    design: OmnidDesign
+    survey: Survey
     checked: tuple[tuple[float, float], ...] = ()
-    unchecked: str | None = None  # why motion and forces were not checked, or None
-    clocks: ClockEstimate | None = None  # clocks of the robots, or None
-    skewed: bool = False  # whether the clocks differ; all results below are then corrected for that
-    segments: Segments | None = None  # rest and motion, or None
-    wiring: Wiring | None = None  # suspected mistakes, or None
-    ready: Readiness | None = None  # what the log is ready for as it is, or None
-    # the same with all found mistakes undone, or None if there are none
+    unchecked: str | None = None
+    clocks: ClockEstimate | None = None
+    skewed: bool = False
+    segments: Segments | None = None
+    wiring: Wiring | None = None
+    ready: Readiness | None = None
     ready_undone: Readiness | None = None
-    units: ArmUnit | None = None  # the robots as calibrated, or None
-    free: bool = False  # whether the robots hold nothing; then ``clocks``, ``wiring`` and ``ready`` are None
+    units: ArmUnit | None = None
+    free: bool = False
 
     @property
     def arms(self) -> Arms:

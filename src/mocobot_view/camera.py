@@ -32,11 +32,16 @@ CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 
 @dataclass(frozen=True)
 class Camera:
-    """Pose of MuJoCo's free camera."""
+    """Pose of MuJoCo's free camera.
 
-    lookat: tuple[float, float, float]  # point in the middle of the picture [m], three numbers
-    distance: float  # distance of the camera from that point [m]
-    # azimuth, elevation: direction of view [deg]
+    Attributes:
+        lookat: point in the middle of the picture [m], three numbers.
+        distance: distance of the camera from that point [m].
+        azimuth, elevation: direction of view [deg].
+    """
+
+    lookat: tuple[float, float, float]
+    distance: float
     azimuth: float
     elevation: float
 
@@ -142,15 +147,19 @@ class Label:
 
 @dataclass
 class Marks:
-    """Lines, arrows, ellipsoids and labels to draw into a picture, in world coordinates."""
+    """Lines, arrows, ellipsoids and labels to draw into a picture, in world coordinates.
 
-    # rows of two end points [m], radius [m] and colour (red, green, blue, opacity): 11 numbers each
+    Attributes:
+        lines: rows of two end points [m], radius [m] and colour (red, green, blue, opacity): 11 numbers each.
+        arrows: rows of the same form, for arrows from the first point to the second.
+        ellipsoids: rows of centre [m], rotation matrix row by row, semi-axes [m] and colour: 19 numbers each.
+        labels: texts, drawn in front of everything.
+    """
+
     lines: list[list[float]] = field(default_factory=list)
-    # rows of the same form, for arrows from the first point to the second
     arrows: list[list[float]] = field(default_factory=list)
-    # rows of centre [m], rotation matrix row by row, semi-axes [m] and colour: 19 numbers each
     ellipsoids: list[list[float]] = field(default_factory=list)
-    labels: list[Label] = field(default_factory=list)  # texts, drawn in front of everything
+    labels: list[Label] = field(default_factory=list)
 
     def path(self, points: ArrayLike, radius_m: float, rgba: Sequence[float]) -> None:
         """Add a line through points [m], shape (K, 3)."""

@@ -78,36 +78,50 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class JointLog:
-    """One log, sampled uniformly."""
+    """One log, sampled uniformly.
 
-    name: str  # name in messages
-    time: Array  # from 0, uniform at ``rate_hz`` [s], shape (Q,)
-    rate_hz: float  # sampling rate [Hz]
-    q: Array  # joint positions in the model's order [rad or m], shape (Q, J)
-    # joint torques, after gear, coupling and torque constant [N m or N], shape (Q, J), NaN where a joint has none; None
-    # if no joint has one
+    Attributes:
+        name: name in messages.
+        time: from 0, uniform at ``rate_hz`` [s], shape (Q,).
+        rate_hz: sampling rate [Hz].
+        q: joint positions in the model's order [rad or m], shape (Q, J).
+        torque: joint torques, after gear, coupling and torque constant [N m or N], shape (Q, J), NaN where a joint has
+            none; None if no joint has one.
+        dq: measured velocities [rad/s or m/s], shape (Q, J), NaN where a joint has none; None if no joint has one.
+        command: commanded positions, velocities or torques (see ``drive.command``) at the joints, shape (Q, J), NaN
+            where a joint has none; None if no joint has one (a commanded duty is ``drive.duty``).
+        joints: names of the J joints in the model.
+        drive: transmission and control between motors and joints.
+        position_step: resolution of each position reading [rad or m], 0 if none is found, shape (J,).
+        usable: False where a gap in the log was filled, shape (Q,).
+        native_hz: sample rate of the log before resampling [Hz].
+        resampled: whether the samples were interpolated or low-passed. The low-pass then begins at a fifth of
+            ``rate_hz`` and leaves nothing above half of it.
+        start_s: time of ``time`` 0 after the first stamp of the file [s].
+        enabled: whether the drives are switched on, shape (Q,); None if the log does not say.
+        motor: motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log
+            has positions on both sides of some drive.
+        notes: sentences on irregularities and how they were handled.
+        asked: whether ``torque`` is what the command asks for, not measured, shape (J,); None if no joint's is.
+    """
+
+    name: str
+    time: Array
+    rate_hz: float
+    q: Array
     torque: Array | None
-    # measured velocities [rad/s or m/s], shape (Q, J), NaN where a joint has none; None if no joint has one
     dq: Array | None
-    # commanded positions, velocities or torques (see ``drive.command``) at the joints, shape (Q, J), NaN where a joint
-    # has none; None if no joint has one (a commanded duty is ``drive.duty``)
     command: Array | None
-    joints: tuple[str, ...]  # names of the J joints in the model
-    drive: Drive  # transmission and control between motors and joints
-    position_step: Array  # resolution of each position reading [rad or m], 0 if none is found, shape (J,)
-    usable: NDArray[np.bool_]  # False where a gap in the log was filled, shape (Q,)
-    native_hz: float  # sample rate of the log before resampling [Hz]
-    # whether the samples were interpolated or low-passed. The low-pass then begins at a fifth of ``rate_hz`` and leaves
-    # nothing above half of it.
+    joints: tuple[str, ...]
+    drive: Drive
+    position_step: Array
+    usable: NDArray[np.bool_]
+    native_hz: float
     resampled: bool = False
-    start_s: float = 0.0  # time of ``time`` 0 after the first stamp of the file [s]
-    # whether the drives are switched on, shape (Q,); None if the log does not say
+    start_s: float = 0.0
     enabled: NDArray[np.bool_] | None = None
-    # motor positions converted to the joints, shape (Q, J), NaN where a joint has none; None unless the log has
-    # positions on both sides of some drive
     motor: Array | None = None
-    notes: tuple[str, ...] = ()  # sentences on irregularities and how they were handled
-    # whether ``torque`` is what the command asks for, not measured, shape (J,); None if no joint's is
+    notes: tuple[str, ...] = ()
     asked: NDArray[np.bool_] | None = None
 
     @property
