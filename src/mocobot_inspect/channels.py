@@ -105,24 +105,14 @@ class ChannelTally:
     """Collects statistics of one robot's channels block by block."""
 
     def __init__(self, names: Sequence[str], sensors: int = SENSORS) -> None:
-        """Start without samples.
-
-        Args:
-            names: names of the channels.
-            sensors: number of first channels that are checked for stuck stretches; commands may be constant.
-        """
+        """Start without samples; only the first ``sensors`` channels are checked for stuck stretches."""
         self._names, self._sensors = names, sensors
         self._parts: list[list[Channel]] = [[] for _ in names]
         self._stuck: list[list[Stretch]] = [[] for _ in names]
         self._clipped: list[list[Stretch]] = [[] for _ in names]
 
     def add(self, time_s: Array, values: Array) -> None:
-        """Add consecutive samples.
-
-        Args:
-            time_s: times after the robot's first stamp [s], shape (q,).
-            values: samples [SI], shape (q, C).
-        """
+        """Add consecutive samples [SI], shape (q, C), at times after the robot's first stamp [s], shape (q,)."""
         forward = np.diff(time_s)
         forward = forward[forward > 0]
         rate_hz = 1.0 / float(np.median(forward)) if len(forward) else None
@@ -199,12 +189,9 @@ def _part(name: str, x: Array, good: NDArray[np.bool_], rate_hz: float | None) -
 
 
 def noise_level(values: Array) -> float:
-    """Estimate the standard deviation of white noise on a smooth signal from the median of fourth differences.
+    """Estimate the standard deviation of white noise on a smooth signal (q,) from the median of fourth differences.
 
     Noise well below the quantisation step gives 0.
-
-    Args:
-        values: consecutive finite samples, shape (q,).
     """
     if len(values) < 5:
         return 0.0
@@ -213,11 +200,7 @@ def noise_level(values: Array) -> float:
 
 
 def wild(values: Array) -> NDArray[np.bool_]:
-    """Return which samples no sensor reads: infinite, absurd, or a thousand times farther off than the others.
-
-    Args:
-        values: samples, shape (q,) or (q, C); NaN is not wild.
-    """
+    """Return which samples, (q,) or (q, C), no sensor reads: infinite, absurd, or a thousand times farther off."""
     if values.ndim == 2:
         return np.stack([wild(x) for x in values.T], axis=1)
     with np.errstate(invalid="ignore"):
@@ -236,14 +219,10 @@ Run = tuple[int, int, int, bool]
 
 
 def stuck(values: Array, rate_hz: float) -> Iterator[Run]:
-    """Yield runs in which a channel of a robot is stuck.
+    """Yield runs in which a channel of a robot is stuck, from finite samples of its channels, shape (q, C).
 
     A channel is not stuck if nothing moves, or if it merely rests while others move. A stuck channel jumps at either
     end, stops abruptly before the log ends, or repeats a value more often than its noise allows.
-
-    Args:
-        values: finite samples of the robot's channels, shape (q, C).
-        rate_hz: sample rate [Hz].
     """
     least = _least_travel(values)
     for channel, x in enumerate(values.T):
@@ -346,12 +325,7 @@ def _travel(values: Array, rate_hz: float) -> Array:
 
 
 def oscillation(x: Array, rate_hz: float) -> Oscillation | None:
-    """Return the spectral line above a channel's noise, or None.
-
-    Args:
-        x: consecutive finite samples, shape (q,).
-        rate_hz: sample rate [Hz].
-    """
+    """Return the spectral line above the noise of consecutive finite samples (q,), or None."""
     size = min(round(WINDOW_S * rate_hz), WINDOW_ROWS)
     if len(x) < size or rate_hz < 4.0 * ABOVE_HZ:
         return None

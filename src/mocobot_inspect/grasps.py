@@ -134,10 +134,7 @@ def _driven(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Array
 def _possible(position: Array, design: OmnidDesign, *, wrist: bool) -> Array | None:
     """Replace the few impossible instants of positions by their neighbours; return None if there are too many.
 
-    Args:
-        position: driven angles or wrist positions with rates and accelerations, shape (3, Q, 3).
-        design: design of the robots.
-        wrist: whether they are wrist positions.
+    Positions are driven angles or wrist positions with rates and accelerations, shape (3, Q, 3).
     """
     if wrist:
         possible = np.all(is_in_reach(position[0], design), axis=-1)
@@ -163,16 +160,9 @@ def gimbal_motion(signals: Signals, robot: int, arms: Arms) -> Gimbal:
 def grasp_motion(
     signals: Signals, robot: int, arm: Arm | Fault, gimbal: Gimbal, arms: Arms
 ) -> tuple[Grasp | None, tuple[Fault, ...]]:
-    """Return motion and force of one grasp.
+    """Return motion and force of one grasp (robots count from 0), and the faults of all channels.
 
-    Args:
-        signals: channels of the team.
-        robot: number of the robot, from 0.
-        arm, gimbal: motion of its arm and gimbal.
-        arms: the robots as calibrated, or as designed.
-
-    Returns:
-        The grasp, None if the arm's postures are impossible, and the faults of all channels.
+    There is no grasp if the arm's postures are impossible.
     """
     if isinstance(arm, Fault):
         return None, (*gimbal.faults, arm)
@@ -263,12 +253,7 @@ def rigid_body(told: Sequence[Grasp], gravity_mps2: float, most_noise: Array | N
     """Return the best-fitting rigid motion, or None without grasps or if the numbers overflow.
 
     Rotations solve Wahba's problem (paper, (3)-(5)), positions a linear least-squares problem (6)-(8), both against
-    robot 1.
-
-    Args:
-        told: motions of the grasps; the first frame is {1}.
-        gravity_mps2: magnitude of gravity.
-        most_noise: upper bound of the noise, as in ``Grasp``.
+    robot 1, whose frame is {1}. ``most_noise`` bounds the noise of ``Grasp``.
     """
     if not told or not all(np.isfinite(np.sum(g.force)) and np.isfinite(np.sum(g.omega)) for g in told):
         return None

@@ -165,11 +165,7 @@ def pooled(found: Sequence[Follows]) -> tuple[float, float] | None:
 def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[Follows]:
     """Fit every moving joint's channel as a delayed copy of another one times a gain, by least squares.
 
-    Args:
-        motion: motion of the robot.
-        late_raw: the delayed channel, not filtered, shape (Q, J).
-        early: the other channel, filtered, shape (Q, J).
-        noise: noise of ``early`` after the filter, shape (J,).
+    The delayed channel (Q, J) is not filtered, the other one (Q, J) is; ``noise`` (J,) is that after the filter.
     """
     log = motion.log
     late = smooth(log, late_raw)
@@ -210,15 +206,7 @@ def _pairs(motion: Motion, late_raw: Array, early: Array, noise: Array) -> list[
 
 
 def solved(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Solve least squares; standard errors allow for residuals that are correlated within blocks.
-
-    Args:
-        columns: regressor, shape (Q, P).
-        y: observations, shape (Q,).
-
-    Returns:
-        Parameters and their standard errors, shape (P,) each.
-    """
+    """Solve least squares (Q, P) x = (Q,); return x and standard errors that allow for correlation within blocks."""
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     scaled = columns / size
     inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)

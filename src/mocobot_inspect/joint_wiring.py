@@ -249,12 +249,9 @@ class _Case:
 def check_wiring(
     motions: Sequence[Motion], robot: Robot, advance: Callable[[int], object] = lambda _: None
 ) -> Wiring | None:
-    """Search for mistakes; return None if no joint with a torque moves.
+    """Search for mistakes in all parts of a log; return None if no joint with a torque moves.
 
-    Args:
-        motions: motion of every part of the log.
-        robot: model of the robot.
-        advance: called with the number of mistakes tried.
+    ``advance`` is called with the number of mistakes tried.
     """
     q, dq, ddq, torque = (
         np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq", "torque")
@@ -360,12 +357,7 @@ def _nonnegative(columns: Array, y: Array) -> tuple[Array, Array]:
 def torque_delay(motion: Motion, asked: Array) -> TorqueDelay | None:
     """Estimate the delay of all torques behind the motion; samples of slow joints are left out.
 
-    Args:
-        motion: motion of the robot.
-        asked: torques of the model, shape (Q, J).
-
-    Returns:
-        The delay, or None if no moving joint has a torque.
+    ``asked`` are torques of the model, shape (Q, J). None if no moving joint has a torque.
     """
     log, rate = motion.log, motion.log.rate_hz
     if log.torque is None:

@@ -80,15 +80,7 @@ def inspect_joints(
 ) -> JointInspection:
     """Inspect a log; faulty samples are reported, not refused.
 
-    Args:
-        source: the log.
-        log_map: its map.
-        robot: model of the robot.
-        advance: called with the reading progress, in the source's units.
-        try_advance: called with the number of mistakes tried.
-
-    Raises:
-        InputError: the log cannot be read.
+    ``advance`` is called with the reading progress in the source's units, ``try_advance`` with the mistakes tried.
     """
     log = collect(source, advance)
     samples = log.streams[0]
@@ -188,12 +180,7 @@ def _rms(x: Array) -> float:
 
 
 def _signs_lost(values: Array, log_map: JointMap) -> Iterator[str]:
-    """Yield a sentence for each unsigned number that jumps between the ends of its range, so must have been signed.
-
-    Args:
-        values: samples [SI], shape (q, C).
-        log_map: map of the log.
-    """
+    """Yield a sentence for each unsigned number that jumps between the ends of its range, so must have been signed."""
     for x, ((quantity, joint), channel) in zip(values.T, log_map.channels.items(), strict=True):
         if channel.bits is not None:
             continue

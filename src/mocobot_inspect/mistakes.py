@@ -143,13 +143,8 @@ def rearranged(
 ) -> Iterator[Mistake]:
     """Yield three channels in another order or with other signs, for all robots and for each.
 
-    Args:
-        signals: channels of the team.
-        design: design of the robots.
-        kind: name of the mistake in reports.
-        level: the only level at which it is tried; None for both.
-        groups: groups that are rearranged together.
-        orders, signs: orders and signs to try: the true channel k is ``signs[k]`` times the logged ``order[k]``.
+    Groups in one tuple are rearranged together; the true channel k is ``signs[k]`` times the logged ``order[k]``. With
+    a ``level``, the mistake ``kind`` is tried at that level alone.
     """
     if level not in (None, signals.level):
         return
@@ -308,12 +303,7 @@ def _shifted(
 
 
 def refined(mistake: Mistake, total: Callable[[Mistake], float]) -> Mistake:
-    """Return a mistake with its size fitted, if it has one.
-
-    Args:
-        mistake: the mistake as tried.
-        total: returns the misfit that remains with a mistake undone.
-    """
+    """Return a mistake with its size fitted, if it has one; ``total`` is the misfit with a mistake undone."""
     if mistake.resized is None:
         return mistake
     resized, start = mistake.resized, dict(mistake.sizes)["offset_rad"]

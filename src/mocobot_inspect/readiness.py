@@ -38,14 +38,7 @@ class Readiness:
 
 
 def readiness(name: str, level: Level, parts: Sequence[tuple[float, Array]], arms: Arms) -> Readiness:
-    """Run the estimate and report on its steps.
-
-    Args:
-        name: name of the log.
-        level: level of the channels.
-        parts: uniform stretches: start [s] and samples (q, N, 9) at 100 Hz.
-        arms: the robots as calibrated, or as designed.
-    """
+    """Run the estimate on uniform stretches, each a start [s] and samples (q, N, 9) at 100 Hz, and report its steps."""
     try:
         with np.errstate(over="raise", divide="raise"):
             data = [
@@ -108,9 +101,7 @@ def _reasons(estimate: PayloadEstimate, omega: Array) -> dict[str, str | None]:
 def idle_axes(omega: Array, noise: float) -> list[str]:
     """Return the axes of {1} about which there is hardly any rotation, in words; oblique axes are left out.
 
-    Args:
-        omega: angular velocities in {1} [rad/s], shape (Q, 3).
-        noise: their noise [rad/s rms].
+    Angular velocities (Q, 3) are in {1} [rad/s], their noise is rms.
     """
     values, vectors = np.linalg.eigh(omega.T @ omega / len(omega))
     rates = np.sqrt(np.maximum(values, 0.0))

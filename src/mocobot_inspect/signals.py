@@ -85,11 +85,8 @@ class Signals:
 def signals_of(level: Level, stretches: Sequence[Array], noise: Array) -> Signals:
     """Filter uniform stretches of a log and pick ``INSTANTS`` evenly spaced instants.
 
-    Args:
-        level: level of the channels.
-        stretches: samples at ``RATE_HZ``, each (q, N, 9) in the order of ``CHANNELS[level]``; each longer than
-            twice ``TRIM_S``.
-        noise: white noise of every channel [SI], shape (N, 9).
+    Each stretch (q, N, 9) is at ``RATE_HZ``, in the order of ``CHANNELS[level]``, and longer than twice ``TRIM_S``;
+    ``noise`` (N, 9) is the white noise of every channel [SI].
     """
     drop = round(TRIM_S * RATE_HZ)
     parts = []

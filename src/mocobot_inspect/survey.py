@@ -144,11 +144,7 @@ class Survey:
 
 
 def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None) -> Survey:
-    """Scan a log with bounded memory; a log too long for the excerpt is read twice.
-
-    Raises:
-        InputError: the log cannot be read.
-    """
+    """Scan a log with bounded memory; a log too long for the excerpt is read twice."""
     robots = [_Robot(source) for _ in range(source.robots)]
     rows = EXCERPT_ROWS // max(source.robots, 1)
     for robot, samples in source.chunks(advance):

@@ -135,9 +135,6 @@ def inspect_log(
         try_advance: called with the number of wiring mistakes tried.
         trial: kind of trial, used if the log does not state it.
         units: the robots as calibrated; None to use those of the log.
-
-    Raises:
-        InputError: the log cannot be read.
     """
     said = source.metadata
     seen = survey(source, advance)
@@ -240,15 +237,9 @@ def _undone(part: Array, wiring: Wiring, level: Level) -> Array:
 def clean_stream(
     samples: Samples, origin_ns: int, faulty: Sequence[tuple[int, int]] = ()
 ) -> tuple[Array, Array]:
-    """Return one robot's usable samples, averaged if they come faster than 100 Hz.
+    """Return one robot's usable samples: times after ``origin_ns`` [s], shape (q,), and nine channels (q, 9).
 
-    Args:
-        samples: the samples.
-        origin_ns: stamp from which time counts [ns].
-        faulty: intervals of stamps to leave out [ns].
-
-    Returns:
-        Increasing times [s], shape (q,), and the nine channels, all finite, shape (q, 9).
+    They are averaged if they come faster than 100 Hz; intervals of ``faulty`` stamps [ns] are left out.
     """
     time_s, values = seconds(samples.stamp_ns, origin_ns), samples.values[:, :9]
     good = (np.isfinite(values) & ~wild(values)).all(axis=1)
@@ -271,14 +262,9 @@ def clean_stream(
 def stretches(
     streams: Sequence[tuple[Array, Array]], clocks: ClockEstimate | None = None
 ) -> list[tuple[float, Array]]:
-    """Return uniform stretches that all robots share.
+    """Return uniform stretches that all robots share: start [s] and samples at ``RATE_HZ``, shape (q, N, 9).
 
-    Args:
-        streams: times [s] and channels of every robot, see ``clean_stream``.
-        clocks: offsets and drifts to remove, if known.
-
-    Returns:
-        For each stretch its start [s] and samples at ``RATE_HZ``, shape (q, N, 9).
+    ``streams`` come from ``clean_stream``; offsets and drifts of ``clocks`` are removed.
     """
     told = []
     for robot, (time_s, values) in enumerate(streams):
@@ -335,13 +321,7 @@ def _at(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def segments(level: Level, parts: Sequence[tuple[float, Array]], design: OmnidDesign) -> Segments:
-    """Classify windows of half a second as rest or motion by the fastest robot.
-
-    Args:
-        level: level of the channels.
-        parts: uniform stretches: start [s] and samples (q, N, 9) at 100 Hz.
-        design: the robots' design.
-    """
+    """Classify windows of half a second of uniform stretches as rest or motion by the fastest robot."""
     # Order of magnitude of the wrist's speed; at joint level from a driven joint's rate.
     lever = 1.0 if level == "wrist" else design.proximal_length_m
     window, drop = round(WINDOW_S * RATE_HZ), round(TRIM_S * RATE_HZ)

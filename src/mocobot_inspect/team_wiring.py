@@ -148,13 +148,7 @@ class Team:
     """
 
     def __init__(self, signals: Signals, arms: Arms, known: dict[Any, Any] | None = None) -> None:
-        """Compute every robot's motion.
-
-        Args:
-            signals: channels of the team.
-            arms: the robots as calibrated, or as designed.
-            known: cached motions of arms and gimbals of the same log.
-        """
+        """Compute every robot's motion; ``known`` are cached motions of arms and gimbals of the same log."""
         self.signals, self._arms = signals, arms
         self._known = {} if known is None else known
         self._body: Body | None = None
@@ -284,13 +278,9 @@ def check_wiring(
     *,
     look_for_hidden: bool = True,
 ) -> Wiring:
-    """Search for wiring mistakes.
+    """Search for wiring mistakes, and for those that these data could not show.
 
-    Args:
-        signals: channels of the team.
-        arms: the robots as calibrated, or as designed.
-        advance: called with the number of mistakes tried since the last call.
-        look_for_hidden: whether to search mistakes that these data could not show.
+    ``advance`` is called with the number of mistakes tried since the last call.
     """
     design = design_of(arms)
     first = team = Team(signals, arms)

@@ -66,7 +66,7 @@ def convert(
     correct: bool = False,
     advance: Callable[[int], object] = lambda _: None,
 ) -> Converted:
-    """Convert a log to a recording on one grid, and check that it is plausible for an estimate.
+    """Convert a log to a recording on one grid that is plausible for an estimate (see ``check_recording``).
 
     Args:
         source: the log.
@@ -77,10 +77,6 @@ def convert(
         max_gap_s: longest gap that is filled [s].
         correct: whether to correct the robots' clocks to that of robot 1.
         advance: called with the progress, in the source's units.
-
-    Raises:
-        InputError: the log is damaged, cannot be resampled, is not plausible (see ``check_recording``), or lacks what
-            is chosen.
     """
     how = partial(
         _convert, labels=labels, standard=standard, rate_hz=rate_hz, max_gap_s=max_gap_s, correct=correct
@@ -104,17 +100,9 @@ def convert_parts(
     correct: bool = False,
     advance: Callable[[int], object] = lambda _: None,
 ) -> tuple[list[Converted], list[Omission]]:
-    """Convert every part of a log between gaps too long to be filled, see ``split``.
+    """Convert every part of a log between gaps too long to be filled, see ``split``; arguments as in ``convert``.
 
-    Args:
-        source, labels, standard, choice, rate_hz, max_gap_s, correct, advance: as in ``convert``.
-
-    Returns:
-        At least one recording; and the omissions with their reasons: unchosen parts, gaps, and parts that are too
-        short or unusable.
-
-    Raises:
-        InputError: the log is damaged, lacks what is chosen, or no part of it can be used.
+    Returns at least one recording, and the omissions: unchosen parts, gaps, and parts too short or unusable.
     """
     extent = extent_of(source, choice, max_gap_s, advance)
     spans, out = split(extent)
@@ -183,16 +171,9 @@ def write_converted(
     *,
     replace_bag: bool = False,
 ) -> None:
-    """Write a recording at the level of its metadata, in the format that the target's name states.
+    """Write a recording at the level of its metadata, in the format that the target's name states (``output_kind``).
 
-    Args:
-        recording: the recording.
-        path: target, see ``output_kind``.
-        advance: called with the number of samples written since the last call.
-        replace_bag: whether to replace the folder of a bag that this program wrote.
-
-    Raises:
-        InputError: it cannot be written.
+    ``advance`` is called with the samples written since the last call; ``replace_bag`` as in ``write_bag``.
     """
     kind, level = output_kind(path), recording.metadata.level
     if kind == "parquet":
@@ -214,14 +195,6 @@ def write_csv(recording: Recording, path: Path, level: Level = "joint") -> None:
     """Write a recording as CSV: a header, commas, the columns of docs/recording.md, every number exactly.
 
     A text table holds no metadata; a reader must supply trial, payload and design.
-
-    Args:
-        recording: the recording.
-        path: target; an existing file is replaced once the new one is complete.
-        level: "joint" or "wrist".
-
-    Raises:
-        InputError: the target cannot be written, or some driven angles have no wrist position.
     """
     columns = replace(recording, metadata=replace(recording.metadata, level=level)).file_columns()
     table = pa.table({name: np.ascontiguousarray(values) for name, values in columns.items()})
@@ -233,14 +206,6 @@ def write_npz(recording: Recording, path: Path, level: Level = "joint") -> None:
     """Write a recording as NPZ: ``time`` (Q,), then ``phi``, ``theta``, ``tau`` and ``ref`` of shape (Q, N, 3).
 
     At wrist level ``h`` and ``force`` replace phi and tau. ``mocobot`` holds the metadata as JSON text.
-
-    Args:
-        recording: the recording.
-        path: target; an existing file is replaced once the new one is complete.
-        level: "joint" or "wrist".
-
-    Raises:
-        InputError: as ``write_csv``.
     """
     arrays = {"time": recording.time, "phi": recording.phi, "theta": recording.theta, "tau": recording.tau}
     if level == "wrist":

@@ -53,13 +53,7 @@ _DONE = {
 
 
 def format_conversion(converted: Converted, name: str, out: Path) -> str:
-    """Return a readable report: streams, clocks, location of the recording, and omissions.
-
-    Args:
-        converted: the result.
-        name: the log, as the user named it.
-        out: path of the recording.
-    """
+    """Return a readable report: streams, clocks, location ``out`` of the recording, and omissions."""
     recording, streams = converted.recording, converted.streams
     if converted.span is not None:
         name = f"{name} ({converted.span})"
@@ -202,13 +196,7 @@ FORMAT, VERSION = "mocobot-conversion", 1
 def conversion_dict(
     name: str, recordings: Sequence[tuple[Converted, Path | None]], left_out: Sequence[Omission]
 ) -> dict[str, Any]:
-    """Return plain JSON values of a conversion, with the keys documented above.
-
-    Args:
-        name: the log, as the user named it.
-        recordings: at least one recording, each with its file, if any.
-        left_out: parts of the log in none of them.
-    """
+    """Return plain JSON values of a conversion of at least one recording, each with its file, if any."""
     return {
         "format": FORMAT,
         "version": VERSION,

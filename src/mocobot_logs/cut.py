@@ -90,15 +90,7 @@ class Omission:
 
 
 def parse_choice(crop: str | None, drops: Iterable[str] = ()) -> Choice:
-    """Parse the options of the command line.
-
-    Args:
-        crop: ``FROM:TO``; either may be missing.
-        drops: ``robot=N:FROM-TO`` each.
-
-    Raises:
-        InputError: an option has another form, or ends before it begins.
-    """
+    """Parse options of the command line: ``FROM:TO``, of which either may be missing, and ``robot=N:FROM-TO`` each."""
     return Choice(None if crop is None else _crop(crop), tuple(_drop(drop) for drop in drops))
 
 
@@ -142,14 +134,7 @@ class Piece:
     """A span of a log without the dropped samples, as a ``LogSource``."""
 
     def __init__(self, source: LogSource, origin_ns: int, span: Span | None, drops: tuple[Drop, ...]) -> None:
-        """Initialise; nothing is read yet.
-
-        Args:
-            source: the log.
-            origin_ns: stamp from which span and drops count [ns].
-            span: span to keep, None for all.
-            drops: samples to leave out.
-        """
+        """Keep a span (None for all) without the drops; both count from ``origin_ns``. Nothing is read yet."""
         self.name = source.name if span is None else f"{source.name} ({span})"
         self.level: Level = source.level
         self.robots, self.channels = source.robots, source.channels
@@ -163,11 +148,7 @@ class Piece:
         return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples as ``LogSource.chunks``; reading stops after the span.
-
-        Raises:
-            InputError: the log is damaged, or holds what its map does not allow.
-        """
+        """Yield samples as ``LogSource.chunks``; reading stops after the span."""
         passed = [False] * self.robots
         for robot, samples in self._source.chunks(advance):
             after = samples.stamp_ns - self._origin_ns
@@ -202,14 +183,7 @@ def extent_of(
 ) -> Extent:
     """Scan a log; only its stamps stay in memory. Rows that lack a value do not count as samples.
 
-    Args:
-        source: the log.
-        choice: the wanted part.
-        max_gap_s: longest time without samples that is filled, beyond one period [s].
-        advance: called with the progress, in the source's units.
-
-    Raises:
-        InputError: the log is damaged or empty, or lacks what is chosen.
+    Gaps of more than ``max_gap_s`` beyond one period [s] are not filled.
     """
     for drop in choice.drops:
         if not 1 <= drop.robot <= source.robots:

@@ -57,15 +57,7 @@ class Draft:
 
 
 def draft_of(path: Path, episode: int | None = None) -> Draft:
-    """Draft the map of a team's log.
-
-    Args:
-        path: a log of any format, with any names.
-        episode: episode of a LeRobot dataset; may be None if it holds only one.
-
-    Raises:
-        InputError: there is no such log, or it is damaged.
-    """
+    """Draft the map of a team's log of any format; ``episode`` of a LeRobot dataset may be None if it has only one."""
     kind = log_kind(path)
     if kind == "bag":
         candidates, unstamped = of_bag(path)

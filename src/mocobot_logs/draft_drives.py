@@ -92,12 +92,7 @@ def numbered(topic: str, path: str, at: Mapping[str, int], joints: Sequence[str]
 
 
 def gain_lines(gains: Mapping[str, Array], joints: Sequence[str]) -> Iterator[str]:
-    """Yield the lines of gains that a log holds.
-
-    Args:
-        gains: ``position_gain`` and ``velocity_gain`` of all rows, shape (q, J) each, NaN where a row has none.
-        joints: the J joints in the map's order.
-    """
+    """Yield the lines of gains: values of all rows by key, shape (q, J) each, NaN where a row has none."""
     for name, values in gains.items():
         usual, doubts = [], []
         for joint, x in zip(joints, values.T, strict=True):
@@ -149,14 +144,8 @@ class Follow:
 def follow(time_s: Array, q: Array, told_s: Array, told: Array) -> Follow | None:
     """Find the lag with which positions follow commands, from the commands' stamps, by least squares.
 
-    Args:
-        time_s: times of the positions [s], increasing, shape (q,).
-        q: positions, shape (q, J).
-        told_s: times of the commands by the same clock [s], increasing, shape (m,).
-        told: commands, shape (m, J).
-
-    Returns:
-        None if nothing moves, or there are too few rows.
+    Positions ``q`` (q, J) are at ``time_s`` [s], commands ``told`` (m, J) at ``told_s`` [s] by the same clock, both
+    increasing. None if nothing moves, or there are too few rows.
     """
     given = np.isfinite(told).all(axis=1)
     told_s, told = told_s[given], told[given]
@@ -227,17 +216,10 @@ def calibration_beside(path: Path) -> tuple[Path, dict[str, dict[str, float]]] |
 def lerobot_places(
     path: Path, places: Mapping[str, Place], joints: Sequence[str], motors: Sequence[str]
 ) -> tuple[dict[str, Place], list[str]]:
-    """Find the units of a LeRobot dataset's states and actions by their steps and a calibration.
+    """Find the units of a LeRobot dataset's states and actions by their steps and a calibration, and further doubts.
 
-    Args:
-        path: the dataset.
-        places: places by quantity.
-        joints: joints in the map's order.
-        motors: LeRobot's names of their motors.
-
-    Returns:
-        The places, and further doubts. One count of the servo is 360/4095 in degrees, 200/(range_max - range_min) in
-        -100 to 100, and 100/(range_max - range_min) in 0 to 100.
+    One count of the servo is 360/4095 in degrees, 200/(range_max - range_min) in -100 to 100, and
+    100/(range_max - range_min) in 0 to 100. ``motors`` are LeRobot's names of the joints' motors.
     """
     state = places["q"]
     beside = calibration_beside(path)

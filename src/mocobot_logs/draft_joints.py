@@ -112,13 +112,9 @@ def draft_joint_map(
 
     Args:
         path: a log of any format, with any names.
-        joints: names of the model's joints.
-        slides: whether each joint slides.
+        joints, slides: names of the model's joints, and whether each slides.
         episode: episode of a LeRobot dataset; may be None if it holds only one.
         rest: position at which each joint may be locked [rad or m]; None: zeros.
-
-    Raises:
-        InputError: there is no such log, or it is damaged.
     """
     head = [*head_lines(path, "docs/serial/guide.md says what may stand here."), "version = 1"]
     kind = log_kind(path)

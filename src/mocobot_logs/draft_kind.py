@@ -25,18 +25,7 @@ _WITHIN = _JOINT | MOTOR
 
 
 def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None]:
-    """Draft the map of a log, of a team or of one robot's joints.
-
-    Args:
-        path: a log of any format, with any names.
-        episode: episode of a LeRobot dataset; may be None if it holds only one.
-
-    Returns:
-        The draft, and the number of joints; None for a team.
-
-    Raises:
-        InputError: there is no such log, or it is damaged.
-    """
+    """Draft the map of a log, of a team or of one robot's joints; return their number, too, None for a team."""
     team = draft_of(path, episode)
     if not team.missing:
         return team, None
@@ -111,12 +100,7 @@ def _left(name: str) -> list[tuple[int, re.Match[str]]]:
 
 
 def _joint_in(name: str, shared: Collection[str]) -> str | None:
-    """Return the part of a column's name that names a joint or its number; None if there is none.
-
-    Args:
-        name: name of the column.
-        shared: words that all columns have.
-    """
+    """Return the part of a column's name that names a joint or its number; ``shared`` words are in all columns."""
     tokens = list(TOKEN.finditer(name))
     left = [k for k, token in _left(name) if token[0].lower() not in shared]
     if not left:

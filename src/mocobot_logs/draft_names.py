@@ -65,12 +65,7 @@ class Reading:
 
 
 def read_name(name: str, *, element: bool = False) -> Reading | None:
-    """Parse a name; return None if it names no channel.
-
-    Args:
-        name: the name.
-        element: whether it ends in the index of an array element.
-    """
+    """Parse a name, which may end in the index of an array ``element``; return None if it names no channel."""
     unit, end = _unit(name)
     for told, stop in dict.fromkeys([(unit, end), (None, len(name))]):
         found = _read(name, _tokens(name, stop), told, element=element)

@@ -19,17 +19,7 @@ readable = partial(system_errors, done="read")
 
 
 def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
-    """Read a small file of metadata.
-
-    Args:
-        path: the file.
-        most_bytes: largest allowed size [bytes].
-        where: name of the file in messages.
-        kind: expected content, for messages.
-
-    Raises:
-        InputError: the file cannot be read, or is too large.
-    """
+    """Read a small file of metadata; ``where`` and ``kind`` name file and content in messages."""
     with readable(where), open_input(path) as file:
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:
@@ -74,11 +64,7 @@ SUFFIXES: dict[str, OutputKind] = {
 
 
 def output_kind(path: Path) -> OutputKind:
-    """Return the output format of a target.
-
-    Raises:
-        InputError: the suffix belongs to no output format.
-    """
+    """Return the output format of a target by its suffix."""
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None or not path.name:
         known = ", ".join(suffix for suffix in SUFFIXES if suffix)
@@ -105,11 +91,7 @@ MATLAB = b"MATL"
 
 
 def log_kind(path: Path) -> Kind:
-    """Return the format of a log; a recording inside a dataset's folder does not belong to the dataset.
-
-    Raises:
-        InputError: there is no such log, or its format is not known.
-    """
+    """Return the format of a log; a recording inside a dataset's folder does not belong to the dataset."""
     try:
         if not path.exists():
             raise InputError(f"{path}: there is no such file")
@@ -150,11 +132,7 @@ def log_kind(path: Path) -> Kind:
 
 
 def is_recording(path: Path) -> bool:
-    """Return whether a Parquet file is a recording.
-
-    Raises:
-        InputError: it cannot be read.
-    """
+    """Return whether a Parquet file is a recording."""
     import pyarrow.parquet as pq
 
     from estimator.recording.parquet import METADATA_KEY

@@ -76,11 +76,7 @@ class LogSource(Protocol):
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         """Yield samples in the order of the log: (robot from 0, its next samples).
 
-        Args:
-            advance: called with the progress since the last call.
-
-        Raises:
-            InputError: the log is damaged, or holds what its map does not allow.
+        ``advance`` is called with the progress since the last call.
         """
         ...
 
@@ -104,11 +100,7 @@ class Log:
 
 
 def collect(source: LogSource, advance: Callable[[int], object] = lambda _: None) -> Log:
-    """Read a whole source.
-
-    Raises:
-        InputError: see ``LogSource.chunks``.
-    """
+    """Read a whole source."""
     parts: list[list[Samples]] = [[] for _ in range(source.robots)]
     for robot, samples in source.chunks(advance):
         parts[robot].append(samples)
@@ -164,11 +156,7 @@ class Readings:
         return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples as ``LogSource.chunks``.
-
-        Raises:
-            InputError: the log is damaged, or holds what its map does not allow.
-        """
+        """Yield samples as ``LogSource.chunks``."""
         streams = [_Stream(self.channels) for _ in range(self.robots)]
         for robot, samples in self._source.chunks(advance):
             if (told := streams[robot].push(samples)) is not None:

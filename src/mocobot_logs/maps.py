@@ -191,15 +191,9 @@ class LogMap:
     def count_robots(
         self, where: str, is_there: Callable[[int], bool], key: Literal["topic", "column"]
     ) -> int:
-        """Return the number of robots from the map, or count those in the log.
+        """Return the number of robots from the map, or count those that are there, from 1.
 
-        Args:
-            where: name of the log in messages.
-            is_there: whether the log has any channel of a robot, counted from 1.
-            key: how the log locates channels.
-
-        Raises:
-            InputError: a robot in the middle is missing.
+        A robot missing in the middle is refused; ``key`` says how the log locates channels.
         """
         if self.robots is not None:
             return self.robots
@@ -266,16 +260,7 @@ def check_placeholders(fields: Fields, key: str, known: Sequence[str]) -> str | 
 def parse_channel(
     fields: Fields, placeholders: Sequence[str], dimension: str, units: Sequence[str], noun: str
 ) -> ChannelMap:
-    """Parse a channel from its table.
-
-    Args:
-        fields: the table, with ``unit``.
-        placeholders: placeholders that its texts may hold.
-        dimension, units, noun: see ``si_factor``.
-
-    Raises:
-        InputError: a key is missing, or a value is not allowed.
-    """
+    """Parse a channel from its table; ``dimension``, ``units`` and ``noun`` as in ``si_factor``."""
     place = {key: check_placeholders(fields, key, placeholders) for key in PLACES}
     if place["column"] is None and (place["topic"] is None or place["field"] is None):
         missing = (
@@ -330,11 +315,7 @@ def parse_csv(values: Values, where: str) -> CsvMap:
 
 
 def read_toml_map(path: Path) -> dict[str, object]:
-    """Read a map's file.
-
-    Raises:
-        InputError: there is no such file, or it is not TOML.
-    """
+    """Read a map's file."""
     names = ", ".join(MAPS)
     try:
         if not path.exists():
@@ -361,11 +342,7 @@ def _toml(text: str, where: str) -> dict[str, object]:
 
 
 def read_map(path_or_name: Path | str) -> LogMap:
-    """Read a map from a file, or return a built-in map by name; built-in names take precedence.
-
-    Raises:
-        InputError: there is no such map, the file is not TOML, or its keys or values are not allowed.
-    """
+    """Read a map from a file, or return a built-in map by name; built-in names take precedence."""
     if str(path_or_name) in MAPS:
         return builtin_map(str(path_or_name))
     path = Path(path_or_name)
@@ -374,31 +351,19 @@ def read_map(path_or_name: Path | str) -> LogMap:
 
 @cache
 def builtin_map(name: str) -> LogMap:
-    """Return a built-in map.
-
-    Raises:
-        InputError: no built-in map has that name.
-    """
+    """Return a built-in map."""
     return parse_map(_toml(builtin_map_text(name), f"map {name}"), name)
 
 
 def builtin_map_text(name: str) -> str:
-    """Return the TOML of a built-in map, as a template for new maps.
-
-    Raises:
-        InputError: no built-in map has that name.
-    """
+    """Return the TOML of a built-in map, as a template for new maps."""
     if name not in MAPS:
         raise InputError(f"map {name!r} does not exist; the built-in maps are {', '.join(MAPS)}")
     return (resources.files("mocobot_logs") / "builtin_maps" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def parse_map(values: Values, name: str) -> LogMap:
-    """Check and parse the TOML values of a map; ``name`` is its name in messages.
-
-    Raises:
-        InputError: a key is unknown or missing, or a value is not allowed; the message lists the allowed ones.
-    """
+    """Check and parse the TOML values of a map; ``name`` is its name in messages."""
     where = f"map {name}"
     check_version(values, where)
     if "joints" in values and "level" not in values:

@@ -52,27 +52,19 @@ def to_recording(
     correct: bool = False,
     cut: bool = False,
 ) -> tuple[Recording, ClockReport]:
-    """Put all robots on one clock.
+    """Put all robots on one clock; return the recording, at joint level whatever the log's level, and the clock report.
 
-    Given labels override those of the log; labels that the log lacks must be given.
+    Given labels override those of the log; labels that the log lacks must be given. Refused are clocks to correct that
+    the motion does not determine, a log that ends more than a second before another, fewer than 16 common samples, and
+    wrist positions out of reach.
 
     Args:
         resampled: the log.
-        design: design of the robots.
-        trial: kind of trial.
-        payload: name of the payload.
+        design, trial, payload: design of the robots, kind of trial, name of the payload.
         source: origin of the samples; by default the log's name.
         correct: whether to remove each clock's offset and drift against robot 1. Otherwise stamps are trusted.
         cut: whether the log was cut out of another one by stamps. Robots whose stamps end together then do not count as
             broken off, whatever their clocks.
-
-    Returns:
-        The recording, in memory at joint level whatever the log's level, and the clock report.
-
-    Raises:
-        InputError: the motion does not determine the clocks to correct, one robot's log ends more than a second before
-            another's, or they share fewer than 16 samples. Or a wrist position cannot be reached, design or trial is
-            missing, or a payload is named although the robots hold nothing.
     """
     stated = {"design": design, "trial": trial, "payload": payload, "source": source}
     metadata = _metadata(resampled, {key: value for key, value in stated.items() if value is not None})
@@ -173,13 +165,9 @@ def _sampling(
 ) -> tuple[Sampling, ...] | None:
     """Return how the sensors were sampled, or None if the samples are unchanged.
 
-    Args:
-        resampled: the log.
-        start_s: start of the recording after the log's origin [s].
-        first_s: time of each robot's first sample in the recording's time [s], shape (N,).
-        speed: rate of each robot's clock relative to that of robot 1, shape (N,).
-        untouched: whether each robot's samples stayed on its own grid.
-        aligned: whether the clocks were corrected by the motion.
+    The recording starts ``start_s`` after the log's origin, where robots' first samples are at ``first_s`` (N,) [s].
+    ``speed`` (N,) is the rate of each clock relative to that of robot 1; ``aligned`` says whether clocks were
+    corrected.
     """
     if resampled.metadata is not None and (known := resampled.metadata.sampling) is not None:
         # A log converted before keeps the errors of its first sampling. Its stamps are the recording's time, and this

@@ -20,13 +20,7 @@ from mocobot_logs.table.text import CsvTable
 def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | None = None) -> LogSource:
     """Open a log of any format; rows that repeat the previous reading are left out and counted.
 
-    Args:
-        path: a file or a folder.
-        log_map: map of its channels; None for files that mocobot writes and for an Omnid's bags.
-        episode: episode of a LeRobot dataset; may be None if it holds only one.
-
-    Raises:
-        InputError: there is no such log, its format is not known, or the map does not suit it.
+    A map may be left out for files that mocobot writes and for an Omnid's bags, the episode for a dataset of one.
     """
     return Readings(_open(Path(path), log_map, episode))
 
@@ -60,17 +54,7 @@ def draft_suggested(path: Path) -> Iterator[None]:
 
 
 def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = None) -> Table:
-    """Open a table of any format.
-
-    Args:
-        path: a file, or the folder of a dataset.
-        kind: format, see ``log_kind``; not "bag".
-        options: form of a text table.
-        episode: as in ``open_log``.
-
-    Raises:
-        InputError: it is damaged, or the episode must be named.
-    """
+    """Open a table of any format but "bag" (see ``log_kind``): a file, or the folder of a dataset."""
     name = str(path)
     if kind == "csv":
         return CsvTable(path, options, name)

@@ -124,18 +124,10 @@ def resample(
 ) -> Resampled:
     """Resample a log onto uniform grids in chunks; only the output stays in memory.
 
-    The source is read a second time if a robot's stamps leave the grid that fits its first 1024 rows.
-
-    Args:
-        source: the log.
-        rate_hz: rate of the grids [Hz].
-        max_gap_s: longest time without samples that is filled, beyond one period [s].
-        advance: called with the progress, in the source's units.
-
-    Raises:
-        InputError: the log cannot be read, or two robots share no time. Or a robot has fewer than 16 samples, an
-            unsuitable rate, values that are not finite, or decreasing stamps. Or one of its stamps has two values, a
-            gap is too long, or more than 10 % of its samples are missing or too close together.
+    The source is read a second time if a robot's stamps leave the grid that fits its first 1024 rows. Refused are
+    robots that share no time, fewer than 16 samples, an unsuitable rate, values that are not finite, decreasing stamps,
+    two values at one stamp, gaps of more than ``max_gap_s`` beyond one period [s], and more than 10 % missing or
+    crowded samples.
     """
     streams: dict[int, RobotStream] = {}
     done: dict[int, tuple[int, Array, StreamReport]] = {}

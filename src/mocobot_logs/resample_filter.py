@@ -100,7 +100,7 @@ def side(missing: int) -> int:
 
 
 def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Insert missing samples, evenly spaced in each gap.
+    """Insert missing samples, evenly spaced in each gap; return times and values.
 
     They lie on a polynomial of degree 7 through ``side`` samples before and after the gap. If these are more than
     eight, the polynomial is fitted by least squares. A spline would amplify noise in wide gaps; this fit has 0.8 to
@@ -111,9 +111,6 @@ def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[A
         time: times of the samples, strictly increasing, shape (q,); q at least 2.
         values: samples, shape (q, C).
         missing: number of missing samples after each sample but the last, shape (q - 1,).
-
-    Returns:
-        Times and values with the filled samples in place.
     """
     gaps = np.flatnonzero(missing)
     if not len(gaps):
@@ -327,16 +324,9 @@ def held_means(stamp_ns: Stamps, values: Array, at_ns: Array | Stamps, until_ns:
 
 
 def on_grid(time_ns: Stamps, values: Array, grid: Grid, k: int) -> tuple[Array, int]:
-    """Resample a whole stream at once: merge, fill, interpolate, low-pass, decimate.
+    """Resample a whole stream at once: merge, fill, interpolate, low-pass, keep every ``k``-th instant of the grid.
 
-    Args:
-        time_ns: times after the first row [ns], shape (q,).
-        values: samples, shape (q, C).
-        grid: the fine grid.
-        k: grid samples per output sample.
-
-    Returns:
-        Output samples, shape (Q, C), and the number missing before the first one (``Decimator.lead``).
+    Returns output samples (Q, C) from samples (q, C) at times after the first row [ns], and ``Decimator.lead``.
     """
     if not (grid.fits or grid.fitted_rows):
         merger = Merger(grid.period_ns)

@@ -45,16 +45,9 @@ def units_of(dimension: str) -> tuple[str, ...]:
 
 
 def si_factor(fields: Fields, dimension: str, allowed: Sequence[str], noun: str) -> float:
-    """Return the size of one unit in SI.
+    """Return the size in SI of ``unit``, one of the allowed ones, with the number of ``NUMBERED`` that it needs.
 
-    Args:
-        fields: ``unit`` and the number that belongs to it, one of ``NUMBERED``.
-        dimension: a key of ``FACTORS``.
-        allowed: the allowed units.
-        noun: name of the quantity in messages, in the plural.
-
-    Raises:
-        InputError: the unit is not allowed, or its number is missing, not allowed or not positive.
+    ``noun`` names the quantity in messages, in the plural.
     """
     unit, where = fields.values["unit"], fields.where
     if unit not in allowed:

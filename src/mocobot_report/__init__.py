@@ -14,11 +14,7 @@ SOUGHT = (
 
 
 def check_folder(folder: Path) -> None:
-    """Check that a folder exists.
-
-    Raises:
-        InputError: the path does not exist or is a file.
-    """
+    """Refuse a path that does not exist or is a file."""
     with system_errors(folder, "read"):
         if not folder.exists():
             raise InputError(f"{folder}: there is no such folder; it must hold {SOUGHT}")

@@ -149,14 +149,8 @@ def row_layout(
 ) -> dict[str, Any]:  # fmt: skip
     """Return layout, height and layout on phones of a chart with one row per name and dashed lines at ``rules``.
 
-    Args:
-        names: names of the rows.
-        across: horizontal axis.
-        rules: positions of dashed lines.
-        row_px: height of a row [px].
-        left_px: width of the names [px]; phones use less.
-        most: largest number of letters of a name.
-        font_px: font size of the names on phones [px].
+    Rows are ``row_px`` high, names ``left_px`` wide (less on phones), with at most ``most`` letters of ``font_px``
+    there.
     """
     layout = {
         "xaxis": across, "yaxis": row_axis(names, most), "margin": {"l": left_px}, "barmode": "stack",
@@ -258,9 +252,6 @@ def thinned(time: Array, values: Array, step_s: float | None = None, most: int =
         values: values, shape (n, C); all columns share the kept times.
         step_s: sample period [s]; a step over 1.5 times as long is a pause. None for a series without pauses.
         most: largest number of rows to keep, not counting the ends of pauses.
-
-    Returns:
-        Times, shape (m,), and values, shape (m, C).
     """
     n, columns = values.shape
     after = np.flatnonzero(np.diff(time) > 1.5 * step_s) + 1 if step_s else np.zeros(0, dtype=int)

@@ -289,12 +289,8 @@ def _pooled_chart(
 ) -> Chart:  # fmt: skip
     """Plot differences from the first row, the pooled estimate, with horizontal bars of two standard errors.
 
-    Args:
-        words: title, label and unit of the values.
-        rows: name, values and standard errors of each row, shape (3,).
-        keys: legend entry of each component.
-        scales: factors on the differences, shape (3,).
-        extra: additional points with their legend entries.
+    ``words`` are title, label and unit; rows have a name, values and standard errors (3,), which ``scales`` (3,)
+    multiply.
     """
     title, label, unit = words
     data = []
@@ -346,11 +342,7 @@ class Left:
 def _signals(
     found: Sequence[Source], e: PayloadEstimate, say: Callable[[str], object]
 ) -> dict[str, Any] | None:
-    """Make charts of the residuals of every recording that still exists, and list what is missing.
-
-    Returns:
-        Data of the template; None if the provenance names no recording.
-    """
+    """Make charts of the residuals of every recording that still exists, and list what is missing; None without any."""
     if not found:
         return None
     panels: list[dict[str, Any]] = []

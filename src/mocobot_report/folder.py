@@ -68,11 +68,7 @@ class Diagnosed:
 
 
 def read_folder(folder: Path) -> list[Result]:
-    """Read all results in a folder, in the order of the page.
-
-    Raises:
-        InputError: the folder does not exist or holds no result, or a result cannot be read.
-    """
+    """Read all results in a folder, in the order of the page."""
     check_folder(folder)
     with system_errors(folder, "read"):
         paths = sorted(path for path in folder.glob("*.json") if path.is_file())
@@ -194,11 +190,7 @@ INCOMPLETE = (
 
 @contextmanager
 def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
-    """Context manager around reading the values of a file: turn missing or invalid values into an InputError.
-
-    Raises:
-        InputError: a key is missing or a value is invalid.
-    """
+    """Context manager around reading the values of a file: turn missing or invalid values into an InputError."""
     try:
         yield
     except INCOMPLETE as error:
@@ -216,11 +208,7 @@ class Source:
     why: str = ""  # reason why it is not used, without a full stop
 
     def recording(self) -> Recording:
-        """Read the recording.
-
-        Raises:
-            InputError: the recording was not found or cannot be read.
-        """
+        """Read the recording; InputError if it was not found or cannot be read."""
         if self.path is None:
             raise InputError(self.why)
         return read_recording(self.path)

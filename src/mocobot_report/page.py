@@ -38,18 +38,9 @@ PARTS: Mapping[str, Callable[[Result, Say], Context]] = {
 
 
 def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: None) -> Path:
-    """Write the report of a result folder.
+    """Write the report of a result folder to ``report.html`` there, or to ``out``, and return its path.
 
-    Args:
-        folder: folder that ``mocobot paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign`` wrote.
-        out: file to write; ``report.html`` in the folder if None. An existing file is replaced.
-        say: called with the name of each stage that begins.
-
-    Returns:
-        Path of the file.
-
-    Raises:
-        InputError: the folder holds no readable result, or the file cannot be written.
+    ``say`` is called with the name of each stage that begins. An existing file is replaced.
     """
     results = read_folder(folder)
     out = folder / NAME if out is None else out
@@ -102,11 +93,7 @@ class _Page:
 
 
 def make_page(folder: Path, results: Sequence[Result], say: Say = lambda _: None) -> bytes:
-    """Make the page of a folder's results as UTF-8 HTML; equal files give equal bytes.
-
-    Raises:
-        InputError: a file was deleted or changed after the folder was read.
-    """
+    """Make the page of a folder's results as UTF-8 HTML; equal files give equal bytes."""
     contexts: list[Context] = []
     for result in results:
         with complete(result.path):

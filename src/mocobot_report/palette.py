@@ -46,11 +46,7 @@ DARK = {name: dark for name, (_, dark) in _THEMES.items()}
 
 
 def template(colours: Mapping[str, str]) -> dict[str, Any]:
-    """Make the plotly template of all plots in the colours of a theme.
-
-    Args:
-        colours: ``LIGHT`` or ``DARK``; each trace names its own colour in ``meta``.
-    """
+    """Make the plotly template of all plots in ``LIGHT`` or ``DARK``; traces name their colour in ``meta``."""
     text, soft, card, line = (colours[name] for name in ("text", "soft", "card", "line"))
     clear = "rgba(0,0,0,0)"
     axis = {

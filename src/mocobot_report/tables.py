@@ -60,11 +60,9 @@ def table(
     A column ``unit`` directly after the row headers moves into them, so that narrow screens show the numbers.
 
     Args:
-        caption: caption of the table.
+        caption, note: first and second line of the caption.
         head: names of the columns; a unit in brackets does not wrap.
         rows: cells; the first ``headers`` cells of each row are row headers.
-        note: second line of the caption.
-        headers: number of leading columns with row headers.
         groups: whether an empty first cell continues the group above.
         stack: whether narrow screens show every row as a heading with its cells below, for rows with long names.
     """

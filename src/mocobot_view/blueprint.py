@@ -78,9 +78,7 @@ INSTANTS = 50
 def scene_eye(trial: ReplayTrial, aspect: float) -> rrb.EyeControls3D:
     """Place the eye so that it sees robots and payload during the whole trial, with little occlusion.
 
-    Args:
-        trial: trial to show.
-        aspect: width over height of the narrowest view that must show everything.
+    ``aspect`` is width over height of the narrowest view that must show everything.
     """
     return _eye(clearest(_seen(trial), trial.bases.p_Wb, AZIMUTH, ELEVATION, aspect, FOVY_DEG))
 
@@ -142,9 +140,7 @@ Its interface cannot set that range; the default shows only 30 s around the curs
 def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blueprint:
     """Make the layout; several trials stand side by side, each with its own scene and plots.
 
-    Args:
-        trials: trials to show.
-        tab: name of the initial tab; None for the summary of a single trial, or the joints of several.
+    The initial ``tab`` is by default the summary of a single trial, or the joints of several.
     """
     aspect = SCENE_ASPECT.get(len(trials), 1.0)
     if len(trials) == 1:
@@ -181,12 +177,7 @@ def playing(body: rrb.Container) -> rrb.Blueprint:
 
 
 def scene_view(trial: ReplayTrial, aspect: float = 1.0) -> rrb.Spatial3DView:
-    """Make the 3D view of one trial, seen from above, with everything in sight.
-
-    Args:
-        trial: trial to show.
-        aspect: width over height of the narrowest view that must show everything.
-    """
+    """Make the 3D view of one trial, seen from above, with everything in sight; ``aspect`` as for ``scene_eye``."""
     window = rrb.VisibleTimeRange(
         TIMELINE,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL_S),

@@ -91,12 +91,9 @@ def framing(points: ArrayLike, azimuth: float, elevation: float, aspect: float, 
 def clearest(
     points: ArrayLike, feet: Array, azimuth: float, elevation: float, aspect: float, fovy_deg: float
 ) -> Camera:
-    """Choose the camera of ``framing`` from which the robots hide each other least.
+    """Choose the camera of ``framing`` from which robots at ``feet`` (N, 3) [m] hide each other least.
 
-    Args:
-        points, elevation, aspect, fovy_deg: as for ``framing``.
-        feet: positions of the robots on the floor [m], shape (N, 3).
-        azimuth: preferred direction of view [deg].
+    ``azimuth`` is the preferred direction of view [deg].
     """
 
     def apart(camera: Camera) -> float:
@@ -119,16 +116,9 @@ def _middle(across: Array, depth: Array) -> float:
 
 
 def pixels(camera: Camera, points: ArrayLike, width: float, height: float, fovy_deg: float) -> Array:
-    """Project points into a picture.
+    """Project points in the world [m], shape (K, 3), into a picture.
 
-    Args:
-        camera: camera of the picture.
-        points: points in the world [m], shape (K, 3).
-        width, height: size of the picture [px].
-        fovy_deg: vertical angle of view [deg].
-
-    Returns:
-        Columns from the left and rows from the top [px], shape (K, 2); NaN for points behind the camera.
+    Returns columns from the left and rows from the top [px], shape (K, 2); NaN for points behind the camera.
     """
     x, y, z = camera.axes() @ (np.reshape(np.asarray(points, dtype=float), (-1, 3)) - camera.lookat).T
     depth = np.where(z + camera.distance > 0, z + camera.distance, np.nan)
@@ -200,12 +190,9 @@ HALO, HALO_SHARE = "white", 0.25
 def with_labels(
     picture: NDArray[np.uint8], labels: Sequence[Label], at: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """Write labels into a picture, without overlaps.
+    """Write labels into a picture (height, width, 3), without overlaps.
 
-    Args:
-        picture: picture of shape (height, width, 3).
-        labels: texts to write, K entries.
-        at: column and row of the middle of each text [px], NaN if behind the camera; shape (K, 2).
+    ``at`` (K, 2) is column and row of the middle of each text [px], NaN if behind the camera.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # an optional dependency
     from matplotlib.figure import Figure

@@ -32,9 +32,7 @@ def of_robot(robot: int) -> Colour:
 def shades(robot: int, saturation: float = 1.0) -> list[Colour]:
     """Return three shades of a robot's colour for its joints or axes 1, 2, 3: dark, plain, light.
 
-    Args:
-        robot: number of the robot from 1.
-        saturation: factor on the saturation of the colour; below 1 for reference curves.
+    Robots count from 1; ``saturation`` below 1 is for reference curves.
     """
     h, _, s = colorsys.rgb_to_hls(*(part / 255.0 for part in of_robot(robot)))
     return [_bytes(colorsys.hls_to_rgb(h, lightness, saturation * s)) for lightness in (0.36, 0.55, 0.78)]

@@ -89,12 +89,8 @@ def joint_replay(
 ) -> JointReplay:
     """Compute the data of the replay of a log.
 
-    Args:
-        model: model of the robot.
-        log: log of its joints.
-        name: name of the replay.
-        traces: residuals of a diagnosis of this log, with measured torques; empty without one.
-        columns: joint of each of their channels, from 0.
+    ``traces`` are residuals of a diagnosis of this log, with measured torques; ``columns`` tells the joint of each of
+    their channels, from 0.
     """
     shapes = _shapes(model.model)
     step = max(1, round(log.rate_hz / POSE_HZ))
@@ -137,9 +133,8 @@ def _found(time: Array, traces: Sequence[Trace], columns: Sequence[int], joints:
 def _poses(model: mujoco.MjModel, q: Array) -> tuple[Array, Array, tuple[Array, float], Array]:
     """Compute the poses of bodies and joints.
 
-    Returns:
-        Positions and quaternions (x, y, z, w) of all bodies, (P, B, 3) and (P, B, 4); a ball around them; anchors and
-        axes of the joints, (2, P, J, 3).
+    Returns positions and quaternions (x, y, z, w) of all bodies, (P, B, 3) and (P, B, 4), a ball around them, and
+    anchors and axes of the joints, (2, P, J, 3).
     """
     joints = np.empty((2, len(q), model.njnt, 3))
     data = mujoco.MjData(model)
@@ -194,13 +189,7 @@ def log_joint_replay(
     replays: Sequence[JointReplay],
     progress: Callable[[int], object] | None = None,
 ) -> None:
-    """Log replays side by side, each below a root with its name, on one timeline that starts at 0.
-
-    Args:
-        stream: target stream.
-        replays: replays to show.
-        progress: called with 1 after each replay.
-    """
+    """Log replays side by side, each below a root with its name, on one timeline that starts at 0."""
     columns = [_column(replay) for replay in replays]
     layout = playing(columns[0] if len(columns) == 1 else rrb.Horizontal(*columns))
     begin(stream, layout, [replay.name for replay in replays])

@@ -65,11 +65,7 @@ class PayloadMotion:
 def place_bases(R_bi: Array, p_bi: Array, grasps: Grasps, height_m: float) -> Bases:
     """Compute the poses of the bases from the grasps and the joint angles, averaged over the samples.
 
-    Args:
-        R_bi: orientation of each flange in its {b}, shape (Q, N, 3, 3).
-        p_bi: wrist positions in {b} [m], shape (Q, N, 3).
-        grasps: grasps of the payload.
-        height_m: height of {b1} over the floor [m].
+    Flanges have orientations (Q, N, 3, 3) and wrists positions (Q, N, 3) [m] in their {b}; {b1} is ``height_m`` high.
     """
     R_b1b, p_b1b = [np.eye(3)], [np.zeros(3)]
     for i in range(1, R_bi.shape[1]):
@@ -84,14 +80,9 @@ def place_bases(R_bi: Array, p_bi: Array, grasps: Grasps, height_m: float) -> Ba
 def placed(
     R_bi: Array, p_bi: Array, grasps: Grasps | None, height_m: float, arms: Arms, at: slice = slice(None)
 ) -> tuple[Bases, PayloadMotion | None]:
-    """Compute the poses of the bases, and the motion of the payload at the samples ``at``.
+    """Compute the poses of the bases as ``place_bases``, and the motion of the payload at the samples ``at``.
 
-    Without grasps, the robots stand in a row and the motion is None.
-
-    Args:
-        R_bi, p_bi, grasps, height_m: as for ``place_bases``, for level bases.
-        arms: the robots; a calibration may state the tilts of their bases.
-        at: samples at which the motion of the payload is computed.
+    Without grasps, the robots stand in a row and the motion is None. A calibration may state the tilts of the bases.
     """
     motion = None
     if grasps is None:
@@ -169,11 +160,7 @@ def held(facts: BodyFacts | None, robots: int) -> Grasps | None:
 
 
 def check_robots(estimate: PayloadEstimate, recording: Recording) -> None:
-    """Check that estimate and recording have the same number of robots.
-
-    Raises:
-        InputError: the numbers differ.
-    """
+    """Refuse an estimate and a recording with different numbers of robots."""
     robots = recording.metadata.robots
     if estimate.robots != robots:
         raise InputError(
@@ -204,11 +191,7 @@ TRUTH = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kg
 
 
 def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = None) -> BodyFacts:
-    """Read the truth beside a simulated recording, in the frames of the estimate if one is given.
-
-    Raises:
-        InputError: the file is missing or invalid, or has another number of robots.
-    """
+    """Read the truth beside a simulated recording, in the frames of the estimate if one is given."""
     path = truth_path(recording)
     values = read_json(path, "the truth beside a simulated recording")
     truth = Fields(values, TRUTH, str(path), optional=("as_built", "effects", "control"))
@@ -233,11 +216,7 @@ def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = 
 
 
 def read_estimate(path: Path) -> PayloadEstimate:
-    """Read an estimate that ``mocobot estimate --out`` wrote.
-
-    Raises:
-        InputError: the file cannot be read or is not a complete estimate.
-    """
+    """Read an estimate that ``mocobot estimate --out`` wrote."""
     values = read_json(path, "an estimate")
     try:
         estimate = PayloadEstimate.from_dict(values)
@@ -293,15 +272,7 @@ FAR_M, FAR_RAD = 0.1, np.deg2rad(15.0)
 
 
 def cad_shape(payload: str | Path, robots: int) -> tuple[Shape | None, Grasps]:
-    """Load the geometry of a payload in {1} and its grasps from CAD.
-
-    Args:
-        payload: name of a shipped payload, or path of a payload MJCF.
-        robots: number of robots that hold it.
-
-    Raises:
-        InputError: the file is not a payload MJCF, or has another number of grasps.
-    """
+    """Load the geometry of a payload (a shipped name or an MJCF) in {1}, and its grasps, one for each robot."""
     root = load_payload(payload)
     frames = grasp_frames(root, str(payload))
     if len(frames) != robots:
@@ -316,16 +287,9 @@ def cad_shape(payload: str | Path, robots: int) -> tuple[Shape | None, Grasps]:
 def drawn_payload(
     payload: str | Path | None, label: str | None, grasps: Grasps, notes: list[str]
 ) -> str | Path | None:
-    """Choose the payload whose CAD is drawn; None means that bars are drawn.
+    """Choose the payload whose CAD is drawn; None means that bars are drawn. Sentences for the viewer go to ``notes``.
 
-    Args:
-        payload: requested name or payload MJCF; None for the payload of the label, if its grasps fit.
-        label: payload label of the recording.
-        grasps: grasps of the payload.
-        notes: list to which sentences for the viewer are appended.
-
-    Raises:
-        InputError: the requested payload does not fit this number of robots.
+    Without a request (a shipped name or an MJCF), it is the payload of the recording's label, if its grasps fit.
     """
     wanted = payload if payload is not None else label if label in payload_names() else None
     if wanted is None:

@@ -85,13 +85,9 @@ def measured_team(
 
     Args:
         recording: one trial.
-        estimate: estimate of the payload.
+        estimate: estimate of the payload, of as many robots.
         payload: name or MJCF of the payload's geometry; None for that of the recording's label, if it fits.
         time_s: time since the first sample [s]; None for the middle of the recording.
-
-    Raises:
-        InputError: the estimate has another number of robots, the rods do not meet, or ``payload`` does not fit these
-            robots.
     """
     recording = as_estimated(recording, estimate)
     meta, notes = recording.metadata, []
@@ -197,15 +193,7 @@ RED = _rgba(colours.FAULT)
 
 
 def team_shot(payload: str | Path, aspect: float = ASPECT) -> Shot:
-    """Describe a picture of a team as designed, at rest, with a payload.
-
-    Args:
-        payload: name of a shipped payload, or path of a payload MJCF.
-        aspect: width over height of the picture.
-
-    Raises:
-        InputError: the payload does not exist, or the robots cannot hold it.
-    """
+    """Describe a picture, ``aspect`` times as wide as high, of a team as designed, at rest, with a payload."""
     scene = build_team(payload)
     model = scene.compile()
     data = mujoco.MjData(model)
@@ -224,16 +212,7 @@ def estimate_shot(
 ) -> Shot:
     """Describe a picture of an estimated team at one instant, with grasp frames, centre of mass and inertia.
 
-    Args:
-        recording: one trial.
-        estimate: estimate of the payload.
-        truth: true payload, drawn beside the estimate.
-        payload: name or MJCF of the payload's geometry; None for that of the recording's label, if it fits.
-        time_s: time since the first sample [s]; None for the middle of the recording.
-        aspect: width over height of the picture.
-
-    Raises:
-        InputError: see ``measured_team``.
+    The ``truth`` is drawn beside the estimate; other arguments as for ``measured_team`` and ``team_shot``.
     """
     team = measured_team(recording, estimate, payload, time_s)
     marks = Marks()
@@ -255,12 +234,7 @@ def diagnosis_shot(
 ) -> Shot:
     """Describe a picture of an estimated team with the causes of a diagnosis in red at their places.
 
-    Args:
-        recording, estimate, payload, time_s, aspect: as for ``estimate_shot``.
-        causes: causes from ``discrepancy.result.read.read_diagnosis``.
-
-    Raises:
-        InputError: see ``measured_team``; or a cause names a robot that the recording does not have.
+    Arguments as for ``estimate_shot``. A cause must not name a robot that the recording does not have.
     """
     team = measured_team(recording, estimate, payload, time_s)
     for cause in causes:

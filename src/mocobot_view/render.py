@@ -64,16 +64,9 @@ def render(
 
 
 def render_shots(shots: Sequence[Shot], width: int = 1600, height: int = 1000) -> list[Picture] | str:
-    """Render several pictures in one process.
+    """Render several pictures (height, width, 3) in one process, or return one sentence that says why there are none.
 
     The environment variable MUJOCO_GL selects the renderer; without it, EGL and then OSMesa are tried.
-
-    Args:
-        shots: pictures to render, K entries.
-        width, height: size [px].
-
-    Returns:
-        K pictures of shape (height, width, 3), or one sentence that explains why there are none.
     """
     if not shots:
         return []

@@ -53,10 +53,8 @@ class Balance:
 def filtered(recording: Recording, notes: list[str]) -> GraspData | None:
     """Compute twists and wrenches as the estimator does, with times from the first sample of the recording.
 
-    The result is decimated to ``FILTERED_HZ``; the filter reduces frequencies that would alias to 1e-4.
-
-    Returns:
-        Filtered data, or None if the recording is too short; ``notes`` then states the reason.
+    The result is decimated to ``FILTERED_HZ``; the filter reduces frequencies that would alias to 1e-4. None if the
+    recording is too short; ``notes`` then states the reason.
     """
     try:
         data = process_recording(recording, CUTOFF_HZ)
@@ -126,15 +124,10 @@ def replay_trial(
     """Compute the data of the replay of a recording.
 
     Args:
-        recording: one trial.
-        name: name of the replay.
+        recording, name: one trial, and the name of its replay.
         estimate: estimate of the payload; None to estimate from this recording, as far as possible.
-        truth: true payload.
-        diagnosis: diagnosis of these robots.
+        truth, diagnosis: true payload, and diagnosis of these robots.
         payload: name or MJCF of the payload's geometry; None for that of the recording's label.
-
-    Raises:
-        InputError: estimate, diagnosis or ``payload`` do not fit the number of robots.
     """
     recording = as_estimated(recording, estimate)
     meta = recording.metadata

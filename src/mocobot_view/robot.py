@@ -61,14 +61,9 @@ def robot_shapes(design: OmnidDesign) -> RobotShapes:
 
 
 def fit_design(model: mujoco.MjModel, design: OmnidDesign, prefix: str = "") -> None:
-    """Change the lengths of the shipped Omnid in a model to those of another design, for drawing only.
+    """Change the lengths of the shipped Omnid, whose names have a prefix, to those of another design, for drawing only.
 
     Masses and inertias do not change.
-
-    Args:
-        model: model that contains the shipped Omnid.
-        design: design with the wanted lengths.
-        prefix: prefix of the Omnid's names in the model.
     """
     shipped = omnid_design()
     wider = design.base_radius_m - shipped.base_radius_m
@@ -113,17 +108,10 @@ class BodyMotion:
 
 
 def body_motion(phi: Array, theta: Array, arms: Arms) -> BodyMotion:
-    """Compute the motion of all bodies from the joint angles.
+    """Compute the motion of all bodies from true phi and (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3) each.
 
-    A link rotates by phi about its negative driven axis, the rod by Ry(swing) Rz(tilt) relative to the link.
-
-    Args:
-        phi: true driven angles [rad], shape (Q, N, 3).
-        theta: true gimbal angles (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
-        arms: robot parameters, calibrated or as designed.
-
-    Raises:
-        InputError: the rods do not meet at some sample.
+    A link rotates by phi about its negative driven axis, the rod by Ry(swing) Rz(tilt) relative to the link. InputError
+    if the rods do not meet at some sample.
     """
     wrist, swing, tilt = rod_angles(phi, arms)
     turns = {}
@@ -136,21 +124,11 @@ def body_motion(phi: Array, theta: Array, arms: Arms) -> BodyMotion:
 
 
 def rod_angles(phi: Array, arms: Arms) -> tuple[Array, Array, Array]:
-    """Solve the forward kinematics of the arms, including the angles of the rods.
+    """Solve the forward kinematics of the arms from true driven angles [rad], shape (..., N, 3), as ``body_motion``.
 
-    From the knee, the rod points in the direction Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt,
-    -sin swing cos tilt) of the link's frame.
-
-    Args:
-        phi: true driven angles [rad], shape (..., N, 3).
-        arms: robot parameters, calibrated or as designed.
-
-    Returns:
-        Wrist positions in the frames of the arms [m], and swing and tilt of each leg's rod relative to its link [rad],
-        each of shape (..., N, 3).
-
-    Raises:
-        InputError: the rods do not meet at some sample.
+    Returns wrist positions in the frames of the arms [m], and swing and tilt of each leg's rod relative to its link
+    [rad], each of shape (..., N, 3). From the knee, the rod points in the direction Ry(swing) Rz(tilt) e_x = (cos swing
+    cos tilt, sin tilt, -sin swing cos tilt) of the link's frame.
     """
     legs = leg_geometry(phi, arms)
     length = np.broadcast_to(np.asarray(arms.rod_length_m), legs.h.shape)[..., None]

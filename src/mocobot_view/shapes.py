@@ -149,12 +149,8 @@ def body_shape(
     """Collect the visible geometry of bodies without relative motion; None if there is none.
 
     Planes, height fields and signed distance fields are left out. The colour of the material replaces textures.
-
-    Args:
-        model: compiled model.
-        bodies: body ids.
-        frame: position [m], (3,), and rotation, (3, 3), of the frame of the result at ``qpos0``; None for the frame of
-            the first body.
+    ``frame`` is position (3,) [m] and rotation (3, 3) of the frame of the result at ``qpos0``; by default that of the
+    first body.
     """
     data = posed(model)
     origin, R = frame or (data.xpos[bodies[0]].copy(), data.xmat[bodies[0]].reshape(3, 3).copy())

@@ -432,14 +432,7 @@ def log_replay(
     progress: Callable[[int], object] | None = None,
     tab: str | None = None,
 ) -> None:
-    """Log trials side by side, each below a root with its name, on one timeline that starts at 0.
-
-    Args:
-        stream: target stream.
-        trials: trials to show.
-        progress: called with 1 after each trial.
-        tab: name of the initial tab (see ``blueprint``).
-    """
+    """Log trials side by side, each below a root with its name, on one timeline from 0; ``tab`` as in ``blueprint``."""
     begin(stream, blueprint(trials, tab), [trial.name for trial in trials])
     for trial in trials:
         stream.log(
@@ -471,11 +464,7 @@ def has_display() -> bool:
 
 
 def check_enabled() -> None:
-    """Check that the environment does not turn Rerun off, which would silently discard all data.
-
-    Raises:
-        InputError: Rerun is turned off.
-    """
+    """Refuse an environment that turns Rerun off, which would silently discard all data."""
     if not rr.is_enabled(new_stream()):
         raise InputError(
             f"RERUN is {os.environ.get('RERUN', '')!r} in the environment, which turns Rerun off; unset it"
@@ -483,20 +472,12 @@ def check_enabled() -> None:
 
 
 def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = None) -> None:
-    """Write a replay as an .rrd file; see ``save_content``.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write a replay as an .rrd file; see ``save_content``."""
     save_content(lambda stream: log_replay(stream, trials, progress), path)
 
 
 def save_content(content: Content, path: Path) -> None:
-    """Write the data that ``content`` logs as an .rrd file; it replaces an earlier file only once it is complete.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write the data that ``content`` logs as an .rrd file; it replaces an earlier file only once it is complete."""
     with whole_file(path) as temporary:
         temporary.touch(exist_ok=False)  # the SDK's message would name the temporary file
         stream = new_stream()
@@ -511,11 +492,7 @@ def save_content(content: Content, path: Path) -> None:
 
 
 def show_content(content: Content) -> None:
-    """Show the data that ``content`` logs in a new or open viewer; return once the viewer has all data.
-
-    Raises:
-        InputError: the viewer does not start.
-    """
+    """Show the data that ``content`` logs in a new or open viewer; return once the viewer has all data."""
     stream = new_stream()
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     try:
@@ -532,11 +509,7 @@ def show_content(content: Content) -> None:
 def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
     """Serve the data that ``content`` logs to browsers, until the process or the returned stream ends.
 
-    Returns:
-        Stream, which the caller must keep, and address to open.
-
-    Raises:
-        InputError: the servers do not start, for example because their ports are in use.
+    Returns the stream, which the caller must keep, and the address to open.
     """
     stream = new_stream()
     try:
@@ -556,11 +529,7 @@ def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
 
 
 def _check_complete(path: Path) -> None:
-    """Read the written file back, because the SDK writes in the background and only logs its errors.
-
-    Raises:
-        OSError: the file is not complete.
-    """
+    """Read the written file back, because the SDK writes in the background and only logs errors; OSError if cut off."""
     try:
         with warnings.catch_warnings():  # a missing footer is only a warning
             warnings.simplefilter("ignore")

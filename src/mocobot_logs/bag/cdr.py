@@ -133,11 +133,7 @@ class MessageType:
 
 
 def message_type(topic: Topic, bag: str) -> MessageType:
-    """Return the type of a topic's messages as the bag defines it, else as ROS 2 does.
-
-    Raises:
-        InputError: messages are not CDR, or the type is neither defined in the bag nor known.
-    """
+    """Return the type of a topic's messages as the bag defines it, else as ROS 2 does."""
     where = f"{bag}: topic {printable(topic.name)}"
     if topic.encoding != "cdr":
         raise InputError(
@@ -159,11 +155,7 @@ def type_name(topic: Topic) -> str:
 
 
 def string_of(message: bytes, where: str) -> str:
-    """Return the text of a std_msgs/msg/String.
-
-    Raises:
-        InputError: the message is not readable.
-    """
+    """Return the text of a std_msgs/msg/String."""
     try:
         return get_typestore(Stores.LATEST).deserialize_cdr(message, STRING).data  # type: ignore[attr-defined]
     except Exception as error:  # the library raises its own type, and others for damaged bytes
@@ -241,16 +233,9 @@ class Walk:
     """
 
     def __init__(self, message: bytes, kind: MessageType, wanted: set[str], names: bool) -> None:
-        """Parse a message with its encapsulation.
+        """Parse a message with its encapsulation; CdrError if it does not match its type, or is no plain CDR.
 
-        Args:
-            message: the message.
-            kind: its type.
-            wanted: dotted paths of numbers or of arrays of numbers.
-            names: whether to collect the strings of a field ``name`` or ``joint_names``.
-
-        Raises:
-            CdrError: the message does not match its type, or its encapsulation is not plain CDR.
+        ``wanted`` are dotted paths of numbers or of arrays of numbers; ``names`` says whether to collect ``joints``.
         """
         if len(message) < 4:
             raise CdrError(f"it is cut off, at {len(message)} bytes")
@@ -359,11 +344,7 @@ class Layout:
     """
 
     def __init__(self, message: bytes, kind: MessageType, selectors: Sequence[Selector], stamp: bool) -> None:
-        """Find the positions in one message.
-
-        Raises:
-            CdrError: the message does not match its type.
-        """
+        """Find the positions in one message; CdrError if it does not match its type."""
         names = any(selector.joint is not None for selector in selectors)
         arrays = {re.sub(r"\[\d+\]$", "", selector.field) for selector in selectors}
         time = {_SEC, _NANOSEC} if stamp else set()
@@ -409,11 +390,7 @@ class Layout:
         return (rows[:, self._at] == self._fixed).all(axis=1)
 
     def read(self, rows: NDArray[np.uint8]) -> tuple[Stamps, Array]:
-        """Read messages of this layout: stamps [ns] (0 without a header), and numbers, NaN where lacking.
-
-        Raises:
-            CdrError: the nanoseconds of a stamp are 1e9 or more.
-        """
+        """Return stamps [ns] (0 without a header) and numbers, NaN where lacking; CdrError for a faulty stamp."""
         table = np.ascontiguousarray(rows).view(self._record)[:, 0]
         stamps = np.zeros(len(rows), np.int64)
         if _SEC in (self._record.names or ()):

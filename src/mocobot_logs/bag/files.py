@@ -75,15 +75,9 @@ class BagFiles:
     def blocks(
         self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
-        """Yield messages of some topics in the order of the files; topics without messages in a block are left out.
+        """Yield messages of some topics in the order of the files, about ``block_bytes`` at a time.
 
-        Args:
-            topics: names of the topics.
-            advance: called with the bytes read since the last call.
-            block_bytes: approximate size of a block, where the file allows a choice.
-
-        Raises:
-            InputError: a file is damaged.
+        Topics without messages in a block are left out. ``advance`` is called with the bytes read since the last call.
         """
         self._unpacked.size = self._on_disk
         for storage in self._storages:

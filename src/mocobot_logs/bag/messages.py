@@ -114,11 +114,7 @@ class UnpackError(ValueError):
 
 
 def unpack(data: bytes, compression: str, size: int) -> bytes:
-    """Unpack a chunk that claims ``size`` bytes; ``compression`` is "", "zstd" or "lz4", as in MCAP.
-
-    Raises:
-        UnpackError: unknown compression, damaged data, or another size.
-    """
+    """Unpack a chunk that claims ``size`` bytes, compressed by "", "zstd" or "lz4" as in MCAP. Raises UnpackError."""
     if size > CHUNK_BYTES:
         raise UnpackError(f"claims {size} bytes; chunks of at most {CHUNK_BYTES >> 20} MiB are read")
     try:
@@ -142,11 +138,7 @@ def unpack(data: bytes, compression: str, size: int) -> bytes:
 
 
 def unpack_message(data: bytes) -> bytes:
-    """Unpack one individually compressed message (zstd).
-
-    Raises:
-        UnpackError: the message is damaged, or larger than ``MESSAGE_BYTES``.
-    """
+    """Unpack one individually compressed message (zstd) of at most ``MESSAGE_BYTES``. Raises UnpackError."""
     try:
         size = zstandard.frame_content_size(data)
         unpacked = _zstd(data, MESSAGE_BYTES if size < 0 else min(size, MESSAGE_BYTES))
@@ -158,17 +150,7 @@ def unpack_message(data: bytes) -> bytes:
 
 
 def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], unpacked: Unpacked) -> None:
-    """Unpack a file of a bag that was compressed as a whole (zstd).
-
-    Args:
-        source: packed file.
-        target: unpacked file.
-        heads: allowed first bytes of the unpacked file.
-        unpacked: counts the unpacked bytes.
-
-    Raises:
-        InputError: the file is damaged, does not begin with one of ``heads``, is too large, or the disk is full.
-    """
+    """Unpack a file of a bag that was compressed as a whole (zstd), if it then begins with one of ``heads``."""
     done = 0
     try:
         with (

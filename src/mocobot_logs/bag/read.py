@@ -73,8 +73,7 @@ class RowAligner:
         """Initialise without samples.
 
         Args:
-            where: name of the robot in messages.
-            names: names of its topics.
+            where, names: names of the robot and of its topics in messages.
             periods_ns: median periods of the topics [ns]; the first that is close to the shortest sets the rows.
             columns: columns of a row that each topic fills.
             held: whether each column of a row is held; None if none is.
@@ -416,11 +415,7 @@ class BagSource:
         self.metadata = self._read_metadata()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples robot by robot, see ``LogSource.chunks``.
-
-        Raises:
-            InputError: the bag is damaged, a message does not match its type, or no message holds what the map names.
-        """
+        """Yield samples robot by robot, see ``LogSource.chunks``."""
         readers = {
             name: _Reader(topic, self._clock, unset=name in self._unset)
             for name, topic in self._topics.items()
@@ -596,14 +591,9 @@ class BagSource:
 
 
 def open_bag(path: Path, log_map: LogMap | None = None) -> BagSource:
-    """Open a bag and find its topics, robots and channels.
+    """Open a folder with ``metadata.yaml``, or a single .mcap or .db3 file.
 
-    Args:
-        path: a folder with ``metadata.yaml``, or a single .mcap or .db3 file.
-        log_map: the map, or None to choose between ``mocobot-ros2`` and ``omnid-ros2`` by the joints' names.
-
-    Raises:
-        InputError: there is no bag, it is damaged, or it lacks what the map names.
+    Without a map, the joints' names decide between ``mocobot-ros2`` and ``omnid-ros2``.
     """
     return BagSource(Path(path), log_map)
 

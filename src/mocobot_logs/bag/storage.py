@@ -67,16 +67,7 @@ class McapBag:
     """One MCAP file of a bag."""
 
     def __init__(self, path: Path, name: str, unpacked: Unpacked) -> None:
-        """Find the topics in the summary or, without one, in the whole file.
-
-        Args:
-            path: the file.
-            name: its name in messages.
-            unpacked: counts the unpacked bytes of chunks.
-
-        Raises:
-            InputError: the file is not a complete MCAP file, or it is damaged.
-        """
+        """Find the topics in the summary or, without one, in the whole file; ``unpacked`` counts bytes of chunks."""
         self._path, self.name, self._unpacked = path, name, unpacked
         self._channels: dict[int, Topic] = {}
         self._schemas: dict[int, Schema] = {}
@@ -325,11 +316,7 @@ class SqliteBag:
     """One SQLite file of a bag."""
 
     def __init__(self, path: Path, name: str) -> None:
-        """Find the topics.
-
-        Raises:
-            InputError: the file is not a complete SQLite file with the tables of a bag, or it is damaged.
-        """
+        """Find the topics."""
         self.path, self.name = path, name
         self._check_file()
         with self._connected() as connection:

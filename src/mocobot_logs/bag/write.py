@@ -133,17 +133,13 @@ def write_bag(
     """Write a recording as a ROS 2 bag; at joint level samples are bit-exact, times exact to the nanosecond.
 
     Args:
-        recording: the recording.
+        recording: a recording with times in [0, 2^31) s.
         path: a single file if it ends in .mcap or .db3 (an existing one is replaced once the new one is complete),
             else a new folder with ``metadata.yaml``.
         level: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
         storage: "mcap" or "sqlite3".
         advance: called with the number of samples written since the last call.
         replace_bag: whether to replace a bag's folder that this program wrote, once the new one is complete.
-
-    Raises:
-        InputError: the target exists or cannot be written, times are not within [0, 2^31) s, or level or storage is
-            not one of the above.
     """
     path = Path(path)
     for value, allowed, what in ((level, get_args(Level), "level"), (storage, get_args(Storage), "storage")):

@@ -167,33 +167,14 @@ def label(quantity: str, joint: str) -> str:
 
 
 def read_joint_map(path: Path | str, joints: Sequence[str], slides: Sequence[bool]) -> JointMap:
-    """Read a map from its file for a model's joints.
-
-    Args:
-        path: TOML file.
-        joints: names of the model's joints.
-        slides: whether each joint slides.
-
-    Raises:
-        InputError: there is no such file, it is not TOML, or it is not a valid map.
-    """
+    """Read a map from its TOML file for a model's joints; see ``parse_joint_map``."""
     return parse_joint_map(read_toml_map(Path(path)), str(path), joints, slides)
 
 
 def parse_joint_map(
     values: Mapping[str, Any], name: str, joints: Sequence[str], slides: Sequence[bool]
 ) -> JointMap:
-    """Check and parse the TOML values of a map.
-
-    Args:
-        values: the parsed TOML.
-        name: name of the map in messages.
-        joints: names of the model's joints.
-        slides: whether each joint slides.
-
-    Raises:
-        InputError: a key is unknown or missing, a value is not allowed, or the joints differ from the model's.
-    """
+    """Check and parse the TOML values of a map for a model's joints; ``slides`` tells which of them slide."""
     where = f"map {name}"
     check_version(values, where)
     top = Fields(values, ("joints", "channels"), where, _OPTIONAL)

@@ -8,12 +8,7 @@ from collections.abc import Mapping
 
 
 def with_control(text: str, numbers: Mapping[str, Mapping[str, float]]) -> str | None:
-    """Replace keys under ``[control]`` and keep all else; None where the map has them elsewhere.
-
-    Args:
-        text: a valid map.
-        numbers: values by key and joint.
-    """
+    """Replace keys under ``[control]`` by numbers (by key and joint); None where the map has them elsewhere."""
     told = tomllib.loads(text)
     if any(key in own for own in told.get("joint", {}).values() for key in numbers):
         return None

@@ -51,32 +51,14 @@ _INSIDE = 0.1  # share of a period: an instant this close to a sample does not c
 
 
 def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = None) -> LogSource:
-    """Open a log of any format that ``open_log`` knows, by a map.
-
-    Args:
-        path: the log.
-        log_map: its map.
-        episode: episode of a LeRobot dataset.
-
-    Raises:
-        InputError: there is no such log, or the map does not suit it.
-    """
+    """Open a log of any format that ``open_log`` knows, by a map."""
     return open_log(path, log_map.of_source(), episode)
 
 
 def read_joint_log(
     source: LogSource, log_map: JointMap, advance: Callable[[int], object] = lambda _: None
 ) -> list[JointLog]:
-    """Read a log and return its parts between long gaps; most logs have one part.
-
-    Args:
-        source: the log.
-        log_map: its map.
-        advance: called with the progress, in the source's units.
-
-    Raises:
-        InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
-    """
+    """Read a log and return its parts between long gaps; most logs have one part."""
     log = collect(source, advance)
     return joint_logs_of(source.name, log.streams[0], log_map, log.notes)
 
@@ -84,16 +66,9 @@ def read_joint_log(
 def joint_logs_of(
     name: str, samples: Samples, log_map: JointMap, notes: Sequence[str] = ()
 ) -> list[JointLog]:
-    """Return the parts between long gaps of a log in memory.
+    """Return the parts between long gaps of a log in memory, whose channels are in the map's order.
 
-    Args:
-        name: path of the log; the map may set gains by its last part.
-        samples: rows of the log, channels in the map's order.
-        log_map: map of the log.
-        notes: sentences on how the log was read.
-
-    Raises:
-        InputError: see ``read_joint_log``.
+    The map may set gains by the last part of the path ``name``; ``notes`` say how the log was read.
     """
     samples, log_map, without = _with_values(name, samples, log_map)
     held = np.array(log_map.held, dtype=bool)
@@ -116,11 +91,7 @@ def joint_logs_of(
 
 
 def _with_values(name: str, samples: Samples, log_map: JointMap) -> tuple[Samples, JointMap, list[str]]:
-    """Leave out channels without a value in any row; return a sentence for each quantity. Positions stay.
-
-    Raises:
-        InputError: what is left does not say what the drives give.
-    """
+    """Leave out channels without a value in any row; return a sentence for each quantity. Positions stay."""
     empty = empty_channels(samples.values, log_map)
     if not empty or not len(samples.values):
         return samples, log_map, []
@@ -394,14 +365,9 @@ ONE_TURN = 1.01
 
 
 def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
-    """Remove jumps by a full turn from positions.
+    """Remove jumps by a full turn from positions [rad], shape (q, C), NaN where a row lacks one.
 
-    Args:
-        values: positions [rad], shape (q, C), NaN where a row lacks one.
-        names: names of the C channels.
-
-    Returns:
-        The positions, and a sentence for each channel that changed.
+    Returns the positions, and a sentence for each of the C named channels that changed.
     """
     out, notes = values, []
     for c, name in enumerate(names):

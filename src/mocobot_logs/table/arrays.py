@@ -103,11 +103,7 @@ class ArrayTable(Table):
     stored_bytes: int
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows of all columns in step, see ``Table.blocks``.
-
-        Raises:
-            InputError: the file is damaged, or an array holds no numbers or has another number of rows.
-        """
+        """Yield rows of all columns in step, see ``Table.blocks``."""
         names = list(dict.fromkeys([*wanted.clocks, *wanted.columns]))
         rows = self._rows(names) if names else 0
         at_a_time = rows_at_a_time(sum(prod(self.arrays[name].row_shape) for name in names))
@@ -166,11 +162,7 @@ class NpzTable(ArrayTable):
     noun, kind = "array", "NPZ archive"
 
     def __init__(self, path: Path, name: str) -> None:
-        """Read the directory of the archive and the header of every array.
-
-        Raises:
-            InputError: the archive is damaged, or a header disagrees with the size of its entry.
-        """
+        """Read the directory of the archive and the header of every array."""
         self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
         with self._opened() as archive:
             self._take(self._headers(archive))
@@ -282,11 +274,7 @@ class MatTable(ArrayTable):
     noun, kind = "variable", "MATLAB file"
 
     def __init__(self, path: Path, name: str) -> None:
-        """Read the tags, sizes and names of all variables.
-
-        Raises:
-            InputError: the file is damaged, cut off, of another version, or holds no matrix of real numbers.
-        """
+        """Read the tags, sizes and names of all variables."""
         self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
         with told_in_one_sentence(name, self.kind), open_input(path) as file:
             header = file.read(_MAT_HEADER)

@@ -62,11 +62,7 @@ class ParquetTable(Table):
         self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows in the order of the file, see ``Table.blocks``.
-
-        Raises:
-            InputError: the file is damaged, or a column holds no numbers.
-        """
+        """Yield rows in the order of the file, see ``Table.blocks``."""
         names = list(dict.fromkeys([*wanted.columns, *wanted.clocks]))
         for name in names:
             self._check_type(name, time=name in wanted.clocks)
@@ -237,11 +233,7 @@ class LeRobotTable(ParquetTable):
         self.aliases: Mapping[str, tuple[str, tuple[int, ...]]] = _aliases(info["features"], self.shapes)
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows of the episode, see ``Table.blocks``; rounded timestamps are replaced by ``frame_index / fps``.
-
-        Raises:
-            InputError: a file is damaged, or a column holds no numbers.
-        """
+        """Yield rows of the episode, see ``Table.blocks``; rounded timestamps are replaced by ``frame_index / fps``."""
         for block in super().blocks(replace(wanted, columns=(*wanted.columns, FRAME)), advance):
             if TIMESTAMP in wanted.clocks:
                 stamp, given = block.clocks[TIMESTAMP]
@@ -318,11 +310,7 @@ def _template(data_path: Any, name: str) -> str:
 
 
 def episodes_of(path: Path) -> list[int]:
-    """Return the episodes of a LeRobot dataset, or of one of its files.
-
-    Raises:
-        InputError: it cannot be read, or has none.
-    """
+    """Return the episodes of a LeRobot dataset, or of one of its files; at least one."""
     root, name = dataset_root(path), str(path)
     if root is None or not path.is_dir():
         return _every({path: None}, name)

@@ -62,15 +62,7 @@ class Table(ABC):
 
     @abstractmethod
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows in the order of the file.
-
-        Args:
-            wanted: columns to read.
-            advance: called with the progress since the last call.
-
-        Raises:
-            InputError: the file is damaged, or a column holds no numbers.
-        """
+        """Yield rows in the order of the file; ``advance`` is called with the progress since the last call."""
 
 
 @dataclass(frozen=True)
@@ -105,11 +97,7 @@ class TableSource:
         self._check_shared()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples robot by robot, see ``LogSource.chunks``.
-
-        Raises:
-            InputError: the table is damaged, or a column holds no numbers.
-        """
+        """Yield samples robot by robot, see ``LogSource.chunks``."""
         maps = [self._map.channels(robot) for robot in range(1, self.robots + 1)]
         below = [name for name in self._below if name is not None]
         columns = tuple(

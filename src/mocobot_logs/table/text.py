@@ -34,18 +34,10 @@ Given = NDArray[np.bool_]
 
 
 def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
-    """Convert integers or floats to stamps; NaN means no stamp.
+    """Convert integers or floats to stamps [ns], 0 where missing (NaN), and which are present; each of shape (q,).
 
-    Args:
-        values: times in any unit, shape (q,).
-        unit_ns: nanoseconds per unit; None if the map's unit is "iso".
-        where, row: file and column, and row of the first value, for error messages.
-
-    Returns:
-        Stamps [ns], 0 where missing, and which are present; each of shape (q,).
-
-    Raises:
-        InputError: a time is beyond 292 years, or the map's unit is "iso".
+    ``unit_ns`` is nanoseconds per unit, None if the map's unit is "iso"; ``where`` and ``row`` locate the first value
+    in messages. Times beyond 292 years are refused.
     """
     unit_ns = _unit(unit_ns, where)
     if values.dtype.kind in "iu":
@@ -299,11 +291,7 @@ class CsvTable(Table):
         self.shapes: Mapping[str, tuple[int, ...]] = dict.fromkeys(self._names, ())
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows in the order of the file, see ``Table.blocks``.
-
-        Raises:
-            InputError: a row has too few or too many cells, or a cell is not a number.
-        """
+        """Yield rows in the order of the file, see ``Table.blocks``."""
         columns, clocks = wanted.columns, wanted.clocks
         index = {name: self._index(name) for name in (*columns, *clocks)}
         types = {f"{index[name]}": pa.float64() for name in columns}
