@@ -18,11 +18,9 @@ from mocobot_logs.log import NS, Stamps
 
 UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}
 """Units of a team's channels, by the first three letters of their names."""
-LISTED = 100
-"""Number of stuck and clipped stretches per channel that are kept; all are counted."""
+LISTED = 100  # number of stuck and clipped stretches per channel that are kept; all are counted
 
-ABSURD = 1e9
-"""Smallest absolute value that no sensor reads, in any unit [SI]."""
+ABSURD = 1e9  # smallest absolute value that no sensor reads, in any unit [SI]
 _FAR = 1000.0  # times the span of the other samples, which counts as at least 1 SI unit
 _FEW = 0.02  # share of the samples on either side that may be outliers
 _LAG_GAIN = 70.0  # variance of a fourth difference over that of white noise: 1 + 16 + 36 + 16 + 1
@@ -31,8 +29,7 @@ _MAD = 0.6744897501960817  # median of |x| of a standard normal distribution
 STUCK_S = 0.2
 """Shortest constant stretch of a stuck channel [s]. Measured on trials of 25 s: 0.1 s moves an estimate by up to 3 of
 its standard errors. 0.2 s moves it by up to 16 (inertia 2 %, grasps 4 mm). 2 s spoils it (mass 1 %, grasps 10 cm)."""
-CLIPPED_SAMPLES = 5
-"""Shortest run at an extreme that counts as clipped."""
+CLIPPED_SAMPLES = 5  # shortest run at an extreme that counts as clipped
 _MOVES = 0.05  # share of its range by which another channel must move
 _JUMP = 4.0  # times the usual large step between samples
 _CORNER = 0.3  # of the usual large step
@@ -41,16 +38,13 @@ _CHANCE = 1e-3  # probability per log that noise alone makes such a run
 _CLEAR = 1.5  # quantisation steps; a slow channel approaches its extreme one step at a time
 _SPEED_S, _AT_SPEED = 0.1, 0.5  # interval over which speed is taken; share of the usual high speed
 
-ABOVE_HZ = 10.0
-"""Lowest frequency of an oscillation [Hz]; no motion of an Omnid is that fast."""
+ABOVE_HZ = 10.0  # lowest frequency of an oscillation [Hz]; no motion of an Omnid is that fast
 NOISES = 10.0
 """Least amplitude of an oscillation over the channel's noise; spectral lines of sensors are weaker."""
 STEPS = 10.0
 """Least amplitude of an oscillation over the quantisation step; a slow joint moves in stairs of one step."""
-SHARE = 0.7
-"""Least share of one spectral line in all fast power; a bump has no such line."""
-WINDOW_S, WINDOW_ROWS = 2.5, 10_000
-"""Length of a spectrogram's window [s] and its largest number of rows."""
+SHARE = 0.7  # least share of one spectral line in all fast power; a bump has no such line
+WINDOW_S, WINDOW_ROWS = 2.5, 10_000  # length of a spectrogram's window [s] and its largest number of rows
 _WIDTH = 3  # frequency bins on either side of a line that belong to it, in a Hann window
 
 

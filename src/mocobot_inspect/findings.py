@@ -24,19 +24,15 @@ from mocobot_logs.log import NS, repeated
 
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]
 
-JITTERY = 0.2
-"""Smallest rms jitter, relative to the period, that is reported."""
+JITTERY = 0.2  # smallest rms jitter, relative to the period, that is reported
 SAME_RATE = 1e-3
-EARLY_S = 1.0
-"""Smallest difference [s] between the robots' first or last stamps that is reported."""
+EARLY_S = 1.0  # smallest difference [s] between the robots' first or last stamps that is reported
 RECORDER_S = 1.0
 """Smallest spread [s] of the recorder's lead over the stamps that is reported: it means mixed clocks."""
 MARGIN = 0.02
 """A joint may leave its range by this share of it plus this many rad or m, since calibration shifts zeros."""
-COARSE = 0.005
-"""Largest position step, as a share of a joint's motion, that is not reported as coarse."""
-SATURATED = 0.98
-"""Share of the drive's limit above which a torque counts as saturated."""
+COARSE = 0.005  # largest position step, as a share of a joint's motion, that is not reported as coarse
+SATURATED = 0.98  # share of the drive's limit above which a torque counts as saturated
 LATE = 1.1
 """Smallest ratio of the torques' unexplained shares, without and with the delay, at which a delay is reported."""
 FACTORS = {
@@ -50,8 +46,7 @@ FACTORS = {
     2.0 * np.pi: "radians, taken for turns",
 }
 """Gains that wrong units cause."""
-CLOSE = 0.05
-"""Relative distance within which a gain counts as equal to a factor, or to 1."""
+CLOSE = 0.05  # relative distance within which a gain counts as equal to a factor, or to 1
 _NAMED = 4  # most channels that a sentence names
 _TURN = 2 * np.pi
 _ONE_TURN = 0.01  # a range within this share of a full turn means an encoder that wraps around

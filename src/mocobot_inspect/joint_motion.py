@@ -22,15 +22,11 @@ CUTOFF_HZ, CUTOFF_SHARE = 10.0, 0.1
 rate."""
 MOST_ROWS = 1500
 """Largest number of samples used: inverse dynamics takes 20 us a sample, and about fifty mistakes are tried."""
-MOVES = 1e-6
-"""Smallest range that counts as motion [rad or m]."""
-NOISES = 12.0
-"""Smallest range that counts as motion, in standard deviations of the low-passed noise."""
+MOVES = 1e-6  # smallest range that counts as motion [rad or m]
+NOISES = 12.0  # smallest range that counts as motion, in standard deviations of the low-passed noise
 
-LONGEST_S = 0.1
-"""Longest delay that is searched [s]."""
-FOLLOWS = 0.8
-"""Least correlation with the motion at which a channel counts as following it."""
+LONGEST_S = 0.1  # longest delay that is searched [s]
+FOLLOWS = 0.8  # least correlation with the motion at which a channel counts as following it
 _UNKNOWN_S, _UNKNOWN = 2e-3, 0.2
 """Largest standard error of a known delay: the larger of this time [s] and this share of a period."""
 _APART, _GRID = 3.0, 0.02

@@ -41,14 +41,11 @@ DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
 Friction can hide an exchange of whole joints, so that none is suspected. Measured on a real arm: undoing it lowers
 the misfit 7 to 12 times.
 """
-SAME = 2.0
-"""Ratio of the products of all joints' misfits below which two mistakes cannot be distinguished."""
-WORTH = 0.03
-"""Misfit above which a payload is tried."""
+SAME = 2.0  # ratio of the products of all joints' misfits below which two mistakes cannot be distinguished
+WORTH = 0.03  # misfit above which a payload is tried
 WRONG_SCALE = 8.0
 """Largest gain of the model's torque, and inverse of the smallest, that wrong masses can explain."""
-SHOWS = 0.3
-"""Least share of a torque's variance that the model must explain for its gain to be known."""
+SHOWS = 0.3  # least share of a torque's variance that the model must explain for its gain to be known
 SLOW = 0.4
 """Share of a joint's rms speed; below it Coulomb friction is undetermined, and leads or lags by milliseconds."""
 _FLOOR = 1e-4  # added to a misfit before its logarithm

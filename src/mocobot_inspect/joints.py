@@ -26,10 +26,8 @@ from mocobot_logs.joints.joint_map import COMMANDS, EFFORTS, POSITIONS, VELOCITI
 from mocobot_logs.joints.read import joint_logs_of
 from mocobot_logs.log import LogSource, Samples, collect
 
-LEAST_ROWS = 50
-"""Least number of samples of smooth motion that are analysed."""
-WORDS = (8, 10, 12, 16, 24, 32)
-"""Word lengths [bits] of numbers that may have lost their sign."""
+LEAST_ROWS = 50  # least number of samples of smooth motion that are analysed
+WORDS = (8, 10, 12, 16, 24, 32)  # word lengths [bits] of numbers that may have lost their sign
 EMPTY = 0.02
 """Largest share of such a number's samples in the middle half of its range; wrapped numbers lie near its ends."""
 _NOISES, _MOVES = 4.0, 0.05  # a velocity is motion above this multiple of its noise and this share of its rms

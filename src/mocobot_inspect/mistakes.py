@@ -95,8 +95,7 @@ UNITS: dict[Level, dict[Kind, tuple[tuple[str, float], ...]]] = {
     "wrist": {"theta": ANGLES, "position": LENGTHS, "effort": FORCES},
 }
 """Units in words, and factors from the logged number to SI."""
-COUNTS_FROM_RAD = 50.0
-"""Angle above which encoder counts are tried as the unit [rad]."""
+COUNTS_FROM_RAD = 50.0  # angle above which encoder counts are tried as the unit [rad]
 COUNT_BITS = tuple(range(8, 25))
 
 
@@ -183,8 +182,7 @@ def _rearranged_words(
 
 # Columns of others
 
-MOST_AT_ONCE = 3
-"""Largest number of robots in a cycle; cycles are tried in teams of at most one robot more."""
+MOST_AT_ONCE = 3  # largest number of robots in a cycle; cycles are tried in teams of at most one robot more
 
 
 def swapped_robots(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:

@@ -20,8 +20,7 @@ from mocobot_inspect.signals import CUTOFF_HZ, RATE_HZ, TRIM_S
 from mocobot_logs.log import Level
 
 QUANTITIES = ("grasps", "mass", "centre of mass", "inertia")
-AXES = ("roll", "pitch", "yaw")
-"""Rotation about x, y and z of {1}."""
+AXES = ("roll", "pitch", "yaw")  # rotation about x, y and z of {1}
 _HARDLY = 0.1  # of the rotation about the axis with most motion
 _ALONG = np.cos(np.deg2rad(20.0))
 

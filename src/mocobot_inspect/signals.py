@@ -22,8 +22,7 @@ KINDS: tuple[Kind, ...] = ("position", "theta", "effort")
 
 RATE_HZ = 100.0
 CUTOFF_HZ = 5.0
-TRIM_S = 1.0
-"""Time dropped at either end [s]; the filter's transients decay as exp(-pi 5 Hz t), to 1e-7 here."""
+TRIM_S = 1.0  # time dropped at either end [s]; the filter's transients decay as exp(-pi 5 Hz t), to 1e-7 here
 INSTANTS = 200
 
 

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from mocobot_inspect.channels import Channel, ChannelTally, seconds
 from mocobot_logs.log import CHANNELS, NS, LogSource, Samples, joined
 
-GAP = 1.5
-"""Length of an interval, in periods, above which samples are missing."""
+GAP = 1.5  # length of an interval, in periods, above which samples are missing
 _FIRST = 4096  # number of intervals that determine the period
-BLOCK_ROWS = 20_000
-"""Number of rows that are analysed together."""
+BLOCK_ROWS = 20_000  # number of rows that are analysed together
 EXCERPT_S = 600.0
 EXCERPT_ROWS = 4_000_000
 """Longest excerpt [s], and its largest number of rows of all robots; of a longer log, the part with most motion is

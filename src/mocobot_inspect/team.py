@@ -22,13 +22,10 @@ from mocobot_inspect.survey import Survey, Timing, survey
 from mocobot_inspect.team_wiring import Wiring, check_wiring
 from mocobot_logs.log import NS, THETA, Level, LogSource, Samples
 
-SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
-"""Slowest and fastest plausible sample rate of a robot [Hz]."""
-OFFSET_S = 2e-4
-"""Smallest offset of a clock that is reported [s]; it must also exceed five standard errors."""
+SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0  # slowest and fastest plausible sample rate of a robot [Hz]
+OFFSET_S = 2e-4  # smallest offset of a clock that is reported [s]; it must also exceed five standard errors
 SIGMAS = 5.0
-MOSTLY = 0.5
-"""Share of the log above which a constant channel is faulty as a whole."""
+MOSTLY = 0.5  # share of the log above which a constant channel is faulty as a whole
 MAX_GAP_S = 0.05
 SHORTEST_S = 2 * TRIM_S + 2.0
 WINDOW_S = 0.5

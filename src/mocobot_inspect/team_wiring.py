@@ -60,24 +60,17 @@ TOLERANCES = {
 Tilt is in rad, the others are relative to the signal. Measured: the largest of four payloads in random, periodic and
 static trials, rounded up.
 """
-SUSPICIOUS = 2.0
-"""Misfit above which something is wrong; poorly calibrated robots stay below 1."""
-FAULT = 1e3
-"""Contribution to the misfit of a fault that lasts all the time."""
+SUSPICIOUS = 2.0  # misfit above which something is wrong; poorly calibrated robots stay below 1
+FAULT = 1e3  # contribution to the misfit of a fault that lasts all the time
 RIGID = ("rotation", "velocity", "tilt", "force", "moment")
 _LEAST_SPAN_M = 0.3
 _RANK = 1e-12
 
-DECISIVE = 4.0
-"""Factor by which undoing mistakes must lower a suspicious misfit."""
-WORTH_TRYING = 0.3
-"""Misfit below which no mistake is searched."""
-OVERWHELMING = 15.0
-"""Factor by which a mistake must lower a misfit that is not suspicious."""
-HELPS = 1.5
-"""Factor by which each of several mistakes must lower the misfit."""
-ALIKE = 1.3
-"""Ratio of misfits below which mistakes cannot be distinguished."""
+DECISIVE = 4.0  # factor by which undoing mistakes must lower a suspicious misfit
+WORTH_TRYING = 0.3  # misfit below which no mistake is searched
+OVERWHELMING = 15.0  # factor by which a mistake must lower a misfit that is not suspicious
+HELPS = 1.5  # factor by which each of several mistakes must lower the misfit
+ALIKE = 1.3  # ratio of misfits below which mistakes cannot be distinguished
 MOST = 6
 _REFINED = 6
 

@@ -24,8 +24,7 @@ from mocobot_logs.one_clock import ClockReport, to_recording
 from mocobot_logs.resample import MAX_GAP_S, RATE_HZ, StreamReport, resample
 from mocobot_logs.table.arrays import METADATA_NAME
 
-UNKNOWN_TRIAL = "random"
-"""Kind of trial if unknown; it only labels reports."""
+UNKNOWN_TRIAL = "random"  # kind of trial if unknown; it only labels reports
 PERIOD_DOUBT = 0.05
 """Largest error of the median of jittering intervals, as a share of the period. Derived: 1.25 / sqrt(1024) of their
 scatter, rounded up."""

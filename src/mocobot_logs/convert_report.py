@@ -25,8 +25,7 @@ from mocobot_logs.cut import Omission
 from mocobot_logs.log import Array, repeated
 from mocobot_logs.resample import StreamReport
 
-SURE = 4.0
-"""Standard errors above which a clock difference is reported ..."""
+SURE = 4.0  # standard errors above which a clock difference is reported ...
 SMALL_S, SMALL_DRIFT = 1e-4, 5e-6
 """... if it also exceeds this [s, s/s]; 0.1 ms changes estimates by less than the sensors' noise."""
 _COLUMNS = (

@@ -18,14 +18,12 @@ from mocobot_logs.resample import is_hole
 SHORTEST_NS = 9_500_000_000
 """Shortest part that becomes a trial [ns]. Derived: ``estimate`` and ``diagnose`` drop 2 s at either end for their
 filters. Resampling may drop 0.1 s at either end. A diagnosis needs 5 s of the rest."""
-UNEVEN_NS = 100_000_000
-"""Smallest difference between the robots' beginnings or ends that is reported [ns]."""
+UNEVEN_NS = 100_000_000  # smallest difference between the robots' beginnings or ends that is reported [ns]
 _S = r"(\d{1,12}(?:\.\d*)?|\.\d+)"
 _CROP = re.compile(rf"{_S}?:{_S}?", re.ASCII)
 _DROP = re.compile(rf"robot=(\d{{1,4}}):{_S}-{_S}", re.ASCII)
 _NS_PER_S = 1_000_000_000
-LATEST_NS = 10**12 * _NS_PER_S
-"""End of a span without a given end: later than any log [ns]."""
+LATEST_NS = 10**12 * _NS_PER_S  # end of a span without a given end: later than any log [ns]
 _UNEVEN = "not all robots have samples"
 _LOOK = 1024  # number of stamps that determine the period
 
@@ -75,8 +73,7 @@ class Choice:
         return self.crop is not None or bool(self.drops)
 
 
-WHOLE = Choice()
-"""All of a log."""
+WHOLE = Choice()  # all of a log
 
 
 @dataclass(frozen=True)

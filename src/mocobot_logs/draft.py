@@ -30,8 +30,7 @@ from mocobot_logs.open_log import open_table
 from mocobot_logs.table.table import Table, Wanted
 from mocobot_logs.units import COUNTS, DATES, FACTORS
 
-DOUBTFUL = "doubtful: "
-"""Prefix of the comment on a line that the user must check."""
+DOUBTFUL = "doubtful: "  # prefix of the comment on a line that the user must check
 _LISTED = 12
 _PLAUSIBLE = {"angle": 3.2, "torque": 60.0, "length": 1.5, "force": 600.0}
 """Largest plausible angle, torque, reach and force of an arm [rad, N m, m, N]."""
@@ -39,10 +38,8 @@ _SURE = {"angle": (1.8, 10.0), "torque": (30.0, 200.0), "length": (1.0, 10.0), "
 """Largest values that are certainly in SI, and smallest that are certainly in the smaller unit; in between, either may
 be."""
 _SMALLER = {"angle": "deg", "torque": "mNm", "length": "mm", "force": "mN"}
-_MOST_DEGREES = 400.0
-"""Largest angle in degrees; larger whole numbers are counts."""
-_ONE_TURN = 0.01
-"""A range within this share of a full turn means an encoder that wraps around."""
+_MOST_DEGREES = 400.0  # largest angle in degrees; larger whole numbers are counts
+_ONE_TURN = 0.01  # a range within this share of a full turn means an encoder that wraps around
 _RATES_HZ = (10.0, 20_000.0)
 
 

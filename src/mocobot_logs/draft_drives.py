@@ -111,8 +111,7 @@ def gain_lines(gains: Mapping[str, Array], joints: Sequence[str]) -> Iterator[st
 
 # What the position follows.
 
-MOST_LAG_S, LEAST_STEP_S = 0.5, 1e-3
-"""Longest lag that is tried, and the least step between two [s]. Chosen."""
+MOST_LAG_S, LEAST_STEP_S = 0.5, 1e-3  # longest lag that is tried, and the least step between two [s]. Chosen.
 LEAST_ROWS, MOST_ROWS, MOST_LEFT = 32, 2000, 0.5
 """Least and most rows to compare, and the share of the variance beyond which a position does not follow. Chosen."""
 
@@ -180,10 +179,8 @@ def follow(time_s: Array, q: Array, told_s: Array, told: Array) -> Follow | None
 
 # Feetech servos as LeRobot logs them.
 
-_COUNTS = 4096.0
-"""Counts of a turn of an STS3215."""
-_DEGREE = 360.0 / (_COUNTS - 1.0)
-"""One count in LeRobot's degrees."""
+_COUNTS = 4096.0  # counts of a turn of an STS3215
+_DEGREE = 360.0 / (_COUNTS - 1.0)  # one count in LeRobot's degrees
 _SAME = 1e-3
 _ZERO = (
     "where is each joint, in the model, when its reading is 0? zero = [ ... ] is that [rad]. Which joints turn the "

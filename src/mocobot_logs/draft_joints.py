@@ -84,21 +84,15 @@ _AT_MOTOR = {
     "torque": "motor_torque",
     "command": "motor_command",
 }
-GAINS = ("position_gain", "velocity_gain")
-"""Keys of [control] that columns may tell."""
-_TURNS = 4.0 * np.pi
-"""Largest range of a turning joint in radians; a larger one counts as degrees."""
-_METRES = 20.0
-"""Largest range of a sliding joint in metres; a larger one counts as millimetres."""
-_NO_POSITION = 1e6
-"""Positions beyond it are none: Unitree's PosStopF is 2.146e9."""
+GAINS = ("position_gain", "velocity_gain")  # keys of [control] that columns may tell
+_TURNS = 4.0 * np.pi  # largest range of a turning joint in radians; a larger one counts as degrees
+_METRES = 20.0  # largest range of a sliding joint in metres; a larger one counts as millimetres
+_NO_POSITION = 1e6  # positions beyond it are none: Unitree's PosStopF is 2.146e9
 _ROWS = 20_000
 
 
-_ADDED = ("command_velocity", "feedforward")
-"""Quantities of no use if they are zero throughout."""
-_WEAK = {"joint", "state"}
-"""Words that identify a quantity only if no other column does."""
+_ADDED = ("command_velocity", "feedforward")  # quantities of no use if they are zero throughout
+_WEAK = {"joint", "state"}  # words that identify a quantity only if no other column does
 
 
 def draft_joint_map(

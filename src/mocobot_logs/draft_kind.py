@@ -20,8 +20,7 @@ _NO_NAMES = set.union(*WORDS.values()) | MOTOR | _MEASURED | set(UNITS)
 """Words of a column's name that are not part of the joint's name."""
 _JOINT = {"joint", "axis"}
 """Words that belong to a joint's name if they stand beside it, as in ``joint_1`` and ``elbow_joint``."""
-_WITHIN = _JOINT | MOTOR
-"""Words that may stand inside a joint's name, as in ``arm_joint_1``."""
+_WITHIN = _JOINT | MOTOR  # words that may stand inside a joint's name, as in ``arm_joint_1``
 
 
 def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None]:

@@ -20,8 +20,7 @@ from mocobot_logs.table.text import BrokenRowsError
 if TYPE_CHECKING:
     from mocobot_logs.bag.cdr import MessageType
 
-JOINED = "\x1f"
-"""Separator between topic, joint and field in a combined name."""
+JOINED = "\x1f"  # separator between topic, joint and field in a combined name
 INDEX = {"z": 2, "y": 1, "x": 0, "yaw": 2, "pitch": 1, "roll": 0}
 _TURNS = ("yaw", "pitch", "roll")
 _COMMAND = {"ref", "reference", "cmd", "command", "commanded", "setpoint", "desired", "target", "goal"}
@@ -170,12 +169,10 @@ def _rest(tokens: list[tuple[str, int, int]], used: set[str], at: int | None) ->
     return tuple((a, b) for k, (text, a, b) in enumerate(tokens) if k != at and text not in used)
 
 
-ROWS = 200_000
-"""Number of rows that are read."""
+ROWS = 200_000  # number of rows that are read
 _LONGEST_ARRAY = 64
 
-Place = tuple[str, tuple[int, ...]]
-"""A column and an index in it."""
+Place = tuple[str, tuple[int, ...]]  # a column and an index in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,8 +332,7 @@ def _is_stamped(kind: "MessageType") -> bool:
     return True
 
 
-HOLE = "\0"
-"""Placeholder for the robot in a name."""
+HOLE = "\0"  # placeholder for the robot in a name
 
 
 @dataclass(frozen=True)

@@ -82,10 +82,8 @@ MCAP, SQLITE, ROS1 = b"\x89MCAP0\r\n", b"SQLite format 3\x00", b"#ROSBAG"
 """First bytes of a bag's files."""
 BAG_METADATA = "metadata.yaml"
 BAG_SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
-DATASET_INFO = Path("meta") / "info.json"
-"""Description of a LeRobot dataset."""
-PARQUET = b"PAR1"
-"""First and last bytes of every Parquet file (parquet.apache.org/docs/file-format)."""
+DATASET_INFO = Path("meta") / "info.json"  # description of a LeRobot dataset
+PARQUET = b"PAR1"  # first and last bytes of every Parquet file (parquet.apache.org/docs/file-format)
 ZIP = b"PK\x03\x04", b"PK\x05\x06"
 MATLAB = b"MATL"
 

@@ -27,8 +27,7 @@ CHANNELS: dict[Level, tuple[str, ...]] = {
     "wrist": ("h_x", "h_y", "h_z", *THETA, "force_x", "force_y", "force_z"),
 }
 """Channels of one robot [rad, rad, N m] or [m, rad, N], in order."""
-REF = ("ref_x", "ref_y", "ref_z")
-"""Optional channels of one robot: commanded wrist position in {b} [m]."""
+REF = ("ref_x", "ref_y", "ref_z")  # optional channels of one robot: commanded wrist position in {b} [m]
 NS = 1e-9
 """One nanosecond [s]. Stamps are integer nanoseconds, since a float of the Unix time resolves only 0.24 us."""
 

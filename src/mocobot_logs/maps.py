@@ -36,8 +36,7 @@ _OPTIONAL = ("robots", "names", "trial", "time", "csv", "defaults", "robot")
 _TIME = ("column", "nanosec", "unit", "clock")
 _CSV = ("delimiter", "decimal")
 _CHANNEL = (*PLACES, "unit", "sign", "offset", "counts_per_turn", "optional")
-KEYS = (*_REQUIRED, *_OPTIONAL, *_TIME, *_CSV, *_CHANNEL)
-"""Every key of a map except the channels' names."""
+KEYS = (*_REQUIRED, *_OPTIONAL, *_TIME, *_CSV, *_CHANNEL)  # every key of a map except the channels' names
 _LARGEST_BYTES = 1 << 20
 _DIMENSIONS = {
     "phi": "angle", "theta": "angle", "tau": "torque", "h": "length", "force": "force", "ref": "length"

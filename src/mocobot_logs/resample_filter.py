@@ -36,8 +36,7 @@ from scipy.signal import firwin, kaiser_beta, kaiserord, upfirdn
 from estimator.recording.metadata import Sampling
 from mocobot_logs.log import NS, Array, Stamps
 
-PASS, STOP = 0.2, 0.5
-"""Edges of the transition band over the output rate: 20 and 50 Hz at 100 Hz."""
+PASS, STOP = 0.2, 0.5  # edges of the transition band over the output rate: 20 and 50 Hz at 100 Hz
 RIPPLE_DB = 110.0
 OVERSAMPLING, PLENTY, FITTED = 3.0, 5.0, 10.0
 _ROUND = 0.01  # relative clock error that needs no finer grid
@@ -338,8 +337,7 @@ def on_grid(time_ns: Stamps, values: Array, grid: Grid, k: int) -> tuple[Array, 
     return decimator.push(fine), decimator.lead
 
 
-_MARGIN_S = 0.3
-"""Time read before and after the recording to fill the low-pass [s]."""
+_MARGIN_S = 0.3  # time read before and after the recording to fill the low-pass [s]
 
 
 @dataclass(frozen=True, eq=False)

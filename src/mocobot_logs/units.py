@@ -30,12 +30,10 @@ _RATED = {
     **dict.fromkeys(("torque", "force", "current"), tuple(RATED)),
     **dict.fromkeys(("angle", "length"), ("%",)),
 }
-NUMBERED = ("counts_per_turn", "full_scale", "rated")
-"""Keys for numbers that belong to a unit."""
+NUMBERED = ("counts_per_turn", "full_scale", "rated")  # keys for numbers that belong to a unit
 TIME_UNITS: dict[str, int] = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 """Nanoseconds per unit of time."""
-DATES = "iso"
-"""Unit of time for ISO 8601 dates instead of numbers, or a column of timestamps."""
+DATES = "iso"  # unit of time for ISO 8601 dates instead of numbers, or a column of timestamps
 
 
 def units_of(dimension: str) -> tuple[str, ...]:

@@ -78,8 +78,7 @@ MEANING = {
     "partly_explained": "The named causes are there, but do not explain all.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
-MOST_NAMED = 2
-"""Largest number of causes in the title. Chosen."""
+MOST_NAMED = 2  # largest number of causes in the title. Chosen.
 
 
 def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:

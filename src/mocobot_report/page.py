@@ -176,8 +176,7 @@ def _version() -> str:
         return "from source"
 
 
-WIDTH, HEIGHT, QUALITY = 1120, 700, 84
-"""Size of a picture [px] and quality of its JPEG."""
+WIDTH, HEIGHT, QUALITY = 1120, 700, 84  # size of a picture [px] and quality of its JPEG
 
 
 @dataclass(frozen=True)

@@ -36,15 +36,13 @@ from mocobot_report.torques import rms_of
 Values = Mapping[str, Any]
 BAND = Key("", "±2 standard deviations of clean data", "band", "band")
 CLEAN = Key("", "clean data", "text", "dash")
-LOG_FROM = 8.0
-"""Residual above which an axis is logarithmic [multiples of clean noise]. Chosen."""
+LOG_FROM = 8.0  # residual above which an axis is logarithmic [multiples of clean noise]. Chosen.
 QUANTITIES = {
     "speed": "m/s", "velocity": "m/s", "position": "m", "acceleration": "m/s²", "load": "N m", "force": "N",
     "temperature": "°C",
 }  # fmt: skip
 """Units of the quantities against which a team's misfit is plotted."""
-OF_JOINTS = {"speed": "typical speeds"}
-"""Entries of ``QUANTITIES`` that differ for a single robot."""
+OF_JOINTS = {"speed": "typical speeds"}  # entries of ``QUANTITIES`` that differ for a single robot
 
 
 def misfits(*, named: bool, lines: bool = False) -> tuple[Key, Key]:

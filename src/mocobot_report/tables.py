@@ -35,8 +35,7 @@ class Num:
     unit: str = ""
 
 
-Entry = str | Num
-"""A cell of a table; text is escaped unless it is ``Markup``."""
+Entry = str | Num  # a cell of a table; text is escaped unless it is ``Markup``
 
 
 @cache

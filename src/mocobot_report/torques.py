@@ -26,14 +26,11 @@ from mocobot_report.numbers import percent, spelled, without_percent
 from mocobot_report.tables import Entry, Num, value
 
 MEASURED, GIVEN = Key("measured", "measured", "text"), Key("before", "model as given", "before")
-COLOURS = ("r1", "r2", "r3", "r4", "r5")
-"""Colours of the causes, which repeat."""
+COLOURS = ("r1", "r2", "r3", "r4", "r5")  # colours of the causes, which repeat
 LEFT = Key("left", "left", "line", "band")
-MARGIN = 1.08
-"""Vertical range of a panel over the largest value. Chosen."""
+MARGIN = 1.08  # vertical range of a panel over the largest value. Chosen.
 FADED = "below the frequency of the rows; all fade at the ends of a log and where nothing is to be learnt"
-WIDE = 3.0
-"""Width of the measured line, which lies below the others [px]. Chosen."""
+WIDE = 3.0  # width of the measured line, which lies below the others [px]. Chosen.
 
 
 def torques(found: Diagnosed, names: Sequence[str]) -> dict[str, Any] | None:

@@ -67,12 +67,9 @@ def _path(trial: ReplayTrial, key: str) -> str:
     return f"{trial.name}/series/key/{key}"
 
 
-FOVY_DEG = 55.0
-"""Vertical angle of view of the viewer's 3D views [deg]."""
-AZIMUTH, ELEVATION = 135.0, -36.0
-"""Preferred direction of view [deg]. Chosen."""
-INSTANTS = 50
-"""Number of instants of a trial at which the view must show everything. Chosen."""
+FOVY_DEG = 55.0  # vertical angle of view of the viewer's 3D views [deg]
+AZIMUTH, ELEVATION = 135.0, -36.0  # preferred direction of view [deg]. Chosen.
+INSTANTS = 50  # number of instants of a trial at which the view must show everything. Chosen.
 
 
 def scene_eye(trial: ReplayTrial, aspect: float) -> rrb.EyeControls3D:
@@ -124,14 +121,12 @@ def _eye(camera: Camera) -> rrb.EyeControls3D:
     return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
 
 
-TRAIL_S = 3.0
-"""Duration of the visible part of the wrist paths [s]. Chosen."""
+TRAIL_S = 3.0  # duration of the visible part of the wrist paths [s]. Chosen.
 BACKGROUND = (100, 108, 120)
 SCENE_ASPECT = {1: 0.7, 2: 1.5}
 """Width over height of the scene by number of trials, 1 for more trials. Measured in a window 800 px wide and slightly
 higher."""
-KEY_SHARE = 0.07
-"""Height of a legend relative to one plot, in a column of full height. Chosen."""
+KEY_SHARE = 0.07  # height of a legend relative to one plot, in a column of full height. Chosen.
 ALL_PLOTS = uuid.UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
 """Id of the view with which the viewer stores the shared time range of linked plots (GLOBAL_VIEW_ID in its sources).
 Its interface cannot set that range; the default shows only 30 s around the cursor for trials longer than 60 s."""

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
     from matplotlib.transforms import Bbox
 
-MARGIN = 0.04
-"""Empty margin at each side, as a share of the picture. Chosen."""
+MARGIN = 0.04  # empty margin at each side, as a share of the picture. Chosen.
 NEAREST = 0.1
 """Smallest distance of the camera from the nearest point, relative to the spread of the points. Chosen."""
 TURNS = (0.0, *(sign * turn for turn in range(15, 180, 15) for sign in (-1, 1)), 180.0)

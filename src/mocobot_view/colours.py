@@ -2,12 +2,9 @@
 
 import colorsys
 
-FORCE_M_PER_N = 0.006
-"""Length of a force arrow per newton [m/N]. Chosen."""
-FRAME_M = 0.10
-"""Length of the axes of a frame [m]. Chosen."""
-MARK_M = 0.06
-"""Radius of the ball that marks a cause [m]. Chosen."""
+FORCE_M_PER_N = 0.006  # length of a force arrow per newton [m/N]. Chosen.
+FRAME_M = 0.10  # length of the axes of a frame [m]. Chosen.
+MARK_M = 0.06  # radius of the ball that marks a cause [m]. Chosen.
 
 
 Colour = tuple[int, int, int]

@@ -23,8 +23,7 @@ from mocobot_view.colours import Colour
 from mocobot_view.shapes import Shape, Triangles, body_shape, capsule, join
 from mocobot_view.stream import begin, log_lines, log_shape, send, send_poses
 
-POSE_HZ, SERIES_HZ = 60.0, 500.0
-"""Largest rates of drawn poses and of samples in the series [Hz]. Chosen."""
+POSE_HZ, SERIES_HZ = 60.0, 500.0  # largest rates of drawn poses and of samples in the series [Hz]. Chosen.
 SMOOTH_HZ, SMOOTH_SHARE = 20.0, 0.1
 """Cut-off of the low-pass filter of positions for the model torques: the smaller of SMOOTH_HZ [Hz] and SMOOTH_SHARE
 times the sample rate. Chosen."""
@@ -180,8 +179,7 @@ def _rod(end: Array) -> Triangles:
 MEASURED, ASKED, FOUND, COMMANDED = *map(colours.of_robot, (1, 2, 3)), colours.COMMAND
 ARROW_SHARE, THICK_SHARE = 0.45, 0.012
 """Length of the arrow of a joint's largest torque, and radius of an arrow, over the robot's radius. Chosen."""
-SHOWN = 4
-"""Number of joints in one tab of plots. Chosen."""
+SHOWN = 4  # number of joints in one tab of plots. Chosen.
 
 
 def log_joint_replay(

@@ -46,8 +46,7 @@ from mocobot_view.payload import (
 from mocobot_view.render import Picture, Shot, render_shots
 from mocobot_view.robot import LEGS, TINTED, body_of, by_place, fit_design, robot_shapes, rod_angles
 
-SAMPLES = 2000
-"""Number of samples, spread over a recording, that determine the poses of the bases. Chosen."""
+SAMPLES = 2000  # number of samples, spread over a recording, that determine the poses of the bases. Chosen.
 GHOST = 0.15
 """Opacity of a payload that must not hide its interior; MuJoCo draws translucent geoms twice. Chosen."""
 
@@ -172,14 +171,11 @@ def _qpos(
     return qpos
 
 
-ASPECT = 1.6
-"""Default width over height of a picture."""
+ASPECT = 1.6  # default width over height of a picture
 AZIMUTH, ELEVATION, FOVY = 125.0, -24.0, 28.0
 """Direction and angle of view [deg]. Chosen: a narrow angle avoids enlarging near objects."""
-ABOVE = -34.0
-"""Elevation for pictures with marks at the payload [deg]. Chosen."""
-LONG_M = 0.17
-"""Length of the axes of a grasp frame [m]. Chosen: they must protrude from the gimbal."""
+ABOVE = -34.0  # elevation for pictures with marks at the payload [deg]. Chosen.
+LONG_M = 0.17  # length of the axes of a grasp frame [m]. Chosen: they must protrude from the gimbal.
 NAME_AT = np.array([0.0, 0.0, 0.05])
 AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
 

@@ -15,8 +15,7 @@ from mocobot_sim.scene.models import posed
 
 AROUND = 24
 """Number of facets around an axis. Chosen: a rod of 6 mm then deviates by 0.05 mm from a cylinder."""
-ALONG = 6
-"""Number of rows of facets from the equator of a half sphere to its pole. Chosen."""
+ALONG = 6  # number of rows of facets from the equator of a half sphere to its pole. Chosen.
 
 
 @dataclass(frozen=True)

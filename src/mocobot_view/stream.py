@@ -52,8 +52,7 @@ def send_poses(
     send(stream, path, time, rr.Transform3D.columns(translation=place, quaternion=turn))
 
 
-TRAIL_HZ = 25.0
-"""Segments of a drawn wrist path per second [Hz]; the series contain all samples. Chosen."""
+TRAIL_HZ = 25.0  # segments of a drawn wrist path per second [Hz]; the series contain all samples. Chosen.
 
 
 def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
@@ -450,10 +449,8 @@ def log_replay(
 Progress = Callable[[int], object] | None
 Content = Callable[[rr.RecordingStream], object]
 
-WEB_PORT, DATA_PORT = 9090, 9876
-"""Ports of the web viewer and of its data; Rerun's defaults."""
-FLUSH_S = 20.0
-"""Time limit for a viewer to accept all data [s]. Chosen: a long recording takes one second."""
+WEB_PORT, DATA_PORT = 9090, 9876  # ports of the web viewer and of its data; Rerun's defaults
+FLUSH_S = 20.0  # time limit for a viewer to accept all data [s]. Chosen: a long recording takes one second.
 
 
 def has_display() -> bool:

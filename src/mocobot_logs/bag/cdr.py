@@ -50,8 +50,7 @@ _NEW_LAYOUTS = 4
 """Number of unstored layouts of one size that are matched against all messages of a group; later ones match one
 message."""
 _KEPT_LAYOUTS = 64
-_GROUP = 8192
-"""Number of messages that are read at once."""
+_GROUP = 8192  # number of messages that are read at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,8 +327,7 @@ class Selector:
     joint: str | None = None  # name of the joint whose number it is, or None
 
 
-EMPTY = "has no"
-"""First words of what a selector lacks if the array of a field is empty."""
+EMPTY = "has no"  # first words of what a selector lacks if the array of a field is empty
 _UNEQUAL = "cannot be told from the others"
 
 

@@ -40,8 +40,7 @@ from mocobot_logs.formats import (
     readable,
 )
 
-VERSIONS = range(1, 10)
-"""Supported versions of ``metadata.yaml``, all that rosbag2 has written so far."""
+VERSIONS = range(1, 10)  # supported versions of ``metadata.yaml``, all that rosbag2 has written so far
 STORAGES = {"mcap": MCAP, "sqlite3": SQLITE}
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _METADATA_BYTES = 1 << 20

@@ -14,14 +14,11 @@ from estimator.inputs import Unpacked
 from mocobot_logs.formats import detail_of, shown
 from mocobot_logs.log import Stamps
 
-BLOCK_BYTES = 4 << 20
-"""Approximate size of a block of messages [bytes], unless a chunk of the file is larger."""
-MESSAGE_BYTES = 16 << 20
-"""Largest message that is read [bytes]; one robot's joint states take some hundred."""
+BLOCK_BYTES = 4 << 20  # approximate size of a block of messages [bytes], unless a chunk of the file is larger
+MESSAGE_BYTES = 16 << 20  # largest message that is read [bytes]; one robot's joint states take some hundred
 CHUNK_BYTES = 256 << 20
 """Largest chunk that is unpacked in memory [bytes]; recorders write chunks of about 1 MiB."""
-SHOWN = 20
-"""Largest number of topics or joints that a message lists."""
+SHOWN = 20  # largest number of topics or joints that a message lists
 _STEP = 1 << 20
 
 

@@ -43,8 +43,7 @@ from mocobot_logs.resample_filter import held_means
 
 MAX_GAP_NS = 50_000_000
 """Longest time without samples of a topic, beyond its period, that is interpolated [ns]."""
-HELD = 1 << 16
-"""Largest number of messages of a topic that wait for those of another topic."""
+HELD = 1 << 16  # largest number of messages of a topic that wait for those of another topic
 _AT_ONCE = 4096
 _SAME = 1.25  # ratio below which periods of topics count as equal
 _CROWDED = 0.25  # of a period: differences between closer samples are only noise
@@ -186,16 +185,12 @@ Clock = Literal["header", "log"]
 
 METADATA_TOPIC = "/mocobot/metadata"
 """Topic of one std_msgs/msg/String with the metadata of the recording that a bag was written from."""
-MATCHING = 0.9
-"""Smallest share of common stamps at which two topics count as stamped together."""
+MATCHING = 0.9  # smallest share of common stamps at which two topics count as stamped together
 ENOUGH = 10_000
 """Number of messages after which a field or joint that none of them had counts as missing; saves reading long bags."""
-LOOKED = 100_000
-"""Number of messages that a draft looks at."""
-STAMPS = 1000
-"""Number of stamps per topic that are read before the bag itself."""
-_ENOUGH_BLOCKS = 64
-"""Number of blocks after which the stamps found so far must suffice."""
+LOOKED = 100_000  # number of messages that a draft looks at
+STAMPS = 1000  # number of stamps per topic that are read before the bag itself
+_ENOUGH_BLOCKS = 64  # number of blocks after which the stamps found so far must suffice
 _EARLY_NS = 1_000_000_000
 """A clock that was just set to zero, as of a simulation, is before this; a stamp of zero counts then [ns]."""
 _MAPS = ("mocobot-ros2", "omnid-ros2")

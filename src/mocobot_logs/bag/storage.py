@@ -42,8 +42,7 @@ from mocobot_logs.bag.messages import (
 )
 from mocobot_logs.formats import MCAP, SQLITE, detail_of, readable
 
-DEFINITION_BYTES = 256 << 10
-"""Longest definition of a message type that is read [bytes]."""
+DEFINITION_BYTES = 256 << 10  # longest definition of a message type that is read [bytes]
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE_HEAD = struct.Struct("<BQH")  # opcode, length, channel
 _MESSAGE = np.dtype(

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 
-Command = Literal["none", "position", "velocity", "torque", "duty"]
-"""Quantity of the logged commands."""
+Command = Literal["none", "position", "velocity", "torque", "duty"]  # quantity of the logged commands
 GainOf = Literal["torque", "velocity", "duty", "firmware"]
 
 

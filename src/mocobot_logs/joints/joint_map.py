@@ -69,8 +69,7 @@ COMMANDS = ("command", "motor_command")
 DUTIES = ("duty", "motor_voltage")
 ORDERS = (*COMMANDS, "command_velocity", "feedforward")
 """Quantities that the robot is told, and that hold until it is told others."""
-KEYS = (*PLACES, "unit", "sign", "offset", "bits", *units.NUMBERED)
-"""Keys of a channel."""
+KEYS = (*PLACES, "unit", "sign", "offset", "bits", *units.NUMBERED)  # keys of a channel
 MOST_BITS = 53
 LEAST_HZ, MOST_HZ = 20.0, 20e3
 _DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
@@ -83,8 +82,7 @@ _DIMENSIONS: dict[Kind, tuple[str, str, str]] = {
     "flag": ("flags", "flag", "flag"),
 }
 """Plural, and dimension for a turning and for a sliding joint."""
-BETWEEN = ("held", "interpolated")
-"""What the robot does between two commands."""
+BETWEEN = ("held", "interpolated")  # what the robot does between two commands
 COMMAND_KINDS: dict[str, Kind] = {"position": "position", "velocity": "velocity", "torque": "effort"}
 _PLACEHOLDERS = ("joint", "number", "index")
 _OPTIONAL = ("version", "time", "csv", "defaults", "drive", "control", "joint", "log")

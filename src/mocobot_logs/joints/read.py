@@ -41,8 +41,7 @@ from mocobot_logs.resample_filter import TOLERANCE_NS, Grid, fineness, fitted_ro
 
 EVEN_SHARE = 2e-3
 """Largest deviation of even stamps, as a share of a period. Derived: an arm turns by micrometres meanwhile."""
-MAX_GAP_S = 0.05
-"""Longest time without samples, beyond one period, that is bridged [s]."""
+MAX_GAP_S = 0.05  # longest time without samples, beyond one period, that is bridged [s]
 SHORTEST_S, LEAST_ROWS = 1.0, 32
 """Shortest part between gaps [s] and its least number of rows; shorter parts are left out."""
 _BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; quantile; slower intervals over the median
@@ -358,10 +357,8 @@ def _notes(screen: Screen) -> list[str]:
 
 
 TURN = 2.0 * np.pi
-LEAST_JUMP = 0.75
-"""Share of a turn that no joint moves between two samples: at 20 Hz it would be 94 rad/s."""
-ONE_TURN = 1.01
-"""Largest range, in turns, of an encoder that wraps around."""
+LEAST_JUMP = 0.75  # share of a turn that no joint moves between two samples: at 20 Hz it would be 94 rad/s
+ONE_TURN = 1.01  # largest range, in turns, of an encoder that wraps around
 
 
 def unwrapped(values: Array, names: Sequence[str]) -> tuple[Array, list[str]]:
@@ -404,8 +401,7 @@ def mean_supply(reading: Array, rate_hz: float) -> Array:
     return low_pass(wide, rate_hz, SUPPLY_HZ)[end : end + len(reading)]
 
 
-_STEP_ROWS = 1024
-"""Rows per block in which the step of a reading is searched."""
+_STEP_ROWS = 1024  # rows per block in which the step of a reading is searched
 _STEP_BLOCKS = 8
 
 

@@ -33,13 +33,11 @@ from mocobot_logs.table.text import from_numbers
 
 MAX_WHOLE_BYTES = 1 << 30
 """Largest array in Fortran order [bytes]; it is loaded whole, since its rows are not contiguous."""
-METADATA_NAME = "mocobot"
-"""Name of a text array with the JSON metadata of a recording (docs/recording.md)."""
+METADATA_NAME = "mocobot"  # name of a text array with the JSON metadata of a recording (docs/recording.md)
 MAX_HEADER_BYTES = 10_000
 MAX_METADATA_BYTES = 1 << 20
 
-Reader = Callable[[int], NDArray]
-"""Function that reads the next rows, given their number."""
+Reader = Callable[[int], NDArray]  # function that reads the next rows, given their number
 
 
 @dataclass(frozen=True)

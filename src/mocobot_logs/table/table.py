@@ -15,10 +15,8 @@ from mocobot_logs.formats import shown
 from mocobot_logs.log import REF, Level, Samples, Stamps
 from mocobot_logs.maps import ChannelMap, LogMap
 
-SHOWN_COLUMNS = 12
-"""Largest number of columns that a message lists."""
-CELLS = 1 << 20
-"""Approximate number of cells in memory at a time."""
+SHOWN_COLUMNS = 12  # largest number of columns that a message lists
+CELLS = 1 << 20  # approximate number of cells in memory at a time
 
 
 @dataclass(frozen=True, eq=False)

@@ -254,8 +254,7 @@ def _without_comments(lines: bytes) -> bytes:
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 1 << 20
 DELIMITERS = (",", ";", "\t", "|", " ")
-EMPTY = ["", " ", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
-"""Cells that count as missing values."""
+EMPTY = ["", " ", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]  # cells that count as missing values
 _NUMBER = re.compile(
     r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE
 )
