@@ -140,7 +140,6 @@ class ChannelTally:
             all_of[k].append(Stretch(start_s, duration_s, value, jumps))
 
     def finish(self) -> tuple[Channel, ...]:
-        """Return the statistics of each channel."""
         channels = []
         for name, parts, stuck_all, clipped_all in zip(
             self._names, self._parts, self._stuck, self._clipped, strict=True

@@ -58,8 +58,6 @@ _UNEXPLAINED = 0.5  # share of a torque, beyond noise, above which the model har
 
 @dataclass(frozen=True)
 class Finding:
-    """A problem of a log."""
-
     topic: Topic  # the subject
     sentence: str  # the problem, with the numbers that show it
 

@@ -39,11 +39,9 @@ class Mistake:
 
     @property
     def sentence(self) -> str:
-        """The mistake in words."""
         return f"{self.who}: {self.what}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values."""
         return {
             "kind": self.kind,
             "robots": [robot + 1 for robot in self.robots],

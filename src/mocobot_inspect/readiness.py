@@ -27,8 +27,6 @@ _ALONG = np.cos(np.deg2rad(20.0))
 
 @dataclass(frozen=True)
 class Readiness:
-    """What can be estimated."""
-
     steps: tuple[StepReport, ...]  # excitation of every step of the estimate
     holds: int  # number of static holds
     axes: tuple[float, float, float] | None  # angular velocity about x, y, z of {1} [rad/s rms], or None

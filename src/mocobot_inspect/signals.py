@@ -69,11 +69,9 @@ class Signals:
 
     @property
     def robots(self) -> int:
-        """Number of robots N."""
         return self.theta.values.shape[2]
 
     def group(self, kind: Kind) -> Group:
-        """Return one of the three groups."""
         return getattr(self, kind)
 
     def having(self, **groups: Group) -> Signals:

@@ -59,7 +59,6 @@ class TimingTally:
     """Counts stamps chunk by chunk; memory does not grow with the log."""
 
     def __init__(self) -> None:
-        """Start without stamps."""
         self._timing = Timing()
         self._period_s: float | None = None
         self._regular, self._regular_s, self._squares = 0, 0.0, 0.0
@@ -115,7 +114,6 @@ class TimingTally:
                 t.longest_gap_s, t.longest_gap_at_s = float(intervals[k]), float(at[k])
 
     def finish(self) -> Timing:
-        """Return the counts."""
         self._settle()
         mean_s = self._regular_s / self._regular if self._regular else None
         self._timing.rate_hz = 1.0 / mean_s if mean_s else None
@@ -125,8 +123,6 @@ class TimingTally:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Contents of a log."""
-
     # timing, channels: per robot
     timing: tuple[Timing, ...]
     channels: tuple[tuple[Channel, ...], ...]
@@ -219,7 +215,6 @@ class _Robot:
                 self.kept = None
 
     def look(self) -> None:
-        """Analyse the waiting samples."""
         block = joined(self._waiting, self._width)
         self._waiting, self._waiting_rows = [], 0
         if not len(block.stamp_ns) or self.first_ns is None:

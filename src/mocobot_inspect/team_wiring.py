@@ -125,8 +125,6 @@ class Found:
 
 @dataclass(frozen=True)
 class Wiring:
-    """Result of the search."""
-
     as_is: Misfit  # misfit of the log as it is
     found: tuple[Found, ...]  # mistakes, the most important first; empty if none is found
     undone: Misfit  # misfit with all of them undone

@@ -43,8 +43,6 @@ class Labels:
 
 @dataclass(frozen=True, eq=False)
 class Converted:
-    """A log that became a recording."""
-
     recording: Recording  # the checked recording, on one grid and one clock
     level: Level  # level of the log
     streams: tuple[StreamReport, ...]  # properties of each robot's stream, and how it was resampled

@@ -37,7 +37,6 @@ class Span:
 
     @property
     def length_ns(self) -> int:
-        """Length [ns]."""
         return self.last_ns - self.first_ns
 
     def holds(self, after_ns: Stamps) -> NDArray[np.bool_]:
@@ -141,7 +140,6 @@ class Piece:
 
     @property
     def notes(self) -> Sequence[str]:
-        """Notes of the whole log."""
         return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:

@@ -45,8 +45,6 @@ _RATES_HZ = (10.0, 20_000.0)
 
 @dataclass(frozen=True)
 class Draft:
-    """A draft of a map."""
-
     text: str  # the map in TOML
     doubtful: int  # number of lines that the user must check
     missing: tuple[str, ...]  # required channels that were not found; the map is incomplete without them

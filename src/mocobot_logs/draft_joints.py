@@ -148,7 +148,6 @@ class _Found:
 
 
 def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | None) -> _Found:
-    """Return what a table holds."""
     table, candidates, csv = opened_table(path, kind, episode)
     time = [*time_lines(table, candidates, Robots((), "")), *csv]
     clock = tomllib.loads("\n".join(time)).get("time", {})
@@ -190,7 +189,6 @@ def _in_columns(path: Path, kind: Kind, joints: Sequence[str], episode: int | No
 
 
 def _columns(place: Place, joints: Sequence[str]) -> list[str]:
-    """Return the columns of a place."""
     told = [{"{joint}": joint, "{number}": f"{k + 1}", "{index}": f"{k}"} for k, joint in enumerate(joints)]
     return [re.sub(r"\{\w+\}", lambda at, own=own: own[at[0]], place.keys["column"]) for own in told]
 
@@ -476,7 +474,6 @@ def _place_in(table: Table, column: str) -> tuple[str, tuple[int, ...]]:
 
 
 def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
-    """Return what a bag holds."""
     from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
     from mocobot_logs.bag.files import BagFiles
     from mocobot_logs.bag.read import Look

@@ -130,7 +130,6 @@ def log_kind(path: Path) -> Kind:
 
 
 def is_recording(path: Path) -> bool:
-    """Return whether a Parquet file is a recording."""
     import pyarrow.parquet as pq
 
     from estimator.recording.parquet import METADATA_KEY
@@ -154,7 +153,6 @@ def is_bag(path: Path) -> bool:
 
 
 def has_bag_suffix(path: Path) -> bool:
-    """Return whether a file has the suffix of a bag."""
     return path.name.lower().endswith(BAG_SUFFIXES)
 
 

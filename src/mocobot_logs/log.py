@@ -43,7 +43,6 @@ class Samples:
     repeats: Stamps = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Set ``repeats`` to zero if not given."""
         if self.repeats is None:
             object.__setattr__(self, "repeats", np.zeros(len(self.stamp_ns), np.int64))
 
@@ -82,8 +81,6 @@ class LogSource(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A whole log in memory."""
-
     # name, level, channels, metadata, notes: as in ``LogSource``
     name: str
     level: Level
@@ -94,12 +91,10 @@ class Log:
 
     @property
     def robots(self) -> int:
-        """Number of robots N."""
         return len(self.streams)
 
 
 def collect(source: LogSource, advance: Callable[[int], object] = lambda _: None) -> Log:
-    """Read a whole source."""
     parts: list[list[Samples]] = [[] for _ in range(source.robots)]
     for robot, samples in source.chunks(advance):
         parts[robot].append(samples)
@@ -144,18 +139,15 @@ class Readings:
     """A log without rows that repeat the previous reading, as a ``LogSource``; ``Samples.repeats`` counts them."""
 
     def __init__(self, source: LogSource) -> None:
-        """Wrap a log; nothing is read yet."""
         self.level: Level = source.level
         self.name, self.robots, self.channels = source.name, source.robots, source.channels
         self.metadata, self.size, self._source = source.metadata, source.size, source
 
     @property
     def notes(self) -> Sequence[str]:
-        """Notes of the log itself."""
         return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples as ``LogSource.chunks``."""
         streams = [_Stream(self.channels) for _ in range(self.robots)]
         for robot, samples in self._source.chunks(advance):
             if (told := streams[robot].push(samples)) is not None:
@@ -183,7 +175,6 @@ class _Stream:
         return self._judged(self._rows // BLOCK * BLOCK) if self._rows >= BLOCK else None
 
     def finish(self) -> Samples:
-        """Return the last readings."""
         return joined([self._judged(self._rows), self._held], self._channels)
 
     def _judged(self, rows: int) -> Samples:
@@ -203,5 +194,4 @@ class _Stream:
 
 
 def repeated(rows: int) -> str:
-    """Describe rows that repeat the previous reading."""
     return f"{rows} row{'s' * (rows > 1)} repeat{'s' * (rows == 1)} the one before, and a reading counts once"

@@ -287,7 +287,6 @@ def parse_channel(
 
 
 def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEHOLDERS) -> TimeMap:
-    """Parse the table ``[time]``."""
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     if "nanosec" in fields and ("column" not in fields or fields.values["unit"] != "s"):
         raise InputError(f'{where}: nanosec goes with a column of whole seconds: column, and unit = "s"')
@@ -300,7 +299,6 @@ def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEH
 
 
 def parse_csv(values: Values, where: str) -> CsvMap:
-    """Parse the table ``[csv]``."""
     fields = Fields(values, (), where, _CSV)
     delimiter = values.get("delimiter")
     decimal: Literal[".", ","] = fields.one_of("decimal", (".", ",")) if "decimal" in fields else "."
@@ -314,7 +312,6 @@ def parse_csv(values: Values, where: str) -> CsvMap:
 
 
 def read_toml_map(path: Path) -> dict[str, object]:
-    """Read a map's file."""
     names = ", ".join(MAPS)
     try:
         if not path.exists():
@@ -350,7 +347,6 @@ def read_map(path_or_name: Path | str) -> LogMap:
 
 @cache
 def builtin_map(name: str) -> LogMap:
-    """Return a built-in map."""
     return parse_map(_toml(builtin_map_text(name), f"map {name}"), name)
 
 

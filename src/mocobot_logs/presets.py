@@ -25,8 +25,6 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Meaning:
-    """Meaning of a name."""
-
     quantity: str | None  # quantity of a map, or None for what is no measurement of a joint
     unit: str | None = None  # unit of a map, or None if the name does not tell
     said: str = ""  # comment for the map

@@ -91,7 +91,6 @@ class StreamReport:
         return self.filled / max(1, self.filled + self.samples - self.blank - self.duplicates - self.repeats)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields as plain values by name."""
         return asdict(self) | {"filled_share": self.filled_share}
 
 
@@ -112,7 +111,6 @@ class Resampled:
 
     @property
     def robots(self) -> int:
-        """Number of robots N."""
         return len(self.values)
 
 
@@ -222,7 +220,6 @@ class RobotStream:
         return self._pipe is not None and self._pipe.left_grid
 
     def push(self, samples: Samples) -> None:
-        """Add the next rows."""
         self._waiting.append(samples)
         self._rows_waiting += len(samples.stamp_ns)
         if self._rows_waiting >= _LOOK:  # a source may yield single rows

@@ -66,7 +66,6 @@ class Decimator:
     """
 
     def __init__(self, k: int) -> None:
-        """Keep every k-th sample."""
         self._k = k
         self._taps = low_pass_taps(k) if k > 1 else np.ones(1)
         self.lead = len(self._taps) // 2 // k
@@ -151,7 +150,6 @@ class Merger:
     """
 
     def __init__(self, period_ns: float) -> None:
-        """``period_ns`` is the native period [ns]."""
         self.merged = 0
         self._least_ns = CROWDED * period_ns
         self._open: tuple[Stamps, Array] | None = None
@@ -169,7 +167,6 @@ class Merger:
         return self._average(time_ns[:last], values[:last], starts[:-1])
 
     def finish(self) -> tuple[Stamps, Array]:
-        """Return the rows held back."""
         if self._open is None:
             raise ValueError("nothing was pushed")
         return self._average(*self._open, np.array([0]))
@@ -210,7 +207,6 @@ class Grid:
         return bool(np.all(off <= TOLERANCE_NS + 0.5) and np.all(np.diff(index) > 0))
 
     def index(self, time_ns: Stamps) -> Stamps:
-        """Return the indices of the nearest instants."""
         return np.rint(time_ns / self.spacing_ns).astype(np.int64)
 
 
@@ -246,7 +242,6 @@ class Interpolator:
         return blocks
 
     def finish(self) -> Array:
-        """Return the last block."""
         self._join()
         return self._block(self._rows)
 

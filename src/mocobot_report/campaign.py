@@ -20,7 +20,6 @@ Json = Mapping[str, Any]
 
 
 def sentences(summary: Json) -> list[str]:
-    """Summarise the campaign in sentences."""
     sets = summary["sets"]
     out = [
         f"{sets['diagnosed']} sets diagnosed, of {sets['clean']} in which nothing was hidden and {sets['hidden']} in "
@@ -45,7 +44,6 @@ def sentences(summary: Json) -> list[str]:
 
 
 def background_words(background: str) -> str:
-    """Return the name of a kind of robots."""
     return BACKGROUNDS[background][0]
 
 

@@ -35,17 +35,7 @@ from mocobot_report.charts import (
 )
 from mocobot_report.folder import Result, Source, sources
 from mocobot_report.numbers import NONE, counted, kinds_of, percent, plain, with_error
-from mocobot_report.tables import (
-    Entry,
-    Num,
-    component,
-    distance,
-    mass,
-    measurement,
-    quantity,
-    value,
-    vector,
-)
+from mocobot_report.tables import Entry, Num, component, distance, mass, measurement, quantity, value, vector
 from mocobot_sim.paper.scoring import rotation_error_deg
 from mocobot_view.payload import BodyFacts, read_truth
 from mocobot_view.pictures import estimate_shot

@@ -40,8 +40,6 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Result:
-    """One result of a folder."""
-
     kind: str  # one of KINDS
     path: Path
     found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, Told, or a campaign's summary

@@ -217,7 +217,6 @@ def render_pictures(contexts: Sequence[Context]) -> None:
 
 
 def _jpeg(pixels: Any) -> str:
-    """Encode an image as a JPEG data URI."""
     from PIL import Image  # an optional dependency, present whenever pictures are rendered
 
     file = io.BytesIO()

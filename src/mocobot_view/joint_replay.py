@@ -61,7 +61,6 @@ class JointReplay:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences for the viewer."""
         if self.log.torque is None:
             return self.log.notes
         said = "Arrows are torques, by the right-hand rule, in shares of the joint's largest: blue measured"

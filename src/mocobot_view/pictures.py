@@ -70,7 +70,6 @@ class MeasuredTeam:
 
     @property
     def robots(self) -> int:
-        """Number of robots N."""
         return sum(self.model.body(b).name.endswith("/flange") for b in range(self.model.nbody))
 
 
@@ -267,7 +266,6 @@ def _shot(
 
 
 def _says(recording: Recording, team: MeasuredTeam, truth: BodyFacts | None, *, marked: bool = True) -> str:
-    """Write the caption of a picture."""
     omnids = f"{team.robots} Omnid{'s' if team.robots != 1 else ''}"
     text = f"{omnids} at {team.time_s:.1f} s of {Path(recording.name).name}, from the measured angles"
     if team.grasps is None:

@@ -16,7 +16,6 @@ NOISE = 4
 
 
 def main(folder: Path) -> None:
-    """Render every shot of a task."""
     with np.load(folder / "task.npz") as file:
         task = dict(file)
     width, height = (int(size) for size in task["size"])

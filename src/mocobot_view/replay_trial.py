@@ -109,7 +109,6 @@ class ReplayTrial:
 
     @property
     def robots(self) -> int:
-        """Number of robots N."""
         return self.recording.metadata.robots
 
 

@@ -33,7 +33,6 @@ class Triangles:
 
 
 def join(meshes: list[Triangles]) -> Triangles:
-    """Merge several meshes into one."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     return Triangles(
         np.concatenate([mesh.vertices for mesh in meshes]),

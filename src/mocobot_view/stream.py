@@ -454,7 +454,6 @@ FLUSH_S = 20.0  # time limit for a viewer to accept all data [s]. Chosen: a long
 
 
 def has_display() -> bool:
-    """Whether a display is available for a window."""
     return not sys.platform.startswith("linux") or bool(
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )

@@ -57,7 +57,6 @@ class BagFiles:
     """
 
     def __init__(self, path: Path) -> None:
-        """Open the files."""
         paths, self._are_packed = _files_of(path)
         self._scratch: Path | None = None
         stored = sum(file.stat().st_size for file in paths if file.is_file())

@@ -24,8 +24,6 @@ _STEP = 1 << 20
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a bag."""
-
     name: str  # such as ``/omnid1/joint/joint_states``
     type: str  # such as ``sensor_msgs/msg/JointState``
     encoding: str  # serialisation of the messages; only ``cdr`` is read
@@ -44,11 +42,9 @@ class Messages:
     log_ns: Stamps  # time of recording [ns], shape (q,)
 
     def __len__(self) -> int:
-        """Return the number of messages q."""
         return len(self.start)
 
     def __getitem__(self, index: int) -> bytes:
-        """Return one message."""
         start = int(self.start[index])
         return self.block[start : start + int(self.size[index])]
 
@@ -97,12 +93,10 @@ def listed(topics: Mapping[str, Topic]) -> str:
 
 
 def listed_names(names: Sequence[str]) -> str:
-    """Return names found in a file, for messages."""
     return ", ".join(map(printable, names[:SHOWN])) + (", ..." if len(names) > SHOWN else "") or "none"
 
 
 def printable(text: str) -> str:
-    """Return text of a file in a form that a terminal can show."""
     return shown(text, 80)
 
 

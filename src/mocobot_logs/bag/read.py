@@ -105,7 +105,6 @@ class RowAligner:
         return self._rows(max(ready, len(leader) - HELD))
 
     def finish(self) -> Samples | None:
-        """Return the remaining rows, if any."""
         return self._rows(len(self._topics[self._leader].stamp_ns))
 
     def _rows(self, ready: int) -> Samples | None:
@@ -247,10 +246,7 @@ class Look:
         if self.joints(topic):
             for sent in self._senders[topic]:
                 mine = set(joints) & sent
-                groups = [
-                    *(g for g in groups if not g & mine),
-                    mine.union(*(g for g in groups if g & mine)),
-                ]
+                groups = [*(g for g in groups if not g & mine), mine.union(*(g for g in groups if g & mine))]
         return sorted(filter(None, groups), key=lambda group: min(map(joints.index, group)))
 
     def sent(self, topic: str, joints: Sequence[str], clock: Clock) -> Stamps:
@@ -312,7 +308,6 @@ class Look:
         return tuple(reader.joints)
 
     def fields(self, topic: str) -> tuple[str, ...]:
-        """Return the names of the fields of a topic's type."""
         kind = message_type(self._files.topics[topic], self._bag)
         return tuple(name for name, _ in kind.fields(kind.name))
 
@@ -382,7 +377,6 @@ class BagSource:
     """A bag as a ``LogSource``."""
 
     def __init__(self, path: Path, log_map: LogMap | None) -> None:
-        """See ``open_bag``."""
         self.name = str(path)
         self._files = BagFiles(path)
         self._look = Look(self.name, self._files)
@@ -410,7 +404,6 @@ class BagSource:
         self.metadata = self._read_metadata()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples robot by robot, see ``LogSource.chunks``."""
         readers = {
             name: _Reader(topic, self._clock, unset=name in self._unset)
             for name, topic in self._topics.items()
@@ -603,7 +596,6 @@ class _Reader:
         self._zeros = self._others = 0
 
     def read(self, messages: Messages, parts: list[dict[int, Samples]]) -> None:
-        """Read the messages of a block into the robots' parts."""
         stamps, numbers, named = self._cdr.read_named(messages)
         if self._clock == "log":
             stamps = messages.log_ns

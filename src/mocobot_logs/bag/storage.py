@@ -63,8 +63,6 @@ _Starts = dict[int, list[int]]
 
 
 class McapBag:
-    """One MCAP file of a bag."""
-
     def __init__(self, path: Path, name: str, unpacked: Unpacked) -> None:
         """Find the topics in the summary or, without one, in the whole file; ``unpacked`` counts bytes of chunks."""
         self._path, self.name, self._unpacked = path, name, unpacked
@@ -92,7 +90,6 @@ class McapBag:
     def blocks(
         self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
-        """Yield messages of some topics, see ``BagFiles.blocks``."""
         for block, found in self._scan(topics, advance, block_bytes):
             by_topic: dict[str, list[int]] = {}
             for channel, starts in found.items():
@@ -312,10 +309,7 @@ _Row = tuple[int, bytes, int, int]  # topic, message, time of logging [ns], row 
 
 
 class SqliteBag:
-    """One SQLite file of a bag."""
-
     def __init__(self, path: Path, name: str) -> None:
-        """Find the topics."""
         self.path, self.name = path, name
         self._check_file()
         with self._connected() as connection:
@@ -327,7 +321,6 @@ class SqliteBag:
     def blocks(
         self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
-        """Yield messages of some topics, see ``BagFiles.blocks``."""
         ids = [key for key, name in self._ids.items() if name in topics]
         last, told, held = -(1 << 63), 0, 0
         with self._connected() as connection:
@@ -353,7 +346,6 @@ class SqliteBag:
         advance(self.size - told)
 
     def has_messages(self, topic: str) -> bool:
-        """Return whether a topic has messages."""
         ids = [key for key, name in self._ids.items() if name == topic]
         with self._connected() as connection:
             marks = ",".join("?" * len(ids))

@@ -63,7 +63,6 @@ class ChecksummedMcap:
         self._channels: dict[int, int] = {}
 
     def add_msgtype(self, connection: Connection) -> None:
-        """Write the definition of a message type."""
         definition = connection.msgdef
         encoding = "ros2msg" if definition.format == MessageDefinitionFormat.MSG else "ros2idl"
         self._schemas[connection.msgtype] = self._writer.register_schema(
@@ -71,7 +70,6 @@ class ChecksummedMcap:
         )
 
     def add_connection(self, connection: Connection, offered_qos_profiles: str) -> None:
-        """Write a topic."""
         self._channels[connection.id] = self._writer.register_channel(
             connection.topic,
             cast(ConnectionExtRosbag2, connection.ext).serialization_format,
@@ -91,7 +89,6 @@ class ChecksummedMcap:
         self._file.close()
 
     def abort(self) -> None:
-        """Close without an index."""
         self._file.close()
 
 

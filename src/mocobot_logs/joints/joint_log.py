@@ -63,7 +63,6 @@ class Drive:
     command_velocity: Array | None = None
 
     def __post_init__(self) -> None:
-        """Fill in the arrays that are not given."""
         if self.gain_within is None:
             object.__setattr__(self, "gain_within", np.ones((len(self.gear), 2)))
         if self.delay_s is None:
@@ -132,5 +131,4 @@ class JointLog:
 
     @property
     def period_s(self) -> float:
-        """Sampling period [s]."""
         return 1.0 / self.rate_hz

@@ -36,8 +36,6 @@ Kind = Literal["position", "velocity", "effort", "current", "duty", "voltage", "
 
 @dataclass(frozen=True)
 class Quantity:
-    """A kind of column."""
-
     kind: Kind  # what it measures
     motor: bool = False  # whether it is measured on the motor's side of the gear
     shared: bool = False  # whether the robot has one such column, not one per joint
@@ -213,7 +211,6 @@ def parse_joint_map(
 
 
 def _joint_names(top: Fields, model: Sequence[str]) -> tuple[str, ...]:
-    """Return the joint names in the map's order."""
     names = top.list("joints")
     if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
         top.refuse("joints", "a list of distinct names of the model's joints")

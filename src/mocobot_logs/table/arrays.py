@@ -58,7 +58,6 @@ class Stored:
 
     @property
     def row_shape(self) -> tuple[int, ...]:
-        """Shape of one row."""
         return self.shape[1:]
 
     @property
@@ -160,14 +159,12 @@ class NpzTable(ArrayTable):
     noun, kind = "array", "NPZ archive"
 
     def __init__(self, path: Path, name: str) -> None:
-        """Read the directory of the archive and the header of every array."""
         self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
         with self._opened() as archive:
             self._take(self._headers(archive))
             self.metadata = self._read_metadata(archive)
 
     def readers(self, names: Sequence[str], stack: ExitStack) -> dict[str, Reader]:
-        """See ``ArrayTable.readers``."""
         archive = stack.enter_context(self._opened())
         return {
             name: self.arrays[name].reader(stack.enter_context(archive.open(self.arrays[name].at)))
@@ -272,7 +269,6 @@ class MatTable(ArrayTable):
     noun, kind = "variable", "MATLAB file"
 
     def __init__(self, path: Path, name: str) -> None:
-        """Read the tags, sizes and names of all variables."""
         self.name, self._path, self.stored_bytes = name, path, path.stat().st_size
         with told_in_one_sentence(name, self.kind), open_input(path) as file:
             header = file.read(_MAT_HEADER)
@@ -291,7 +287,6 @@ class MatTable(ArrayTable):
             )
 
     def readers(self, names: Sequence[str], stack: ExitStack) -> dict[str, Reader]:
-        """See ``ArrayTable.readers``."""
         arrays = {name: self.arrays[name] for name in names}
         return {
             name: array.reader(self._content(stack.enter_context(open_input(self._path)), array.at))

@@ -42,7 +42,6 @@ class ParquetTable(Table):
     """
 
     def __init__(self, path: Path, name: str) -> None:
-        """Read the file's footer."""
         self._path = path
         with opened(path, name) as file:
             rows, schema = file.metadata.num_rows, file.schema_arrow
@@ -62,7 +61,6 @@ class ParquetTable(Table):
         self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows in the order of the file, see ``Table.blocks``."""
         names = list(dict.fromkeys([*wanted.columns, *wanted.clocks]))
         for name in names:
             self._check_type(name, time=name in wanted.clocks)
@@ -318,7 +316,6 @@ def episodes_of(path: Path) -> list[int]:
 
 
 def _every(files: Files, name: str) -> list[int]:
-    """Return all episodes of data files."""
     if not files:
         raise InputError(f"{name}: has no Parquet files under data")
     told = [known for known in files.values() if known is not None]

@@ -30,8 +30,6 @@ class Block:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Columns to read from a table."""
-
     columns: tuple[str, ...]  # names of columns read as numbers
     clocks: tuple[str, ...]  # names of columns read as time
     unit_ns: int | None  # nanoseconds per unit of time, None for dates
@@ -77,7 +75,6 @@ class TableSource:
     notes: Sequence[str] = ()
 
     def __init__(self, table: Table, log_map: LogMap) -> None:
-        """Locate every channel of every robot."""
         log_map.require("column", "tables")
         self._table, self._map = table, log_map
         self.name, self.size, self.metadata = table.name, table.size, table.metadata
@@ -95,7 +92,6 @@ class TableSource:
         self._check_shared()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
-        """Yield samples robot by robot, see ``LogSource.chunks``."""
         maps = [self._map.channels(robot) for robot in range(1, self.robots + 1)]
         below = [name for name in self._below if name is not None]
         columns = tuple(

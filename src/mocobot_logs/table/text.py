@@ -273,7 +273,6 @@ class CsvTable(Table):
     """
 
     def __init__(self, path: Path, options: CsvMap, name: str) -> None:
-        """Read the header."""
         self.name, self._path, self._decimal = name, path, options.decimal
         header, first_row, self._lines_before, self._start = _first_lines(path, name, options.decimal)
         self._delimiter = options.delimiter or _find_delimiter(header, first_row, options.decimal)
@@ -290,7 +289,6 @@ class CsvTable(Table):
         self.shapes: Mapping[str, tuple[int, ...]] = dict.fromkeys(self._names, ())
 
     def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
-        """Yield rows in the order of the file, see ``Table.blocks``."""
         columns, clocks = wanted.columns, wanted.clocks
         index = {name: self._index(name) for name in (*columns, *clocks)}
         types = {f"{index[name]}": pa.float64() for name in columns}
