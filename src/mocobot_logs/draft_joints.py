@@ -474,14 +474,11 @@ def _place_in(table: Table, column: str) -> tuple[str, tuple[int, ...]]:
 
 
 def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
-    from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
-    from mocobot_logs.bag.files import BagFiles
-    from mocobot_logs.bag.read import Look
+    from mocobot_logs.bag.read import Look  # the import takes a third of a second
 
-    files = BagFiles(path)
-    look = Look(str(path), files)
-    types = {topic: type_name(told) for topic, told in files.topics.items()}
-    named = {topic: set(joints) & set(look.joints(topic)) for topic in types if types[topic] == JOINT_STATE}
+    look = Look(path)
+    types = look.types
+    named = {topic: set(joints) & set(look.joints(topic)) for topic in types}
     of: dict[str, str] = {}  # the topic of each joint: that with most joints of the model
     for topic in sorted(named, key=lambda topic: -len(named[topic])):
         of = {joint: topic for joint in joints if joint in named[topic]} | of

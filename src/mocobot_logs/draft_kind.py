@@ -46,17 +46,11 @@ def draft_any(path: Path, episode: int | None = None) -> tuple[Draft, int | None
 
 def _joints_of_bag(path: Path) -> tuple[list[str], bool]:
     """Return the joints of the largest joint state, else those of a Franka, and whether messages name them."""
-    from mocobot_logs.bag.cdr import JOINT_STATE, type_name  # the import takes a third of a second
-    from mocobot_logs.bag.files import BagFiles
-    from mocobot_logs.bag.read import Look
+    from mocobot_logs.bag.read import Look  # the import takes a third of a second
 
-    files = BagFiles(path)
-    look = Look(str(path), files)
-    types = {topic: type_name(told) for topic, told in files.topics.items()}
-    told = max(
-        (list(look.joints(topic)) for topic in types if types[topic] == JOINT_STATE), key=len, default=[]
-    )
-    return (told, True) if told else (_numbered(max(map(arm_joints, types.values()), default=0)), False)
+    look = Look(path)
+    told = max((list(look.joints(topic)) for topic in look.types), key=len, default=[])
+    return (told, True) if told else (_numbered(max(map(arm_joints, look.types.values()), default=0)), False)
 
 
 def _joints_of_table(table: Table) -> list[str]:

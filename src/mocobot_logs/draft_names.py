@@ -272,22 +272,15 @@ _DEEPEST, _MOST = 4, 64
 
 def of_bag(path: Path) -> tuple[list[Candidate], frozenset[str]]:
     """Return the candidates of a bag (joints of joint states, numbers of other messages), and topics without stamps."""
-    from mocobot_logs.bag.cdr import (  # the import takes a third of a second
-        JOINT_STATE,
-        CdrReader,
-        Selector,
-        message_type,
-    )
-    from mocobot_logs.bag.files import BagFiles
+    from mocobot_logs.bag.cdr import JOINT_STATE, CdrReader, Selector  # the import takes a third of a second
     from mocobot_logs.bag.read import Look
 
-    files = BagFiles(path)
-    look = Look(str(path), files)
+    look = Look(path)
     found: list[Candidate] = []
     unstamped: set[str] = set()
-    for name, topic in files.topics.items():
+    for name in look.types:
         try:
-            kind = message_type(topic, str(path))
+            kind = look.kind(name)
             if kind.name == JOINT_STATE:
                 joints = look.joints(name)
                 selectors = [Selector(field, joint) for joint in joints for field in ("position", "effort")]

@@ -36,7 +36,7 @@ from mocobot_logs.bag.cdr import (
     type_name,
 )
 from mocobot_logs.bag.files import BagFiles
-from mocobot_logs.bag.messages import Messages, listed, listed_names, printable
+from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, listed, listed_names, printable
 from mocobot_logs.log import NS, REF, Array, Level, Samples, Stamps, joined, rows_of
 from mocobot_logs.maps import ChannelMap, LogMap, builtin_map
 from mocobot_logs.resample_filter import held_means
@@ -198,85 +198,75 @@ _MAPS = ("mocobot-ros2", "omnid-ros2")
 class Look:
     """Reads the first messages of a bag's topics."""
 
-    def __init__(self, bag: str, files: BagFiles) -> None:
-        """``bag`` is the bag's name in messages; nothing is read yet."""
-        self._bag, self._files = bag, files
-        self._joints: dict[str, tuple[str, ...]] = {}
-        self._senders: dict[str, set[frozenset[str]]] = {}
+    def __init__(self, path: Path, files: BagFiles | None = None) -> None:
+        """``path`` names the bag in messages; no message is read yet."""
+        self._bag, self.files = str(path), files or BagFiles(path)
+        self.types = {topic: type_name(told) for topic, told in self.files.topics.items()}
+        self._named: dict[str, CdrReader] = {}
         self._stamps: dict[tuple[str, str], Stamps] = {}
+
+    def kind(self, topic: str) -> MessageType:
+        """Return the type of a topic's messages."""
+        return message_type(self.files.topics[topic], self._bag)
 
     def first(self, topic: str, block_bytes: int) -> Messages | None:
         """Return the first messages of a topic, about ``block_bytes`` bytes, or None if it has none."""
-        if not self._files.has_messages(topic):
-            return None
-        found = self._files.blocks((topic,), lambda _: None, block_bytes)
-        return next((block[topic] for block in found), None)
+        return next((block[topic] for block in self._blocks((topic,), block_bytes)), None)
 
-    def firsts(self, topic: str) -> Iterator[Messages]:
-        """Yield the first messages of a topic, at least ``STAMPS`` if there are so many.
+    def _blocks(self, topics: Sequence[str], block_bytes: int = BLOCK_BYTES) -> Iterator[dict[str, Messages]]:
+        there = tuple(filter(self.files.has_messages, topics))
+        return self.files.blocks(there, lambda _: None, block_bytes) if there else iter(())
 
-        Several publishers may each send some of the joints, and one of them may start late.
+    def _read(
+        self, topic: str, places: Sequence[tuple[str, str | None]], clock: Clock | None, most: int = STAMPS
+    ) -> tuple[CdrReader, Stamps, Array, NDArray[np.bool_]]:
+        """Read numbers from at least ``most`` of the first messages of a topic, if there are so many.
+
+        Several publishers may each send some of the joints, and one of them may start late. Returns the reader, stamps
+        [ns], shape (q,), numbers, NaN where lacking, and whether a message names each joint, shape (q, C).
         """
-        count = 0
-        blocks = self._files.blocks((topic,), lambda _: None) if self._files.has_messages(topic) else ()
-        for block in islice(blocks, _ENOUGH_BLOCKS):
-            if topic in block:
-                yield block[topic]
-                count += len(block[topic])
-            if count >= STAMPS:
-                return
+        reader = CdrReader(self.kind(topic), [Selector(*place) for place in places], clock == "header")
+        found = [(np.empty(0, np.int64), np.empty((0, len(places))), np.empty((0, len(places)), bool))]
+        for block in islice(self._blocks((topic,)), _ENOUGH_BLOCKS if most == STAMPS else None):
+            stamps, values, named = reader.read_named(block[topic])
+            found.append((stamps if clock == "header" else block[topic].log_ns, values, named))
+            if reader.count >= most:
+                break
+        stamps, values, named = (np.concatenate(each) for each in zip(*found, strict=True))
+        return reader, stamps, values, named
+
+    def _names(self, topic: str) -> CdrReader | None:
+        """Return what has read the joints of a topic, None if it has no joint states or does not exist."""
+        if self.types.get(topic) == JOINT_STATE and topic not in self._named:
+            self.kind(topic).require_joints("position")
+            self._named[topic] = self._read(topic, [("position", "")], None)[0]
+        return self._named.get(topic)
 
     def joints(self, topic: str) -> tuple[str, ...]:
         """Return the joints in the first messages of a topic, empty if it has no joint states or does not exist."""
-        if topic not in self._files.topics:
-            return ()
-        if topic not in self._joints:
-            kind = message_type(self._files.topics[topic], self._bag)
-            reader = CdrReader(kind, [Selector("position", "")], stamp=False)
-            if kind.name == JOINT_STATE:
-                kind.require_joints("position")
-                for messages in self.firsts(topic):
-                    reader.read(messages)
-            self._joints[topic], self._senders[topic] = tuple(reader.joints), reader.senders
-        return self._joints[topic]
+        return () if (reader := self._names(topic)) is None else tuple(reader.joints)
 
     def together(self, topic: str, joints: Sequence[str]) -> list[set[str]]:
         """Return the joints of a topic in groups, one for each publisher that sends joints of its own."""
         groups: list[set[str]] = []
-        if self.joints(topic):
-            for sent in self._senders[topic]:
-                mine = set(joints) & sent
-                groups = [*(g for g in groups if not g & mine), mine.union(*(g for g in groups if g & mine))]
+        reader = self._names(topic)
+        for sent in () if reader is None else reader.senders:
+            mine = set(joints) & sent
+            groups = [*(g for g in groups if not g & mine), mine.union(*(g for g in groups if g & mine))]
         return sorted(filter(None, groups), key=lambda group: min(map(joints.index, group)))
 
     def sent(self, topic: str, joints: Sequence[str], clock: Clock) -> Stamps:
         """Return stamps [ns] of the first messages of a topic that name some of the joints."""
-        kind, found = message_type(self._files.topics[topic], self._bag), [np.empty(0, np.int64)]
-        reader = CdrReader(kind, [Selector("position", joint) for joint in joints], clock == "header")
-        for messages in self.firsts(topic):
-            stamps, _, named = reader.read_named(messages)
-            found.append((stamps if clock == "header" else messages.log_ns)[named.any(axis=1)])
-        return np.concatenate(found)
+        _, stamps, _, named = self._read(topic, [("position", joint) for joint in joints], clock)
+        return stamps[named.any(axis=1)]
 
     def numbers(self, topic: str, joints: Sequence[str], field: str) -> dict[str, tuple[Array, str]]:
         """Return the finite values of a field in the first messages by joint, and why there are none, if so."""
-        reader = CdrReader(
-            message_type(self._files.topics[topic], self._bag),
-            [Selector(field, joint) for joint in joints],
-            stamp=False,
-        )
-        values = np.concatenate(
-            [np.empty((0, len(joints))), *(reader.read(m)[1] for m in self.firsts(topic))]
-        )
+        reader, _, values, _ = self._read(topic, [(field, joint) for joint in joints], None)
         found = {}
         for joint, x, lacking in zip(joints, values.T, reader.lacking, strict=True):
-            why = (
-                f"{field} is NaN"
-                if lacking is None
-                else f"{field} is empty"
-                if lacking.startswith(EMPTY)
-                else lacking.partition(": ")[2]
-            )
+            why = f"{field} is NaN" if lacking is None else lacking.partition(": ")[2]
+            why = f"{field} is empty" if lacking is not None and lacking.startswith(EMPTY) else why
             found[joint] = x[np.isfinite(x)], f"{why} in the first {reader.count} messages"
         return found
 
@@ -287,34 +277,23 @@ class Look:
 
         ``places`` are fields, each with the joint whose number it is, or None.
         """
-        kind = message_type(self._files.topics[topic], self._bag)
-        reader = CdrReader(kind, [Selector(*place) for place in places], clock == "header")
-        stamps, values = [np.empty(0, np.int64)], [np.empty((0, len(places)))]
-        for block in self._files.blocks((topic,), lambda _: None) if self._files.has_messages(topic) else ():
-            stamp, numbers = reader.read(block[topic])
-            stamps.append(stamp if clock == "header" else block[topic].log_ns)
-            values.append(numbers)
-            if reader.count > LOOKED:
-                break
-        return np.concatenate(stamps), np.concatenate(values)
+        return self._read(topic, places, clock, LOOKED)[1:3]
 
     def joint_names(self, topic: str) -> tuple[str, ...]:
-        """Return the texts of ``joint_names`` in the first messages of a topic, empty if there are none."""
-        reader = CdrReader(
-            message_type(self._files.topics[topic], self._bag), [Selector("", "")], stamp=False
-        )
+        """Return the texts of ``joint_names`` in the first message of a topic, empty if there are none."""
+        reader = CdrReader(self.kind(topic), [Selector("", "")], stamp=False)
         if (found := self.first(topic, 1)) is not None:
             reader.read(found)
         return tuple(reader.joints)
 
     def fields(self, topic: str) -> tuple[str, ...]:
-        kind = message_type(self._files.topics[topic], self._bag)
+        kind = self.kind(topic)
         return tuple(name for name, _ in kind.fields(kind.name))
 
     def is_stamped(self, topic: str) -> bool:
         """Return whether messages have header stamps, and the first ones are not all zero."""
         try:
-            message_type(self._files.topics[topic], self._bag).require_stamp()
+            self.kind(topic).require_stamp()
         except InputError:
             return False
         return bool(self.stamps((topic,), "header")[topic].any())
@@ -322,11 +301,10 @@ class Look:
     def stamps(self, topics: Sequence[str], clock: Clock) -> dict[str, Stamps]:
         """Return stamps [ns] of the first messages of some topics, in a single pass over the bag."""
         missing = [topic for topic in topics if (topic, clock) not in self._stamps]
-        kinds = {topic: message_type(self._files.topics[topic], self._bag) for topic in missing}
-        readers = {topic: CdrReader(kind, (), clock == "header") for topic, kind in kinds.items()}
+        readers = {topic: CdrReader(self.kind(topic), (), clock == "header") for topic in missing}
         found: dict[str, list[Stamps]] = {topic: [np.empty(0, np.int64)] for topic in missing}
-        wanted = tuple(topic for topic in missing if self._files.has_messages(topic))
-        for number, block in enumerate(self._files.blocks(wanted, lambda _: None) if wanted else (), 1):
+        wanted = tuple(filter(self.files.has_messages, missing))
+        for number, block in enumerate(self._blocks(wanted), 1):
             for topic, messages in block.items():
                 stamps = readers[topic].read(messages)[0] if clock == "header" else messages.log_ns
                 found[topic].append(stamps)
@@ -378,8 +356,8 @@ class BagSource:
 
     def __init__(self, path: Path, log_map: LogMap | None) -> None:
         self.name = str(path)
-        self._files = BagFiles(path)
-        self._look = Look(self.name, self._files)
+        self._look = Look(path)
+        self._files = self._look.files
         self._map = self._choose_map() if log_map is None else log_map
         self._clock: Clock = self._map.time.clock
         self.level: Level = self._map.level
