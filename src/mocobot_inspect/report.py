@@ -68,9 +68,8 @@ from mocobot_inspect.findings import (
 from mocobot_inspect.joint_motion import Follows, pooled
 from mocobot_inspect.joints import JointInspection
 from mocobot_inspect.mistakes import Mistake, listed
-from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.survey import Timing
-from mocobot_inspect.team import Inspection, differs
+from mocobot_inspect.team import AXES, Inspection, Readiness, differs
 from mocobot_inspect.team_wiring import Misfit, Wiring
 from mocobot_logs.joints.joint_map import COMMAND_KINDS, COMMANDS, QUANTITIES
 from mocobot_logs.resample import MAX_GAP_S, MOST_MISSING

@@ -4,7 +4,7 @@ Seconds count from the log's start, the earliest first stamp of its robots. Both
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_logs.log import Level, LogSource, Samples, Stamps, rows_of
+from mocobot_logs.log import LogSource, Samples, Selection, Stamps, rows_of
 from mocobot_logs.resample import is_hole
 
 SHORTEST_NS = 9_500_000_000
@@ -126,26 +126,19 @@ def _drop(text: str) -> Drop:
     return Drop(int(found[1]), span)
 
 
-class Piece:
+class Piece(Selection):
     """A span of a log without the dropped samples, as a ``LogSource``."""
 
     def __init__(self, source: LogSource, origin_ns: int, span: Span | None, drops: tuple[Drop, ...]) -> None:
         """Keep a span (None for all) without the drops; both count from ``origin_ns``. Nothing is read yet."""
-        self.name = source.name if span is None else f"{source.name} ({span})"
-        self.level: Level = source.level
-        self.robots, self.channels = source.robots, source.channels
-        self.metadata, self.size = source.metadata, source.size
-        self.span, self._source, self._origin_ns = span, source, origin_ns
+        super().__init__(source, source.name if span is None else f"{source.name} ({span})")
+        self.span, self._origin_ns = span, origin_ns
         self._drops = [[d.span for d in drops if d.robot == i + 1] for i in range(source.robots)]
-
-    @property
-    def notes(self) -> Sequence[str]:
-        return self._source.notes
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         """Yield samples as ``LogSource.chunks``; reading stops after the span."""
         passed = [False] * self.robots
-        for robot, samples in self._source.chunks(advance):
+        for robot, samples in self.source.chunks(advance):
             after = samples.stamp_ns - self._origin_ns
             keep = np.ones(len(after), bool)
             if self.span is not None:

@@ -128,7 +128,6 @@ class Follow:
         """Return the command's place with what was found as a comment, and its doubts."""
         if self.left > MOST_LEFT:
             share = f"{100 * self.left:.0f} % of its variance is left"
-            share = f"{100 * self.left:.0f} % of its variance is left"
             return place.told("", f"the position does not follow it ({share})")
         when = f"by {1e3 * self.lag_s:.0f} ms" if self.lag_s >= 0.5e-3 else "at once"
         against = [joint for joint, slope in zip(joints, self.slope, strict=True) if slope < 0]

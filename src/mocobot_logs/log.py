@@ -123,33 +123,31 @@ def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp] | slice
 
 _EFFORTS = ("tau", "force_", "torque", "link_torque", "motor_torque", "current")
 _UNMEASURED = (
-    "ref_",
-    "command",
-    "motor_command",
-    "feedforward",
-    "duty",
-    "motor_voltage",
-    "supply",
-    "enabled",
-)
+    "ref_", "command", "motor_command", "feedforward", "duty", "motor_voltage", "supply", "enabled"
+)  # fmt: skip
 """Prefixes of channel names, for teams and joints: measured efforts, and channels that are no measurements."""
 
 
-class Readings:
-    """A log without rows that repeat the previous reading, as a ``LogSource``; ``Samples.repeats`` counts them."""
+class Selection:
+    """What a log that yields some rows of another ``source`` has in common with it; subclasses add ``chunks``."""
 
-    def __init__(self, source: LogSource) -> None:
+    def __init__(self, source: LogSource, name: str | None = None) -> None:
+        self.name, self.source = name or source.name, source
         self.level: Level = source.level
-        self.name, self.robots, self.channels = source.name, source.robots, source.channels
-        self.metadata, self.size, self._source = source.metadata, source.size, source
+        self.robots, self.channels = source.robots, source.channels
+        self.metadata, self.size = source.metadata, source.size
 
     @property
     def notes(self) -> Sequence[str]:
-        return self._source.notes
+        return self.source.notes
+
+
+class Readings(Selection):
+    """A log without rows that repeat the previous reading, as a ``LogSource``; ``Samples.repeats`` counts them."""
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         streams = [_Stream(self.channels) for _ in range(self.robots)]
-        for robot, samples in self._source.chunks(advance):
+        for robot, samples in self.source.chunks(advance):
             if (told := streams[robot].push(samples)) is not None:
                 yield robot, told
         for robot, stream in enumerate(streams):

@@ -58,13 +58,9 @@ def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = No
     name = str(path)
     if kind == "csv":
         return CsvTable(path, options, name)
-    if kind == "npz":
-        return NpzTable(path, name)
-    if kind == "mat":
-        return MatTable(path, name)
     if kind == "lerobot":
         return LeRobotTable(path, name, episode)
-    return ParquetTable(path, name)
+    return {"npz": NpzTable, "mat": MatTable}.get(kind, ParquetTable)(path, name)
 
 
 def _default_map(table: Table) -> LogMap:

@@ -36,7 +36,7 @@ from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import LIST
-from mocobot_report import residuals, torques
+from mocobot_report import residuals
 from mocobot_report.charts import Chart, Key, column_axis, dots, literal, log_axis, rule
 from mocobot_report.folder import Diagnosed, Result, sources
 from mocobot_report.numbers import (
@@ -106,7 +106,7 @@ def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
         "suspected": _suspected(values["suspected"]),
         "gain": _gain(values, names),
         "rollouts": _rollouts(values.get("rollouts")),
-        "torques": torques.torques(found, names),
+        "torques": residuals.torques(found, names),
         "residuals": residuals.residuals(found, names, say),
         "places": residuals.places(values, names),
         "evidence": residuals.evidence(values),

@@ -15,9 +15,8 @@ from estimator.estimate.uncertainty import StepReport, WeakDirection
 from mocobot_inspect.channels import Oscillation, Stretch
 from mocobot_inspect.findings import evidence, findings
 from mocobot_inspect.grasps import Fault
-from mocobot_inspect.readiness import Readiness, idle_axes
 from mocobot_inspect.report import format_inspection, verdict
-from mocobot_inspect.team import Inspection, Segments, inspect_log
+from mocobot_inspect.team import Inspection, Readiness, Segments, idle_axes, inspect_log
 from mocobot_inspect.team_wiring import Misfit, Wiring
 from omnid_design import DESIGN
 

@@ -22,9 +22,8 @@ from log_files import write_text
 from miswired import miswire
 from mocobot.cli import main
 from mocobot_inspect.findings import findings
-from mocobot_inspect.readiness import QUANTITIES, Readiness
 from mocobot_inspect.report import ready_line
-from mocobot_inspect.team import Inspection, Standing, inspect_log
+from mocobot_inspect.team import QUANTITIES, Inspection, Readiness, Standing, inspect_log
 from mocobot_inspect.team_wiring import Misfit, Wiring
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.open_log import open_log

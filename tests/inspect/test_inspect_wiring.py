@@ -11,8 +11,8 @@ from estimator.arm.delta import wrist_of
 from estimator.arm.unit import Arms
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
-from mocobot_inspect.readiness import readiness
 from mocobot_inspect.signals import Signals, signals_of
+from mocobot_inspect.team import readiness
 from mocobot_inspect.team_wiring import SUSPICIOUS, Misfit, Team, Wiring, check_wiring, shows
 from mocobot_logs.log import Level
 from mocobot_sim.scene.scene import build_team

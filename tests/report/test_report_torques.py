@@ -14,7 +14,7 @@ from joint_logs import write_csv
 from made_arm import JOINTS, MAP, made, write_log, write_map
 from mocobot_report.folder import read_folder
 from mocobot_report.page import write_report
-from mocobot_report.torques import torques
+from mocobot_report.residuals import torques
 
 TITLE = "Measured and modelled torques"
 

@@ -22,7 +22,7 @@ from rosbags.typesys.msg import normalize_msgtype
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_logs.bag.messages import Messages, Topic, printable
+from mocobot_logs.bag.storage import Messages, Topic, printable
 from mocobot_logs.log import Stamps
 
 JOINT_STATE = "sensor_msgs/msg/JointState"

@@ -19,16 +19,17 @@ from ruamel.yaml.tokens import AnchorToken
 
 from estimator.errors import InputError
 from estimator.inputs import Unpacked, plain
-from mocobot_logs.bag.messages import (
+from mocobot_logs.bag.storage import (
     BLOCK_BYTES,
+    McapBag,
     Messages,
+    SqliteBag,
     UnpackError,
     joined,
     merged,
     unpack_file,
     unpack_message,
 )
-from mocobot_logs.bag.storage import McapBag, SqliteBag
 from mocobot_logs.formats import (
     BAG_METADATA,
     MCAP,

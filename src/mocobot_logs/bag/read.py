@@ -36,7 +36,7 @@ from mocobot_logs.bag.cdr import (
     type_name,
 )
 from mocobot_logs.bag.files import BagFiles
-from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, listed, listed_names, printable
+from mocobot_logs.bag.storage import BLOCK_BYTES, Messages, listed, listed_names, printable
 from mocobot_logs.log import NS, REF, Array, Level, Samples, Stamps, joined, rows_of
 from mocobot_logs.maps import ChannelMap, LogMap, builtin_map
 from mocobot_logs.resample_filter import held_means

@@ -44,8 +44,8 @@ from estimator.errors import InputError
 from estimator.files import check_place, holds, scratch_folder, whole_file, whole_folder
 from estimator.recording.model import Recording
 from mocobot_logs.bag.cdr import JOINT_STATE, STRING, Walk, message_type
-from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC
+from mocobot_logs.bag.storage import Topic
 from mocobot_logs.log import Array, Level, Stamps
 
 

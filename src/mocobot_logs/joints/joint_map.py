@@ -362,34 +362,19 @@ def _check_together(channels: Channels, control: Control, where: str) -> None:
 # Gears, coupled drives, torque constants and the loop.
 
 
-def _number(value: Any) -> float | None:
-    return float(value) if is_number(value) else None
-
-
-def _positive(value: Any) -> float | None:
-    number = _number(value)
-    return number if number is not None and number > 0 else None
-
-
-def _from(least: float) -> Callable[[Any], float | None]:
-    return lambda value: float(value) if is_number(value) and value >= least else None
-
-
-def _or_free(convert: Callable[[Any], float | None], free: float) -> Callable[[Any], float | None]:
-    return lambda value: free if value == "free" else convert(value)
-
-
-_RULES: dict[str, tuple[float, Callable[[Any], float | None], str]] = {
-    "gear": (1.0, lambda value: _number(value) or None, "a number of motor turns per joint turn, not 0"),
-    "zero": (0.0, _number, "a finite number"),
-    "torque_constant": (1.0, _or_free(_positive, _UNKNOWN), 'a positive number of newton metres per ampere, or "free"'),
-    "position_gain": (_UNKNOWN, _or_free(_positive, np.inf), 'a positive number, or "free"'),
-    "velocity_gain": (_UNKNOWN, _or_free(_from(0.0), np.inf), 'a number, not negative, or "free"'),
-    "limit": (_UNKNOWN, _positive, "a positive number"),
-    "gain_known_within": (1.0, _from(1.0), "a factor of at least 1, such as 2 for half to twice the gain"),
-    "delay_s": (_UNKNOWN, _from(0.0), "a number of seconds, not negative"),
+_RULES: dict[str, tuple[float, float | None, Callable[[float], bool], str]] = {
+    "gear": (1.0, None, lambda x: x != 0, "a number of motor turns per joint turn, not 0"),
+    "zero": (0.0, None, lambda x: True, "a finite number"),
+    "torque_constant": (
+        1.0, _UNKNOWN, lambda x: x > 0, 'a positive number of newton metres per ampere, or "free"'
+    ),
+    "position_gain": (_UNKNOWN, np.inf, lambda x: x > 0, 'a positive number, or "free"'),
+    "velocity_gain": (_UNKNOWN, np.inf, lambda x: x >= 0, 'a number, not negative, or "free"'),
+    "limit": (_UNKNOWN, None, lambda x: x > 0, "a positive number"),
+    "gain_known_within": (1.0, None, lambda x: x >= 1, "a factor of at least 1, such as 2 for half to twice the gain"),
+    "delay_s": (_UNKNOWN, None, lambda x: x >= 0, "a number of seconds, not negative"),
 }  # fmt: skip
-"""By key of a joint: default, converter (None refuses the value), and description of allowed values."""
+"""By key of a joint: default, what "free" stands for (None: not allowed), which numbers are allowed, and in words."""
 
 
 @dataclass(frozen=True)
@@ -406,7 +391,7 @@ class _PerJoint:
 
         A table gives one number for all joints or a list in the map's order; tables of single joints override it.
         """
-        default, convert, allowed = _RULES[key]
+        default, free, allows, allowed = _RULES[key]
         given = table.get(key, default)
         count = len(self.named)
         listed = given if isinstance(given, list) else [given] * count
@@ -418,11 +403,12 @@ class _PerJoint:
         for joint, value in zip(self.named, listed, strict=True):
             own = self.own.get(joint, {})
             value = own.get(key, value)
-            number = default if value is default else convert(value)
-            if number is None:
+            if value == "free" and free is not None:
+                value = free
+            elif value is not default and not (is_number(value) and allows(value)):
                 here = f"{self.where}: joint.{joint}" if key in own else inside
                 raise InputError(f"{here}: {key} is {value!r:.60}; it must be {allowed}")
-            found[joint] = number
+            found[joint] = value
         return np.array([found[joint] for joint in self.model], dtype=float)
 
 

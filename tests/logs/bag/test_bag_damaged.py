@@ -20,8 +20,8 @@ from bags import EPOCH_NS, NO_SUMMARY, OMNID, UNCHUNKED, Team, raw_mcap, rosbags
 from estimator.errors import InputError
 from fuzzing import damaged
 from mocobot_logs.bag.cdr import CdrReader, Selector, message_type
-from mocobot_logs.bag.messages import Topic, joined
 from mocobot_logs.bag.read import open_bag
+from mocobot_logs.bag.storage import Topic, joined
 from mocobot_logs.log import collect
 
 RANGES = {
