@@ -1,7 +1,5 @@
 """Problems of a log of a team or of joints: one sentence each, with its evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
@@ -36,15 +34,11 @@ SATURATED = 0.98  # share of the drive's limit above which a torque counts as sa
 LATE = 1.1
 """Smallest ratio of the torques' unexplained shares, without and with the delay, at which a delay is reported."""
 FACTORS = {
-    180.0 / np.pi: "degrees, taken for radians",
-    np.pi / 180.0: "radians, taken for degrees",
-    1e3: "thousandths, taken for whole units",
-    1e-3: "whole units, taken for thousandths",
-    30.0 / np.pi: "rpm, taken for rad/s",
-    np.pi / 30.0: "rad/s, taken for rpm",
-    1.0 / (2.0 * np.pi): "turns, taken for radians",
-    2.0 * np.pi: "radians, taken for turns",
-}
+    180.0 / np.pi: "degrees, taken for radians", np.pi / 180.0: "radians, taken for degrees",
+    1e3: "thousandths, taken for whole units", 1e-3: "whole units, taken for thousandths",
+    30.0 / np.pi: "rpm, taken for rad/s", np.pi / 30.0: "rad/s, taken for rpm",
+    1.0 / (2.0 * np.pi): "turns, taken for radians", 2.0 * np.pi: "radians, taken for turns",
+}  # fmt: skip
 """Gains that wrong units cause."""
 CLOSE = 0.05  # relative distance within which a gain counts as equal to a factor, or to 1
 _NAMED = 4  # most channels that a sentence names

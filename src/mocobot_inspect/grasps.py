@@ -1,7 +1,5 @@
 """Compute motion and force of the robots' grasps from possibly wrong channels, and fit one rigid body to them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Measured velocities are compared with differentiated positions, and positions wi
 all joints is estimated from all together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

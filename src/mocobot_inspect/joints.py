@@ -1,7 +1,5 @@
 """Inspect a joint log: stamps, channels, units, signs, order and delays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 

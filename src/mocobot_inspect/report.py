@@ -44,8 +44,6 @@ JSON of joints::
     findings, ready     as above
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from typing import Any
@@ -77,14 +75,9 @@ from mocobot_logs.resample import MAX_GAP_S, MOST_MISSING
 _HIDDEN = 6
 _AS_IT_IS = "nothing as it is; with "
 _JOINT_UNITS = {
-    "position": ("rad", "m"),
-    "velocity": ("rad/s", "m/s"),
-    "effort": ("N m", "N"),
-    "current": ("A", "A"),
-    "duty": ("1", "1"),
-    "voltage": ("V", "V"),
-    "flag": ("", ""),
-}
+    "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N m", "N"), "current": ("A", "A"),
+    "duty": ("1", "1"), "voltage": ("V", "V"), "flag": ("", ""),
+}  # fmt: skip
 """Units of a turning and of a sliding joint, by the quantity's kind."""
 
 

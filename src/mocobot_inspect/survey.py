@@ -1,8 +1,6 @@
 """Scan a log of any length once: stamps and channels of every robot, and an excerpt for tests that need many
 samples."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

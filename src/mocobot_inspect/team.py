@@ -1,7 +1,5 @@
 """Inspect a team's log: stamps, channels, clocks, wiring and excitation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

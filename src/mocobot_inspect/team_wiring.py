@@ -47,14 +47,9 @@ from mocobot_inspect.mistakes import SUSPICIONS, Mistake, refined, wrong_zero
 from mocobot_inspect.signals import Signals
 
 TOLERANCES = {
-    "rotation": 0.01,
-    "velocity": 0.03,
-    "tilt": 0.02,
-    "force": 0.03,
-    "moment": 0.025,
-    "angular speed": 0.01,
+    "rotation": 0.01, "velocity": 0.03, "tilt": 0.02, "force": 0.03, "moment": 0.025, "angular speed": 0.01,
     "lift": 0.03,
-}
+}  # fmt: skip
 """Disagreement of robots with encoder zeros off by 1 deg, springs by 2 % and lengths by 1 mm.
 
 Tilt is in rad, the others are relative to the signal. Measured: the largest of four payloads in random, periodic and

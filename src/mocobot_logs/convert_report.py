@@ -29,13 +29,9 @@ SURE = 4.0  # standard errors above which a clock difference is reported ...
 SMALL_S, SMALL_DRIFT = 1e-4, 5e-6
 """... if it also exceeds this [s, s/s]; 0.1 ms changes estimates by less than the sensors' noise."""
 _COLUMNS = (
-    ("samples", ""),
-    ("rate", "Hz"),
-    ("jitter", "rms, max ms"),
-    ("gaps", "longest ms"),
-    ("filled", ""),
+    ("samples", ""), ("rate", "Hz"), ("jitter", "rms, max ms"), ("gaps", "longest ms"), ("filled", ""),
     ("doubles", ""),
-)
+)  # fmt: skip
 _WIDTHS = (9, 9, 15, 13, 7, 8)
 _ONTO = "interpolated onto the grid of robot 1"
 _DONE = {

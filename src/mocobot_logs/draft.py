@@ -1,7 +1,5 @@
 """Draft a team's map: TOML that reads a log as far as names and values tell, with comments on doubtful lines."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

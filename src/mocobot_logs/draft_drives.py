@@ -52,14 +52,8 @@ class Place:
 _LEG = ("hip", "thigh", "calf")
 _G1_LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
 _G1_ARM = (
-    "shoulder_pitch",
-    "shoulder_roll",
-    "shoulder_yaw",
-    "elbow",
-    "wrist_roll",
-    "wrist_pitch",
-    "wrist_yaw",
-)
+    "shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw",
+)  # fmt: skip
 _UNITREE: tuple[tuple[str, ...], ...] = (
     tuple(f"{leg}_{name}" for leg in ("fr", "fl", "rr", "rl") for name in _LEG),
     (

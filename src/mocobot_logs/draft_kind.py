@@ -1,7 +1,5 @@
 """Draft the map of a log of unknown kind: of a team if the log has a team's channels, else of one robot's joints."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator
 from dataclasses import replace

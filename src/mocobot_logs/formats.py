@@ -53,13 +53,8 @@ def told_in_one_sentence(where: str, kind: str) -> Iterator[None]:
 
 OutputKind = Literal["parquet", "csv", "npz", "mcap", "sqlite3", "folder"]
 SUFFIXES: dict[str, OutputKind] = {
-    ".parquet": "parquet",
-    ".csv": "csv",
-    ".npz": "npz",
-    ".mcap": "mcap",
-    ".db3": "sqlite3",
-    "": "folder",
-}
+    ".parquet": "parquet", ".csv": "csv", ".npz": "npz", ".mcap": "mcap", ".db3": "sqlite3", "": "folder",
+}  # fmt: skip
 """Output formats by suffix of the target; a bag's folder has none."""
 
 

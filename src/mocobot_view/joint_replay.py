@@ -1,7 +1,5 @@
 """Replay of a joint log in Rerun: robot motion, and position, command, torque and model torque of every joint."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

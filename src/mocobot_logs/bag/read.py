@@ -10,8 +10,6 @@ a note says so.
 A bag of any length is read once from front to back, a few MiB at a time.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Torques that drives without torque readings are asked for: by a command, or by a position loop with known gains."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

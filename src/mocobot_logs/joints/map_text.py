@@ -1,7 +1,5 @@
 """Put numbers of a position loop into the text of a map."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping

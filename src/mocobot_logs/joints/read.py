@@ -5,8 +5,6 @@ parts. Uneven stamps are treated as in ``resample``: polynomials bridge short ga
 grid, and a known low-pass leads back to the log's rate. This averages the noise of close samples and avoids aliasing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
