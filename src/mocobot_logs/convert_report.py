@@ -21,7 +21,7 @@ import numpy as np
 
 from estimator.clocks import ClockEstimate
 from mocobot_logs.convert import Converted
-from mocobot_logs.cut import Omission
+from mocobot_logs.cut import Omission, Span
 from mocobot_logs.log import Array, repeated
 from mocobot_logs.resample import StreamReport
 
@@ -186,6 +186,7 @@ def _clock(estimate: ClockEstimate, robot: int) -> str:
 
 
 FORMAT, VERSION = "mocobot-conversion", 1
+_OF_CLOCKS = ("offset_s", "offset_se_s", "drift", "drift_se")
 
 
 def conversion_dict(
@@ -199,21 +200,15 @@ def conversion_dict(
         "level": recordings[0][0].level,
         "recordings": [_recording(*each) for each in recordings],
         "left_out": [
-            {
-                "from_s": each.span.first_ns / 1e9,
-                "to_s": each.span.last_ns / 1e9,
-                "robot": each.robot,
-                "samples": each.samples,
-                "why": each.why,
-            }
+            _ends(each.span) | {"robot": each.robot, "samples": each.samples, "why": each.why}
             for each in left_out
         ],
     }
 
 
 def _recording(converted: Converted, file: Path | None) -> dict[str, Any]:
-    recording, span = converted.recording, converted.span
-    estimate, metadata = converted.clocks.estimate, recording.metadata
+    recording, estimate = converted.recording, converted.clocks.estimate
+    metadata = recording.metadata
     return {
         "file": None if file is None else str(file),
         "samples": len(recording.time),
@@ -222,21 +217,22 @@ def _recording(converted: Converted, file: Path | None) -> dict[str, Any]:
         "level": metadata.level,
         "trial": metadata.trial,
         "payload": metadata.payload,
-        "from_s": None if span is None else span.first_ns / 1e9,
-        "to_s": None if span is None else span.last_ns / 1e9,
+        **_ends(converted.span),
         "streams": [
             stream.to_dict() | {"on_grid": same}
             for stream, same in zip(converted.streams, converted.clocks.untouched, strict=True)
         ],
         "clocks": {
             "corrected": converted.clocks.corrected,
-            "offset_s": _numbers(estimate.offset_s),
-            "offset_se_s": _numbers(estimate.offset_se_s),
-            "drift": _numbers(estimate.drift),
-            "drift_se": _numbers(estimate.drift_se),
+            **{key: _numbers(getattr(estimate, key)) for key in _OF_CLOCKS},
             "why_not": list(estimate.why_not),
         },
     }
+
+
+def _ends(span: Span | None) -> dict[str, float | None]:
+    first_s, last_s = (None, None) if span is None else (span.first_ns / 1e9, span.last_ns / 1e9)
+    return {"from_s": first_s, "to_s": last_s}
 
 
 def _numbers(values: Array) -> list[float | None]:

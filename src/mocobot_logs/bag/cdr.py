@@ -9,9 +9,10 @@ an ``InputError`` that names the bag and the topic.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -327,6 +328,12 @@ class Selector:
     joint: str | None = None  # name of the joint whose number it is, or None
 
 
+def record_of(places: Mapping[str, tuple[Any, int]], size: int) -> np.dtype:
+    """Return the record with named numbers or arrays of a kind at an offset in messages of ``size`` bytes."""
+    kinds, offsets = zip(*places.values(), strict=True) if places else ((), ())
+    return np.dtype({"names": [*places], "formats": [*kinds], "offsets": [*offsets], "itemsize": size})
+
+
 EMPTY = "has no"  # first words of what a selector lacks if the array of a field is empty
 _UNEQUAL = "cannot be told from the others"
 
@@ -358,14 +365,7 @@ class Layout:
             self.lacking.append(place if isinstance(place, str) else None)
             if not isinstance(place, str):
                 places[str(number)] = place
-        self._record = np.dtype(
-            {
-                "names": list(places),
-                "formats": [kind for kind, _ in places.values()],
-                "offsets": [offset for _, offset in places.values()],
-                "itemsize": len(message),
-            }
-        )
+        self._record = record_of(places, len(message))
 
     @staticmethod
     def _place(selector: Selector, walk: Walk) -> tuple[str, int] | str:

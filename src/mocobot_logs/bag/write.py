@@ -43,7 +43,7 @@ from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
 from estimator.files import check_place, holds, scratch_folder, whole_file, whole_folder
 from estimator.recording.model import Recording
-from mocobot_logs.bag.cdr import JOINT_STATE, STRING, Walk, message_type
+from mocobot_logs.bag.cdr import JOINT_STATE, STRING, Walk, message_type, record_of
 from mocobot_logs.bag.read import METADATA_TOPIC
 from mocobot_logs.bag.storage import Topic
 from mocobot_logs.log import Array, Level, Stamps
@@ -99,6 +99,7 @@ SUFFIXES: dict[Storage, str] = {"mcap": ".mcap", "sqlite3": ".db3"}
 POINT = "geometry_msgs/msg/PointStamped"
 _ARM: dict[Level, tuple[str, ...]] = {"joint": ("phi1", "phi2", "phi3"), "wrist": ("x", "y", "z")}
 _GIMBAL = ("gimbal_z", "gimbal_y", "gimbal_x")
+_SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 _LAST_S = 2**31 - 1  # seconds of a stamp are an int32
 _AT_ONCE = 4096
 _VERSION = 8  # of metadata.yaml: the newest with quality of service as text, as ROS 2 Humble needs it
@@ -260,7 +261,7 @@ class _Stream:
         """Return one message per stamp, with numbers (q, n) for each array of the record after the stamp."""
         rows: NDArray[np.uint8] = np.tile(np.frombuffer(self.template, np.uint8), (len(stamps), 1))
         table = rows.view(self.record)[:, 0]
-        table["sec"], table["nanosec"] = np.divmod(stamps, 1_000_000_000)
+        table[_SEC], table[_NANOSEC] = np.divmod(stamps, 1_000_000_000)
         for name, value in zip((self.record.names or ())[2:], values, strict=True):
             table[name] = value
         return [row.tobytes() for row in rows]
@@ -288,13 +289,7 @@ def _header(types: Typestore, frame: str) -> Any:
 def _stream(connection: Connection, message: object, arrays: dict[str, int], types: Typestore) -> _Stream:
     template = bytes(types.serialize_cdr(message, connection.msgtype, little_endian=True))
     kind = message_type(Topic(connection.topic, connection.msgtype, "cdr"), "bag")
-    walk = Walk(template, kind, {"header.stamp.sec", "header.stamp.nanosec", *arrays}, names=False)
-    record = np.dtype(
-        {
-            "names": ["sec", "nanosec", *arrays],
-            "formats": ["<i4", "<u4", *(("<f8", (count,)) for count in arrays.values())],
-            "offsets": [walk.leaves[p].offset for p in ("header.stamp.sec", "header.stamp.nanosec", *arrays)],
-            "itemsize": len(template),
-        }
-    )
-    return _Stream(connection, template, record)
+    kinds = {_SEC: "<i4", _NANOSEC: "<u4"} | {path: ("<f8", (count,)) for path, count in arrays.items()}
+    leaves = Walk(template, kind, set(kinds), names=False).leaves
+    places = {path: (form, leaves[path].offset) for path, form in kinds.items()}
+    return _Stream(connection, template, record_of(places, len(template)))
