@@ -219,29 +219,24 @@ def _log_arrows(stream: rr.RecordingStream, replay: JointReplay) -> None:
 
 
 def _log_series(stream: rr.RecordingStream, replay: JointReplay) -> None:
-    log, every = replay.log, slice(None, None, replay.every)
+    log = replay.log
+    q, torque, command, duty = (
+        None if x is None else x[:: replay.every]
+        for x in (log.q, log.torque, log.command if log.drive.command == "position" else None, log.drive.duty)
+    )
+    lines = (
+        ("position", "measured", q, MEASURED),
+        ("torque", "measured", torque, MEASURED),
+        ("torque", "model, without friction", replay.asked, ASKED),
+        ("torque", "corrected, with the causes", replay.found, FOUND),
+        ("position", "commanded", command, COMMANDED),
+        ("duty", "measured", duty, MEASURED),
+    )
     for j in range(len(replay.joints)):
-        root = _series(replay, j)
-        lines: list[tuple[str, str, Array | None, Colour]] = [
-            ("position", "measured", log.q[every, j], MEASURED),
-            ("torque", "measured", None if log.torque is None else log.torque[every, j], MEASURED),
-            ("torque", "model, without friction", replay.asked[:, j], ASKED),
-            (
-                "torque",
-                "corrected, with the causes",
-                None if replay.found is None else replay.found[:, j],
-                FOUND,
-            ),
-        ]
-        if log.command is not None and log.drive.command == "position":
-            lines.append(("position", "commanded", log.command[every, j], COMMANDED))
-        if log.drive.duty is not None:
-            lines.append(("duty", "measured", log.drive.duty[every, j], MEASURED))
         for quantity, name, values, colour in lines:
-            if values is None or not np.isfinite(values).any():
-                continue
-            path = f"{root}/{quantity}/{name.split(',')[0]}"
-            log_lines(stream, path, replay.series_time, values[:, None], [name], [colour])
+            if values is not None and np.isfinite(values[:, j]).any():
+                path = f"{_series(replay, j)}/{quantity}/{name.split(',')[0]}"
+                log_lines(stream, path, replay.series_time, values[:, [j]], [name], [colour])
 
 
 def _series(replay: JointReplay, j: int) -> str:

@@ -230,28 +230,25 @@ def read_estimate(path: Path) -> PayloadEstimate:
 
 def _check(estimate: PayloadEstimate) -> None:
     """Check shapes and finiteness of the drawn quantities, which ``PayloadEstimate.from_dict`` does not check."""
-    facts: list[tuple[str, Any, tuple[int, ...]]] = [("com.p_1c_m", estimate.p_1c, (3,))]
     if type(estimate.robots) is not int or estimate.robots < 1:
         raise InputError(f"robots is {estimate.robots!r:.40}; it must be a whole number of at least 1")
-    if estimate.p_1c is not None:
-        facts.append(("com.covariance_m2", estimate.p_1c_covariance, (3, 3)))
-    if (grasps := estimate.grasps) is not None:
-        N = estimate.robots
-        facts += [("grasps.R_axis_angle_deg", grasps.R_1i, (N, 3, 3)), ("grasps.p_m", grasps.p_1i, (N, 3))]
-        facts += [
-            ("grasps.covariance", grasps.covariance, (6 * (N - 1),) * 2),
-            ("grasps.angular_residual_radps", grasps.angular_residual_rms, (N, N)),
-            ("grasps.linear_residual_mps", grasps.linear_residual_rms, (N, N)),
-        ]
-    if (mass := estimate.mass) is not None:
-        facts += [("mass.m_kg", mass.mass, ()), ("mass.m_se_kg", mass.se, ())]
-    if (inertia := estimate.inertia) is not None:
-        facts += [
-            ("inertia.I_b_kgm2", inertia.inertia, (3, 3)),
-            ("inertia.principal_kgm2", inertia.principal.moments, (3,)),
-            ("inertia.principal_se_kgm2", inertia.principal.moments_se, (3,)),
-            ("inertia.R_1c_axis_angle_deg", inertia.principal.R_1c, (3, 3)),
-        ]
+    N, grasps, mass, inertia = estimate.robots, estimate.grasps, estimate.mass, estimate.inertia
+    principal = inertia and inertia.principal
+    facts: tuple[tuple[str, Any, tuple[int, ...]], ...] = (
+        ("com.p_1c_m", estimate.p_1c, (3,)),
+        ("com.covariance_m2", estimate.p_1c_covariance, (3, 3)),
+        ("grasps.R_axis_angle_deg", grasps and grasps.R_1i, (N, 3, 3)),
+        ("grasps.p_m", grasps and grasps.p_1i, (N, 3)),
+        ("grasps.covariance", grasps and grasps.covariance, (6 * (N - 1),) * 2),
+        ("grasps.angular_residual_radps", grasps and grasps.angular_residual_rms, (N, N)),
+        ("grasps.linear_residual_mps", grasps and grasps.linear_residual_rms, (N, N)),
+        ("mass.m_kg", mass and mass.mass, ()),
+        ("mass.m_se_kg", mass and mass.se, ()),
+        ("inertia.I_b_kgm2", inertia and inertia.inertia, (3, 3)),
+        ("inertia.principal_kgm2", principal and principal.moments, (3,)),
+        ("inertia.principal_se_kgm2", principal and principal.moments_se, (3,)),
+        ("inertia.R_1c_axis_angle_deg", principal and principal.R_1c, (3, 3)),
+    )
     for key, value, shape in facts:
         if value is not None and not _is(value, shape):
             size = " x ".join(map(str, shape)) + " finite numbers" if shape else "a finite number"
@@ -300,13 +297,10 @@ def drawn_payload(
         if payload is not None:
             raise
         elsewhere = str(error)
-    if elsewhere is None:
-        return wanted
-    if payload is not None:
-        notes.append(f"The geometry of payload {str(wanted)!r} is drawn as asked, but {elsewhere}.")
-        return wanted
-    notes.append(f"The geometry of payload {str(wanted)!r} is not drawn: {elsewhere}.")
-    return None
+    if elsewhere is not None:
+        how = "not drawn:" if payload is None else "drawn as asked, but"
+        notes.append(f"The geometry of payload {str(wanted)!r} is {how} {elsewhere}.")
+    return wanted if elsewhere is None or payload is not None else None
 
 
 def held_elsewhere(cad: Grasps, grasps: Grasps) -> str | None:

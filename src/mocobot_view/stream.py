@@ -307,24 +307,19 @@ def _estimate(trial: ReplayTrial) -> str:
     if estimate is None and truth is None:
         return ""
     facts = trial.facts
-    mass, inertia, com_se = None, None, None
-    if estimate is not None:
-        mass, inertia, com_se = estimate.mass, estimate.inertia, estimate.p_1c_se_m
-    com = facts.p_1c if facts else None
-    true_com, true_moments = (truth.p_1c, truth.principal_kgm2) if truth else (None, None)
-    moments, moments_se = (
-        (inertia.principal.moments, inertia.principal.moments_se) if inertia else (None, None)
+    mass = None if estimate is None else estimate.mass
+    com = (facts and facts.p_1c, estimate and estimate.p_1c_se_m, truth and truth.p_1c)
+    principal = estimate.inertia.principal if estimate and estimate.inertia else None
+    moments = (
+        principal and principal.moments,
+        principal and principal.moments_se,
+        truth and truth.principal_kgm2,
     )
     # One number per row, because the viewer cuts off text wider than its panel.
-    rows = [
-        (
-            "mass [kg]",
-            NOT_KNOWN if mass is None else f"{mass.mass:.4f} ± {mass.se:.4f}",
-            "" if truth is None else f"{truth.mass_kg:.4f}",
-        ),
-        *_rows("CoM {} in {{1}} [mm]", "xyz", (com, com_se, true_com), 1e3, 2),
-        *_rows("moment {} [kg m²]", "123", (moments, moments_se, true_moments), 1.0, 4),
-    ]
+    known = NOT_KNOWN if mass is None else f"{mass.mass:.4f} ± {mass.se:.4f}"
+    rows = [("mass [kg]", known, "" if truth is None else f"{truth.mass_kg:.4f}")]
+    rows += _rows("CoM {} in {{1}} [mm]", "xyz", com, 1e3, 2)
+    rows += _rows("moment {} [kg m²]", "123", moments, 1.0, 4)
     grasps, true = (of.grasps if of else None for of in (facts, truth))
     for i in range(1, trial.robots):
         places, turns = zip(*(_pose(of, i) for of in (grasps, true)), strict=True)
@@ -354,27 +349,27 @@ def _residuals(trial: ReplayTrial) -> str:
 
 
 def _key(trial: ReplayTrial) -> str:
-    lines = []
-    if trial.data is not None:
-        lines.append(
-            f"- arrows at the grasps: force of each robot on the payload, 100 N is {100 * FORCE_M_PER_N:g} m"
-        )
-    if trial.facts is not None and trial.motion is not None:
-        lines.append("- red, green, blue arrows: x, y, z of a grasp frame")
-        lines.append(
-            "- magenta: estimated centre of mass, principal axes, and the solid ellipsoid of that "
-            "mass and inertia"
-        )
-    if trial.truth is not None and trial.motion is not None:
-        lines.append("- green, thin: the same in truth; true grasp frames are longer")
-    if trial.diagnosis is not None and trial.diagnosis.causes:
-        lines.append("- red ball: a cause that the diagnosis names sits there")
+    held = trial.motion is not None
     commanded = "; white: the command" if trial.recording.ref is not None else ""
-    lines.append(f"- line at a wrist: its path, in the robot's colour{commanded}")
-    lines.append(
-        "- series: the robot's colour; dark, plain, light for its joints 1, 2, 3 or axes x, y, z (theta: z, y, x)"
+    lines = (
+        (
+            trial.data,
+            f"arrows at the grasps: force of each robot on the payload, 100 N is {100 * FORCE_M_PER_N:g} m",
+        ),
+        (held and trial.facts, "red, green, blue arrows: x, y, z of a grasp frame"),
+        (
+            held and trial.facts,
+            "magenta: estimated centre of mass, principal axes, and the solid ellipsoid of that mass and inertia",
+        ),
+        (held and trial.truth, "green, thin: the same in truth; true grasp frames are longer"),
+        (trial.diagnosis and trial.diagnosis.causes, "red ball: a cause that the diagnosis names sits there"),
+        (True, f"line at a wrist: its path, in the robot's colour{commanded}"),
+        (
+            True,
+            "series: the robot's colour; dark, plain, light for its joints 1, 2, 3 or axes x, y, z (theta: z, y, x)",
+        ),
     )
-    return "**Key**\n\n" + "\n".join(lines)
+    return "**Key**\n\n" + "\n".join(f"- {text}" for there, text in lines if there)
 
 
 def _rows(

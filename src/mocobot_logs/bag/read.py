@@ -619,14 +619,10 @@ class _Reader:
         for (selector, meaning), lacking in zip(
             self._topic.selectors.items(), self._cdr.lacking, strict=True
         ):
-            if lacking is not None and lacking.startswith(EMPTY) and selector in self._topic.optional:
-                continue  # later stages leave such a channel out
-            if lacking is not None and selector.joint is not None:
-                raise InputError(
-                    f"{where}: joint {selector.joint!r:.60}, wanted for {meaning}, {lacking} in {every}; the joints "
-                    f"there are {listed_names(tuple(self._cdr.joints))}"
-                )
-            if lacking is not None:
-                raise InputError(
-                    f"{where}: field {selector.field!r:.60}, wanted for {meaning}, {lacking} in {every}"
-                )
+            if lacking is None or (lacking.startswith(EMPTY) and selector in self._topic.optional):
+                continue  # later stages leave an empty channel out
+            what, there = f"field {selector.field!r:.60}", ""
+            if selector.joint is not None:
+                what = f"joint {selector.joint!r:.60}"
+                there = f"; the joints there are {listed_names(tuple(self._cdr.joints))}"
+            raise InputError(f"{where}: {what}, wanted for {meaning}, {lacking} in {every}{there}")
