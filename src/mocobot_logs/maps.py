@@ -286,13 +286,13 @@ def parse_channel(
     )
 
 
-def parse_time(values: Values, where: str, placeholders: Sequence[str] = _PLACEHOLDERS) -> TimeMap:
+def parse_time(values: Values, where: str) -> TimeMap:
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     if "nanosec" in fields and ("column" not in fields or fields.values["unit"] != "s"):
         raise InputError(f'{where}: nanosec goes with a column of whole seconds: column, and unit = "s"')
     return TimeMap(
-        column=check_placeholders(fields, "column", placeholders),
-        nanosec=check_placeholders(fields, "nanosec", placeholders),
+        column=check_placeholders(fields, "column", _PLACEHOLDERS),
+        nanosec=check_placeholders(fields, "nanosec", _PLACEHOLDERS),
         unit=fields.one_of("unit", (*TIME_UNITS, DATES)) if "unit" in fields else "s",
         clock=fields.one_of("clock", ("header", "log")) if "clock" in fields else "header",
     )

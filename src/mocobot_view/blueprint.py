@@ -132,24 +132,21 @@ ALL_PLOTS = uuid.UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
 Its interface cannot set that range; the default shows only 30 s around the cursor for trials longer than 60 s."""
 
 
-def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blueprint:
-    """Make the layout; several trials stand side by side, each with its own scene and plots.
-
-    The initial ``tab`` is by default the summary of a single trial, or the joints of several.
-    """
+def blueprint(trials: Sequence[ReplayTrial]) -> rrb.Blueprint:
+    """Make the layout; several trials stand side by side, each with its own scene and plots."""
     aspect = SCENE_ASPECT.get(len(trials), 1.0)
     if len(trials) == 1:
         trial = trials[0]
         body: rrb.Container = rrb.Horizontal(
             scene_view(trial, aspect),
-            _tabs([_text(trial), *_series(trial, KEY_SHARE)], tab),
+            rrb.Tabs(_text(trial), *_series(trial, KEY_SHARE), active_tab=0),
             column_shares=[1.25, 1],
         )
     else:
         columns = [
             rrb.Vertical(
                 scene_view(trial, aspect),
-                _tabs([*_series(trial, 2.0 * KEY_SHARE), _text(trial)], tab),
+                rrb.Tabs(*_series(trial, 2.0 * KEY_SHARE), _text(trial), active_tab=0),
                 row_shares=[1, 1],
             )
             for trial in trials
@@ -213,11 +210,6 @@ def plot_view(origin: str, title: str, axis_y: rrb.ScalarAxis | None = None) -> 
 def trail_paths(trial: ReplayTrial) -> list[str]:
     """List the entities with the segments of the wrist paths, which are visible for ``TRAIL_S``."""
     return [f"{trial.name}/omnid{i + 1}/base/wrist" for i in range(trial.robots)]
-
-
-def _tabs(contents: list[rrb.Container | rrb.View], tab: str | None) -> rrb.Tabs:
-    names = [content.name for content in contents]
-    return rrb.Tabs(*contents, active_tab=names.index(tab) if tab in names else 0)
 
 
 def _series(trial: ReplayTrial, key_share: float) -> list[rrb.Container | rrb.View]:

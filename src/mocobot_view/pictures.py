@@ -219,19 +219,12 @@ def estimate_shot(
     return _shot(team.model, team.qpos, marks, _says(recording, team, truth), aspect, ABOVE)
 
 
-def diagnosis_shot(
-    recording: Recording,
-    estimate: PayloadEstimate,
-    causes: Sequence[NamedCause],
-    payload: str | Path | None = None,
-    time_s: float | None = None,
-    aspect: float = ASPECT,
-) -> Shot:
+def diagnosis_shot(recording: Recording, estimate: PayloadEstimate, causes: Sequence[NamedCause]) -> Shot:
     """Describe a picture of an estimated team with the causes of a diagnosis in red at their places.
 
-    Arguments as for ``estimate_shot``. A cause must not name a robot that the recording does not have.
+    A cause must not name a robot that the recording does not have.
     """
-    team = measured_team(recording, estimate, payload, time_s)
+    team = measured_team(recording, estimate)
     for cause in causes:
         if cause.robot is not None and cause.robot > team.robots:
             raise InputError(
@@ -244,7 +237,7 @@ def diagnosis_shot(
     where = [f"{cause.label or cause.name} ({_place(cause)})" for cause in causes]
     found = f" Red: {', '.join(where)}." if where else " No cause is named."
     says = _says(recording, team, None, marked=False) + found
-    return _shot(team.model, team.qpos, marks, says, aspect, ABOVE)
+    return _shot(team.model, team.qpos, marks, says, ASPECT, ABOVE)
 
 
 def _shot(

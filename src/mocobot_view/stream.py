@@ -424,10 +424,9 @@ def log_replay(
     stream: rr.RecordingStream,
     trials: Sequence[ReplayTrial],
     progress: Callable[[int], object] | None = None,
-    tab: str | None = None,
 ) -> None:
-    """Log trials side by side, each below a root with its name, on one timeline from 0; ``tab`` as in ``blueprint``."""
-    begin(stream, blueprint(trials, tab), [trial.name for trial in trials])
+    """Log trials side by side, each below a root with its name, on one timeline that starts at 0."""
+    begin(stream, blueprint(trials), [trial.name for trial in trials])
     for trial in trials:
         stream.log(
             f"{trial.name}/summary", rr.TextDocument(summary(trial), media_type="text/markdown"), static=True

@@ -196,9 +196,9 @@ _MAPS = ("mocobot-ros2", "omnid-ros2")
 class Look:
     """Reads the first messages of a bag's topics."""
 
-    def __init__(self, path: Path, files: BagFiles | None = None) -> None:
-        """``path`` names the bag in messages; no message is read yet."""
-        self._bag, self.files = str(path), files or BagFiles(path)
+    def __init__(self, path: Path) -> None:
+        """Open the bag's files; no message is read yet."""
+        self._bag, self.files = str(path), BagFiles(path)
         self.types = {topic: type_name(told) for topic, told in self.files.topics.items()}
         self._named: dict[str, CdrReader] = {}
         self._stamps: dict[tuple[str, str], Stamps] = {}

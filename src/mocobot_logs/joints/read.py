@@ -5,7 +5,7 @@ parts. Uneven stamps are treated as in ``resample``: polynomials bridge short ga
 grid, and a known low-pass leads back to the log's rate. This averages the noise of close samples and avoids aliasing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -52,11 +52,9 @@ def open_joint_log(path: Path | str, log_map: JointMap, episode: int | None = No
     return open_log(path, log_map.of_source(), episode)
 
 
-def read_joint_log(
-    source: LogSource, log_map: JointMap, advance: Callable[[int], object] = lambda _: None
-) -> list[JointLog]:
+def read_joint_log(source: LogSource, log_map: JointMap) -> list[JointLog]:
     """Read a log and return its parts between long gaps; most logs have one part."""
-    log = collect(source, advance)
+    log = collect(source)
     return joint_logs_of(source.name, log.streams[0], log_map, log.notes)
 
 
