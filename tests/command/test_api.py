@@ -21,7 +21,9 @@ import mocobot
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
-ROWS = re.findall(r"^\| `([\w.]+)", PAGE, re.MULTILINE)
+ROWS = [
+    name for cell in re.findall(r"^\| (`.+?) \| ", PAGE, re.MULTILINE) for name in re.findall(r"`([\w.]+)", cell)
+]
 """Names in the first column of the page's tables."""
 
 
