@@ -28,9 +28,6 @@ from sealed.form import (
     vector,
 )
 
-SLACK_RAD = 0.03
-"""Angle within which a hose hangs loose."""
-
 
 @dataclass(frozen=True)
 class _Torque(Form):
@@ -97,21 +94,6 @@ class CableSpring(_Torque):
 
     def torque(self, angle: float, rate: float, time: float) -> float:
         return -self.stiffness_Nm_per_rad * (angle - self.rest_rad)
-
-
-@dataclass(frozen=True)
-class SlackHose(_Torque):
-    """A hose through a gimbal axis that hangs loose, then resists with the square of the angle."""
-
-    kind, size = "gimbal", "square_Nm_per_rad2"
-    ranges: ClassVar = {"square_Nm_per_rad2": (0.0, 1e4)}
-    formula: ClassVar = (
-        ["own theta"], f"-a (theta beyond +-{SLACK_RAD:g}) |theta beyond|", "N m/rad^2"
-    )  # fmt: skip
-    square_Nm_per_rad2: float
-
-    def torque(self, angle: float, rate: float, time: float) -> float:
-        return -self.square_Nm_per_rad2 * math.copysign(max(abs(angle) - SLACK_RAD, 0.0) ** 2, angle)
 
 
 @dataclass(frozen=True)

@@ -95,9 +95,7 @@ _LISTED = {
     "stiffening_strap": (0.125, 0.128, 0.147, 0.147),
     "rubber_cord": (0.25, 0.34, 0.49, 0.27),
     "turning_drag": (0.58, 1.32, 3.36, 0.58),
-    "quadratic_drag": (3.0, 7.6, 21.4, 3.0),
     "power_drag": (0.77, 2.03, 6.6, 0.77),
-    "torque_backlash": (0.0138, 0.0415, 0.138, 0.0138),
     "mass_drift": (7.0e-5, 7.1e-5, 7.1e-5, 7.0e-5),
     "mass_of_trials": (9.0e-4, 9.2e-4, 9.3e-4, 9.1e-4),
 }
@@ -126,14 +124,9 @@ _AT_38 = {
     "gyroscope": (0.0121, 0.0122, 0.0122, 0.0121),
     "shifting_load": (0.022, 0.023, 0.024, 0.023),
     "sinking_base": (5.0e-6, 5.0e-6, 5.0e-6, 5.0e-6),
-    "scratched_disc": (1.04e-5, 1.05e-5, 1.06e-5, 1.06e-5),
-    "soft_saturation": (8.1e-3, 1.65e-2, 3.50e-2, 8.5e-3),
-    "loose_bridge": (1.54e-3, 1.60e-3, 1.63e-3, 1.57e-3),
-    "fine_interpolation": (2.23e-6, 2.24e-6, 2.24e-6, 2.24e-6),
     "torque_ramp": (1.15e-4,) * 4,
     "torque_walk": (5.4e-4,) * 4,
     "dead_band": (1.35e-3,) * 4,
-    "slack_hose": (5.9, 6.0, 6.2, 6.2),
 }
 LIMITS: dict[str, dict[Background, float]] = {
     name: dict(zip(BACKGROUNDS, values, strict=True)) for name, values in (_LISTED | _SHARES).items()

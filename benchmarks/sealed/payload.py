@@ -139,27 +139,6 @@ class TurningDrag(Form):
 
 
 @dataclass(frozen=True)
-class QuadraticDrag(Form):
-    """Force -c |v| v at the centre of mass, and moment -c r^3 |omega| omega."""
-
-    answer = "drag"
-    size = "coefficient_Ns2_per_m2"
-    on_payload = True
-    ranges: ClassVar = {"coefficient_Ns2_per_m2": (0.0, 1e4), "reach_m": (0.0, 10.0)}
-    draws: ClassVar = {"reach_m": (0.1, 0.4)}
-    coefficient_Ns2_per_m2: float
-    reach_m: float
-
-    def actors(self, trial_number: int | None) -> Sequence[Actor]:
-        c, turn = self.coefficient_Ns2_per_m2, self.coefficient_Ns2_per_m2 * self.reach_m**3
-        return [
-            PayloadWrench(
-                lambda t, p, v, w: (-c * float(np.sqrt(v @ v)) * v, -turn * float(np.sqrt(w @ w)) * w)
-            )
-        ]
-
-
-@dataclass(frozen=True)
 class PowerDrag(Form):
     """Force -c |v|^(n-1) v at the centre of mass, and moment -c r^(n+1) |omega|^(n-1) omega: between the two."""
 
@@ -434,9 +413,3 @@ class HalfSinePush(_ShapedPush):
 
     def shape(self, share: float) -> float:
         return math.sin(np.pi * share)
-
-
-def in_every_trial(kind: type[Form], size: float, ground: Ground, rng: np.random.Generator) -> list[Form]:
-    """One push in each trial that moves."""
-    assert issubclass(kind, _ShapedPush)
-    return [kind.drawn(size, ground, {}, rng, trial=number) for number, _, _ in ground.moving]

@@ -48,11 +48,6 @@ UNLISTED: tuple[type[Form], ...] = (
     readings.SlippingZero, forces.Cogging, forces.CubicSpring, forces.CableSpring, forces.DoorCloser,
     forces.GrowingPush, forces.Shaker, forces.Gyroscope, forces.ShiftingLoad, forces.SinkingBase,
 )  # fmt: skip
-OUTSIDE: tuple[type[Form], ...] = (
-    readings.ScratchedDisc, readings.SoftSaturation, readings.LooseBridge, readings.FineInterpolation,
-    forces.SlackHose,
-)  # fmt: skip
-"""Unlisted ones whose formula the dictionary of laws does not have either."""
 FAULTY: tuple[type[Form], ...] = (
     readings.DropoutsPhi, readings.DropoutsTheta, readings.TorqueRamp, readings.TorqueWalk, readings.DeadBand,
 )  # fmt: skip
@@ -62,9 +57,7 @@ FAULTS = (
     at_payload.HalfSinePush,
 )  # fmt: skip
 """These, and others that come with use: drawn by themselves."""
-KNOWN: tuple[type[Form], ...] = (at_payload.QuadraticDrag, readings.TorqueBacklash)
-"""Listed ones whose law the catalogue has by now: hidden by name only."""
-FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE, *FAULTY)}
+FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *UNLISTED, *FAULTY)}
 
 
 SIZES = (2.0, 20.0)
@@ -89,8 +82,6 @@ def largest(name: str, background: Background) -> float:
 
 def over_nominal(name: str, background: Background) -> float:
     """Detection limit of a cause or form in a background over that within tolerances."""
-    if name == "pushes":
-        return 1.0
     if name in FORMS:
         return LIMITS[name][background] / LIMITS[name]["x1"]
     return limit_over_nominal(name, background)
@@ -111,10 +102,7 @@ def family(name: str) -> str:
 def draw(
     name: str, factor: float, background: Background, ground: Ground, rng: np.random.Generator
 ) -> list[Effect]:
-    """One effect of ``factor`` times the limit of its background; ``pushes`` are one in every trial that moves."""
-    if name == "pushes":
-        kind = at_payload.RampPush if rng.uniform() < 0.5 else at_payload.HalfSinePush
-        return list(at_payload.in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
+    """One effect of ``factor`` times the limit of its background."""
     if name in EFFECTS:
         factor *= limit_over_nominal(name, background)
         return [draw_effect(name, factor, ground_of(ground.robots, ground.p_1c, ground.moving), rng)]
@@ -132,7 +120,6 @@ def _place(form: type[Form], ground: Ground, rng: np.random.Generator) -> dict[s
 CATALOGUE = tuple(name for name in CAUSES if name in EFFECTS)
 OTHER = tuple(form.cause for form in LISTED)
 NOWHERE = tuple(form.cause for form in UNLISTED)
-BEYOND = tuple(form.cause for form in OUTSIDE)
 WORN = tuple(form.cause for form in FAULTS)
 
 
@@ -147,13 +134,9 @@ Kind = Literal[
     "unlisted",
     "pairs",
     "triples",
-    "pushes",
     "sliding",
     "logs",
     "long",
-    "left-out",
-    "unlisted-pairs",
-    "outside",
     "faults",
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -253,12 +236,10 @@ def _names(
 ) -> tuple[str, ...]:
     if kind in ("clean", "logs"):
         return ()
-    if kind == "pushes":
-        return ("pushes",)
-    several = {"pairs": 2, "triples": 3, "unlisted-pairs": 2}.get(kind, 1)
+    several = {"pairs": 2, "triples": 3}.get(kind, 1)
     pools: dict[Kind, tuple[str, ...]] = {
-        "single": CATALOGUE, "left-out": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "unlisted-pairs": NOWHERE,
-        "sliding": SLIDING, "long": ("joint_friction", "push"), "outside": BEYOND, "faults": WORN,
+        "single": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "sliding": SLIDING,
+        "long": ("joint_friction", "push"), "faults": WORN,
     }  # fmt: skip
     found: list[str] = []
     while len(found) < several:
