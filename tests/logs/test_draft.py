@@ -12,18 +12,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.io import savemat
 
-import command
 from estimator.errors import InputError
-from joint_logs import write_table
 from log_files import channels_of, read_log, write_lerobot, write_text
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.convert import write_csv, write_npz
 from mocobot_logs.draft import draft_of, team_draft
 from mocobot_logs.draft_joints import draft_joint_map
 from mocobot_logs.draft_names import Candidate, find_channels, read_name
-from mocobot_logs.maps import LogMap, parse_map, read_map
+from mocobot_logs.maps import LogMap, parse_map
 from recordings import small_recording
 
 RECORDING = small_recording(rows=200, ref=False)
@@ -142,35 +139,6 @@ def test_commands_are_optional(tmp_path: Path) -> None:
     np.testing.assert_array_equal(log.streams[1].values, channels_of(recording, 1))
 
 
-def test_decimal_commas_and_dates(tmp_path: Path) -> None:
-    columns = table(lambda r, c: f"{PEOPLE[r]}_{c}")
-    path = write_text(tmp_path / "comma.csv", columns, ";", ",")
-    assert_reads(path, drafted(path))
-    rows = write_text(tmp_path / "date.csv", columns).read_text().splitlines()
-    dated = [f"2026-03-01T12:00:{k / 100:06.3f}Z," + row.split(",", 1)[1] for k, row in enumerate(rows[1:])]
-    path.write_text("\n".join(["# a remark", rows[0], *dated]) + "\n")
-    assert 'unit = "iso"' in draft_of(path).text
-    assert_reads(path, drafted(path))
-
-
-def test_clocks_of_their_own(tmp_path: Path) -> None:
-    columns = table(lambda r, c: f"{PEOPLE[r]}_{c}")
-    time = columns.pop("time")
-    columns |= {f"{name}_stamp_ms": 1e3 * time for name in PEOPLE}
-    path = write_text(tmp_path / "log.csv", columns)
-    assert 'column = "{name}_stamp_ms"' in draft_of(path).text
-    assert_reads(path, drafted(path))
-
-
-def test_arrays_of_robots(tmp_path: Path) -> None:
-    arrays = {"t": RECORDING.time}
-    for robot, name in enumerate(PEOPLE):
-        arrays |= {f"{name}_q": RECORDING.phi[:, robot], f"{name}_torque": RECORDING.tau[:, robot]}
-        arrays |= {f"{name}_gimbal_{axis}": RECORDING.theta[:, robot, k] for k, axis in enumerate("zyx")}
-    np.savez(tmp_path / "log.npz", **arrays)  # type: ignore[arg-type]
-    assert_reads(tmp_path / "log.npz", drafted(tmp_path / "log.npz"))
-
-
 # Doubts
 
 
@@ -193,19 +161,6 @@ def test_counts_must_be_filled_in(tmp_path: Path) -> None:
         parse_map(tomllib.loads(draft.text), "draft")
     filled = re.sub(r"# (phi\d = .*) = \?", r"\1 = 65536", draft.text)
     assert_reads(path, parse_map(tomllib.loads(filled), "draft"), 1e-4)
-
-
-def test_units_that_cannot_be(tmp_path: Path) -> None:
-    """Radians by name, degrees by value; torques between N m and mN m; a channel of zeros."""
-    columns = table(lambda r, c: f"r{r + 1}_{c}" + ("_rad" if c == "phi1" else ""))
-    columns |= {k: np.rad2deg(v) for k, v in columns.items() if "phi1" in k}
-    columns |= {k: 0 * v for k, v in columns.items() if "theta_y" in k}
-    columns |= {k: 10 * v for k, v in columns.items() if "tau2" in k}
-    found = doubts(write_text(tmp_path / "log.csv", columns))
-    assert set(found) == {"phi1", "theta_y", "tau2"}
-    assert "rad is no angle of an arm: which unit?" in found["phi1"]
-    assert "zero throughout" in found["theta_y"]
-    assert "Nm or mNm?" in found["tau2"]
 
 
 def test_names_that_may_mean_two_things(tmp_path: Path) -> None:
@@ -237,18 +192,6 @@ def test_what_is_not_there(tmp_path: Path) -> None:
     assert "temperature" not in text
 
 
-def test_one_robot(tmp_path: Path) -> None:
-    columns = {
-        k.removeprefix("r1_"): v
-        for k, v in table(lambda r, c: f"r{r + 1}_{c}").items()
-        if k[:2] not in ("r2", "r3")
-    }
-    path = write_text(tmp_path / "log.csv", columns)
-    log = read_log(path, drafted(path))
-    assert log.robots == 1
-    np.testing.assert_array_equal(log.streams[0].values, channels_of(RECORDING, 0))
-
-
 @pytest.mark.parametrize(
     ("name", "group", "index", "unit"),
     [
@@ -270,43 +213,7 @@ def test_what_a_name_says(name: str, group: str, index: int | None, unit: str | 
     assert (found.group, found.index, found.unit) == (group, index, unit)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "joint1_velocity",
-        "imu_x",
-        "wrench.torque.x",
-        "q7",
-        "temperature",
-        "battery",
-        "",
-        "{robot}.phi1",
-        "gimbal_z/effort",
-    ],
-)
-def test_names_of_no_use(name: str) -> None:
-    assert read_name(name) is None
-
-
 # The command
-
-
-def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """From a log that nobody knows to a recording, and never over a map that somebody worked on."""
-    log, out = write_text(tmp_path / "my.csv", table(*LOGS["units"])), tmp_path / "my.toml"
-    message = command.refused(capsys, "convert", log, tmp_path / "rec.parquet")
-    assert f"No map was given (--map): `mocobot map {log}` drafts one" in message
-    code, text, err = command.run(capsys, "map", log)
-    assert (code, err) == (0, "mocobot: 3 robots; nothing is doubtful")
-    assert command.run(capsys, "map", log, "--out", out)[0] == 0
-    assert out.read_text() == text
-    assert read_map(out).called == PEOPLE
-    assert command.run(capsys, "convert", log, tmp_path / "rec.parquet", "--map", out)[0] == 0
-    assert "exists; give --force" in command.refused(capsys, "map", log, "--out", out)
-    assert "there is no such file" in command.refused(capsys, "map", tmp_path / "none.csv")
-    assert command.run(capsys, "map", write_text(tmp_path / "a.csv", {"a": RECORDING.time}))[2].startswith(
-        "mocobot: 1 robot; 10 doubtful lines must be looked at; the draft is not complete: "
-    )
 
 
 WORDS = st.lists(
@@ -375,32 +282,3 @@ def test_units_in_names_are_read(tmp_path, called: str, said: str) -> None:
     path = written(tmp_path, ["time", called.format(1), called.format(2)])
     (line,) = (s for s in draft_joint_map(path, JOINTS, [False, False]).text.splitlines() if "{number}" in s)
     assert f"unit = {said} }}  # -" in line, line  # and what the column holds, without a doubt
-
-
-@pytest.mark.parametrize(("size", "unit"), [(1.0, "m"), (300.0, "mm")])
-def test_slides_that_go_far_are_logged_in_millimetres(tmp_path, size: float, unit: str) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text(
-        "time,pos_1,pos_2\n" + "".join(f"{0.01 * k},{size * k / 100},{-size}\n" for k in range(100))
-    )
-    assert f'unit = "{unit}" }}  # doubtful: unit?' in draft_joint_map(path, JOINTS, [True, True]).text
-
-
-def test_decimal_commas_are_seen(tmp_path) -> None:
-    names = ["time", "q_1_deg", "q_2_deg", "torque_1_Nm", "torque_2_Nm"]
-    draft = draft_joint_map(written(tmp_path, names, comma=True), JOINTS, [False, False])
-    assert '[csv]\ndecimal = ","' in draft.text
-    assert draft.doubtful == 0
-    assert "[csv]" not in draft_joint_map(written(tmp_path, names), JOINTS, [False, False]).text
-
-
-@pytest.mark.parametrize("suffix", ["csv", "mat", "npz", "parquet"])
-def test_names_that_mean_nothing(tmp_path: Path, suffix: str) -> None:
-    path, columns = tmp_path / f"log.{suffix}", {"a": np.arange(50.0), "b": np.ones(50)}
-    if suffix == "mat":
-        savemat(path, columns, oned_as="column")
-    else:
-        write_table(path, columns)
-    draft = draft_joint_map(path, JOINTS, [False, False])
-    assert draft.missing == ("a position", "a torque, a current, a command or a duty")
-    assert "# not used: a, b" in draft.text

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from estimator.arm.delta import (
-    driven_motion,
     forward_kinematics,
     inverse_kinematics,
-    is_in_reach,
     is_reachable,
     jacobian,
     joints_of,
@@ -77,19 +75,6 @@ def test_forward_kinematics_takes_the_higher_solution():
         assert h[2] > mirrored[2] + 0.01
 
 
-def test_home_is_at_36_degrees():
-    phi = inverse_kinematics([0, 0, DESIGN.home_height_m], DESIGN)
-    # In the leg's plane: (r + L1 cos phi)^2 + (z - L1 sin phi)^2 = L2^2, solved by hand.
-    r, z = DESIGN.base_radius_m - DESIGN.platform_radius_m, DESIGN.home_height_m
-    l1, l2 = DESIGN.proximal_length_m, DESIGN.rod_length_m
-    assert (r + l1 * np.cos(phi)) ** 2 + (z - l1 * np.sin(phi)) ** 2 == pytest.approx(np.full(3, l2**2))
-    assert np.rad2deg(phi) == pytest.approx(np.full(3, 35.7), abs=0.1)
-
-
-def test_inverse_kinematics_is_the_inverse():
-    assert forward_kinematics(PHIS, DESIGN) == pytest.approx(HS, abs=1e-13)
-
-
 def test_knees_point_outward():
     """The one of two knees that fit which is farther from the robot's centre line through the leg's plane."""
     below = HS * [1, 1, -1]  # the same with the robot hanging: a mirror image
@@ -104,21 +89,6 @@ def test_knees_point_outward():
             assert np.cos(angle) > np.cos(other)
 
 
-def test_a_raised_knee_raises_the_wrist():
-    h_low, h_high = forward_kinematics([[0.5, 0.5, 0.5], [0.6, 0.6, 0.6]], DESIGN)
-    assert h_high[2] > h_low[2] + 0.01
-    assert h_high[:2] == pytest.approx([0, 0], abs=1e-15)
-
-
-def test_leg_one_lies_along_x():
-    """Raising knee 1 alone moves the wrist in the leg's own plane, up and away from that leg."""
-    h = forward_kinematics([0.8, 0.6, 0.6], DESIGN) - forward_kinematics([0.6, 0.6, 0.6], DESIGN)
-    assert h[1] == pytest.approx(0.0, abs=1e-15)
-    assert h[0] < -0.005
-    turned = forward_kinematics([0.6, 0.8, 0.6], DESIGN) - forward_kinematics([0.6, 0.6, 0.6], DESIGN)
-    assert np.arctan2(turned[1], turned[0]) == pytest.approx(np.deg2rad(120 - 180))
-
-
 def differences(function, x, step):
     """Fourth-order central differences of function along each axis of x, shape (..., outputs, 3)."""
     columns = []
@@ -131,30 +101,6 @@ def differences(function, x, step):
 def test_jacobian_is_the_derivative_of_forward_kinematics():
     numerical = differences(lambda phi: forward_kinematics(phi, DESIGN), PHIS, 1e-3)
     assert jacobian(PHIS, DESIGN) == pytest.approx(numerical, abs=2e-8)
-
-
-def test_jacobian_where_the_rods_lie_almost_flat():
-    """Next to the limit of intersection the derivatives grow; smaller steps, the same agreement."""
-    phi = np.array([0.6, 0.6, 0.6])
-    design = dataclasses.replace(DESIGN, rod_length_m=0.2835)
-    assert is_reachable(phi, design)
-    h = forward_kinematics(phi, design)
-    assert h[2] - DESIGN.proximal_length_m * np.sin(0.6) < 0.02
-    numerical = differences(lambda p: forward_kinematics(p, design), phi, 2e-6)
-    assert jacobian(phi, design) == pytest.approx(numerical, rel=1e-5, abs=1e-5)
-    assert np.abs(numerical).max() > 0.7
-
-
-def test_jacobian_at_home_has_the_known_singular_values():
-    """From the symmetric closed form: vertical L1 cos(phi) (tan-free) and horizontal sensitivities."""
-    phi = inverse_kinematics([0, 0, DESIGN.home_height_m], DESIGN)
-    values = np.linalg.svd(jacobian(phi, DESIGN), compute_uv=False)
-    # One leg's constraint: -(r dr-component) ... rod (x, z), knee direction (-s, c): x dr + z dz = q dphi.
-    x = -(DESIGN.base_radius_m - DESIGN.platform_radius_m + DESIGN.proximal_length_m * np.cos(phi[0]))
-    z = DESIGN.home_height_m - DESIGN.proximal_length_m * np.sin(phi[0])
-    q = DESIGN.proximal_length_m * (-x * np.sin(phi[0]) + z * np.cos(phi[0]))
-    horizontal, vertical = q * np.sqrt(2 / 3) / -x, q / (np.sqrt(3) * z)
-    assert values == pytest.approx(sorted([horizontal, horizontal, vertical], reverse=True))
 
 
 def test_wrist_motion_is_the_derivative_along_a_path():
@@ -192,15 +138,6 @@ def test_leverage_vanishes_where_the_leg_is_stretched():
     l1_l2 = DESIGN.proximal_length_m * DESIGN.rod_length_m
     assert legs.leverage[0] == pytest.approx(0.0, abs=1e-3 * l1_l2)
     assert np.all(legs.leverage[1:] > 0.01 * l1_l2)
-
-
-def test_shapes_follow_the_input():
-    phi = PHIS[:24].reshape(2, 3, 4, 3)
-    assert forward_kinematics(phi, DESIGN).shape == (2, 3, 4, 3)
-    assert jacobian(phi, DESIGN).shape == (2, 3, 4, 3, 3)
-    assert jacobian(phi, DESIGN)[1, 2, 3] == pytest.approx(jacobian(phi[1, 2, 3], DESIGN), abs=1e-15)
-    assert is_reachable(phi, DESIGN).shape == (2, 3, 4)
-    assert forward_kinematics(np.zeros((0, 3)), DESIGN).shape == (0, 3)
 
 
 def test_rods_that_cannot_meet_are_refused_with_their_angles():
@@ -274,17 +211,6 @@ def test_power_goes_through_the_wrist_of_mujocos_chain(arm: Arm, seed: int) -> N
     assert force @ h_dot == pytest.approx(tau @ phi[1], abs=1e-11)
 
 
-def test_power_by_finite_differences_all_over_the_joints_range() -> None:
-    phi, tau = anywhere(500, seed=1)
-    rate = np.random.default_rng(2).normal(size=phi.shape)
-    step = 1e-3
-    h = [forward_kinematics(phi + k * step * rate, DESIGN) for k in (-2, -1, 1, 2)]
-    h_dot = (h[0] - 8 * h[1] + 8 * h[2] - h[3]) / (12 * step)
-    power = np.sum(tau * rate, axis=-1)
-    assert np.sum(wrist_of(phi, tau, DESIGN)[1] * h_dot, axis=-1) == pytest.approx(power, abs=1e-6)
-    assert np.abs(power).max() > 20.0
-
-
 def test_round_trip() -> None:
     phi, tau = (array.reshape(50, 10, 4, 3) for array in anywhere(2000, seed=3))
     h, force = wrist_of(phi, tau, DESIGN)
@@ -294,23 +220,6 @@ def test_round_trip() -> None:
     assert np.abs(back_tau - tau).max() < 1e-12 * np.abs(force).max()
     assert wrist_of(np.zeros((0, 3)), np.zeros((0, 3)), DESIGN)[0].shape == (0, 3)
     assert joints_of(np.zeros((0, 3)), np.zeros((0, 3)), DESIGN)[1].shape == (0, 3)
-
-
-def test_driven_motion_of_a_wrist_along_a_path() -> None:
-    """By fourth-order differences of inverse kinematics alone."""
-    rng = np.random.default_rng(6)
-    h = np.array([0.0, 0.0, HOME_Z]) + rng.uniform(-0.07, 0.07, (50, 3))
-    velocity, acceleration = rng.normal(0.0, 0.3, h.shape), rng.normal(0.0, 2.0, h.shape)
-    step = 1e-3
-    phi = [
-        inverse_kinematics(h + t * velocity + t**2 / 2 * acceleration, DESIGN)
-        for t in step * np.arange(-2, 3)
-    ]
-    rate, rate_dot = driven_motion(leg_geometry(phi[2], DESIGN), velocity, acceleration)
-    assert rate == pytest.approx((phi[0] - 8 * phi[1] + 8 * phi[3] - phi[4]) / (12 * step), abs=1e-8)
-    second = (-phi[0] + 16 * phi[1] - 30 * phi[2] + 16 * phi[3] - phi[4]) / (12 * step**2)
-    assert rate_dot == pytest.approx(second, abs=1e-6)
-    assert np.abs(second).max() > 10.0
 
 
 # What has no driven angles
@@ -349,12 +258,6 @@ def test_wrist_positions_without_driven_angles(h: list[float], words: str) -> No
     assert str(caught.value) == fault[1]
 
 
-def test_only_the_singular_posture_is_refused_not_its_neighbours() -> None:
-    h = stretched(1e-5)
-    phi, _ = joints_of(h, np.zeros(3), DESIGN)
-    assert forward_kinematics(phi, DESIGN) == pytest.approx(h, abs=1e-12)
-
-
 def test_driven_angles_without_a_wrist_position() -> None:
     short = dataclasses.replace(DESIGN, rod_length_m=0.25)
     with pytest.raises(InputError, match=r"no wrist position reaches .* phi = \(0\.1, 0\.2, 0\.3\) rad"):
@@ -372,26 +275,3 @@ def test_driven_angles_without_a_wrist_position() -> None:
         wrist_of(
             inverse_kinematics(stretched(1e-12), DESIGN) - 1e-7 * np.array([1, 0, 0]), np.zeros(3), DESIGN
         )
-
-
-def test_rods_that_lie_flat_are_singular() -> None:
-    """All three in one plane: they cannot carry a load across it."""
-    phi = np.full(3, 0.6)
-    radius = DESIGN.base_radius_m - DESIGN.platform_radius_m + DESIGN.proximal_length_m * np.cos(0.6)
-    for longer, flat in ((1e-12, True), (1e-4, False)):
-        design = dataclasses.replace(DESIGN, rod_length_m=radius + longer)
-        if flat:
-            with pytest.raises(InputError, match=r"the arm is singular at phi = \(0\.6, 0\.6, 0\.6\) rad"):
-                wrist_of(phi, np.ones(3), design)
-        else:
-            assert joints_of(*wrist_of(phi, np.ones(3), design), design)[1] == pytest.approx(np.ones(3))
-    exactly = dataclasses.replace(DESIGN, rod_length_m=radius)
-    with pytest.raises(InputError, match="the arm is singular at the wrist position"):
-        joints_of([0.0, 0.0, DESIGN.proximal_length_m * np.sin(0.6)], np.zeros(3), exactly)
-
-
-def test_reach_says_which_leg() -> None:
-    assert is_in_reach([[0.0, 0.0, HOME_Z], [0.25, 0.0, 0.45]], DESIGN).tolist() == [
-        [True] * 3,
-        [True, False, False],
-    ]

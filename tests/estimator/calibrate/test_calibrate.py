@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
 from estimator.calibrate.least_squares import CarriedTrial, Given, Unknowns, fit
-from estimator.calibrate.prior import LARGEST, Prior, read_prior
+from estimator.calibrate.prior import Prior, read_prior
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.errors import InputError
 from estimator.recording.model import Recording
@@ -260,30 +260,6 @@ def test_errors_of_held_robots_go_on_to_the_payload(recording: Recording, design
     np.testing.assert_allclose(predicted[large], np.abs(change)[large], rtol=0.03)
 
 
-def test_common_spring_scale_goes_on(recording: Recording, designed: Calibration) -> None:
-    """Springs 1 % stiffer than held: mass and inertia are 1 % more, but for the arms' own weight."""
-    by_scale = np.zeros((3, COUNT))
-    by_scale[:, AT["stiffness_ratio"]] = 1.0
-    stiffer = designed.units.moved(0.01 * by_scale)
-    held = calibrate([recording], robots=replace(designed, by_scale=by_scale, scale_sd=0.5))
-    there = calibrate([recording], robots=replace(designed, units=stiffer))
-    mass = held.payloads[0].parameters[0]
-    change = there.payloads[0].parameters[0] - mass
-    assert held.payloads[0].by_scale[12] == pytest.approx(change / 0.01, rel=0.01)
-    assert change > 0.01 * mass
-
-
-def test_what_cannot_change_held_robots_is_refused(recording: Recording, designed: Calibration) -> None:
-    for more in ({"prior": Prior()}, {"known_mass": {"": (MASS, 0.01)}}, {"free": [recording]}):
-        with pytest.raises(
-            InputError, match="robots are held as calibrated: unloaded arms, a prior or a known"
-        ):
-            calibrate([recording], robots=designed, **more)
-    pair = replace(designed, units=replace(designed.units, x=np.zeros((2, COUNT))))
-    with pytest.raises(InputError, match="the calibration is of 2 robots and the recording of 3"):
-        calibrate([recording], robots=pair)
-
-
 def named(name: str, **changes: Any) -> Recording:
     return replace(small_recording(**changes), name=name)
 
@@ -356,14 +332,6 @@ def test_what_is_given_and_defaults_for_the_rest(tmp_path: Path) -> None:
     assert read_prior(written(tmp_path, "")) == Prior()
 
 
-def test_every_field_may_be_given_and_defaults_are_allowed(tmp_path: Path) -> None:
-    names = [field.name for field in fields(Prior)]
-    assert set(LARGEST) == set(names)
-    text = "\n".join(f"{name} = {0.4 * LARGEST[name]}" for name in names)
-    assert read_prior(written(tmp_path, text)) == Prior(**{name: 0.4 * LARGEST[name] for name in names})
-    assert all(0 <= getattr(Prior(), name) <= LARGEST[name] for name in names)
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -380,11 +348,6 @@ def test_every_field_may_be_given_and_defaults_are_allowed(tmp_path: Path) -> No
 def test_what_cannot_be_meant_is_refused(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(InputError, match=rf"prior\.toml: {said}"):
         read_prior(written(tmp_path, text))
-
-
-def test_no_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
-        read_prior(tmp_path / "none.toml")
 
 
 def test_the_mean_of_all_springs_is_held_and_the_arms_weigh_more_or_less_together() -> None:

@@ -9,7 +9,6 @@ from calibration_case import PRIOR, differences, exact_trial, instants
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, leg_geometry, length_jacobians
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
-from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.equations import AloneEquations, TrialEquations, pose_derivatives
 from estimator.calibrate.prior import Prior
@@ -64,74 +63,6 @@ def test_noise_in_rows_is_as_the_gain_says_and_independent():
     correlation = [np.sum(angle[k:] * angle[:-k]) / np.sum(angle**2) for k in range(1, 7)]
     assert np.abs(correlation).max() < 0.03
     assert 1.0 + 2.0 * np.sum(correlation) == pytest.approx(1.0, abs=0.06)
-
-
-def test_holds_are_one_row_each():
-    """Three holds of 4 s: a mean over all of each but its ends."""
-    level, time = [], np.arange(0, 21, 0.01)
-    for t in time:
-        s = np.clip((t % 7.0 - 5.0) / 2.0, 0.0, 1.0)
-        level.append(t // 7.0 + s**3 * (10 - 15 * s + 6 * s**2))
-    rows = Rows.of(recording_of(0.1 * np.array(level)))
-    held = rows(rows.s)[rows.moving :, 0, 0]
-    # The first begins before the trimmed two seconds are over, and no hold is complete at the end.
-    assert held == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
-    settled = 5.0 - 2 * rules.SETTLING_S
-    assert rows.length[rows.moving + 1] / 100.0 == pytest.approx(settled, abs=0.6)
-    assert (rows.length[: rows.moving] == 0).all()
-    assert rows.moving > 5
-
-
-def test_a_hold_of_encoders_without_noise_has_one_rounding_error():
-    sensing = Sensing(np.full((2, 9), 1e-4), np.zeros((2, 9)))
-    time = np.arange(0, 20, 0.01)
-    rows = Rows.of(recording_of(np.where(time < 10, 0.1, 0.1 + 0.02 * (time - 10))))
-    moving, held = sensing.variances(rows)
-    floor = rules.PHI_FLOOR_RAD**2
-    resting = rules.AT_REST**2 * floor
-    hold = rows.moving  # the first hold
-    assert held[hold, 0, 0] == pytest.approx(1e-8 / 12 + resting, rel=1e-9)
-    # In motion a joint at 0.02 rad/s makes 200 steps a second: every sample's error is its own.
-    assert moving[rows.moving // 2, 0, 0] == pytest.approx(1e-8 / 12 + floor, rel=1e-9)
-    dithered = Sensing(np.full((2, 9), 1e-4), np.full((2, 9), 1e-4)).variances(rows)[1]
-    length = rows.length[hold]
-    assert dithered[hold, 0, 0] == pytest.approx((1e-8 + 1e-8 / 12) / length + resting, rel=1e-9)
-
-
-def test_sensing_finds_steps_and_noise():
-    exact = exact_trial(3)[2]
-    rng = np.random.default_rng(4)
-    noisy = with_noise(exact.recording, 2e-5, 0.004, rng)
-    found = Sensing.of([noisy])
-    assert not found.step.any()
-    assert found.sigma == pytest.approx(np.tile(np.repeat([2e-5, 2e-5, 0.004], 3), (3, 1)), rel=0.15)
-
-
-def test_ripple_of_slow_rounding_is_no_noise():
-    """A joint of 50 steps a second: its rounding errors are as fast as noise, but no reading goes back."""
-    time, step = np.arange(0, 40, 0.01), 1e-4
-    slow = 1.3e-3 * np.sin(2 * np.pi * 0.67 * time)
-
-    def found(noise):
-        read = slow + noise * step * np.random.default_rng(5).standard_normal(len(time))
-        return Sensing.of([recording_of(np.round(read / step) * step)])
-
-    assert found(0.0).step[0, 0] == pytest.approx(step)
-    assert found(0.0).sigma[0, 0] < 0.05 * step  # 0.44 of one by its frequencies alone
-    assert found(0.5).sigma[0, 0] == pytest.approx(0.5 * step, rel=0.2)
-
-
-def test_each_joint_has_its_own_rounding_errors_again():
-    """Where a cycle is no whole number of samples, a slow joint's readings come again, and a fast one's do not."""
-    time, step = np.arange(0, 44, 0.01), 1e-4
-    angle = 2 * np.pi * 0.6037 * time
-    trial = recording_of(np.round(0.1 * np.sin(angle) / step) * step)
-    trial.theta[:] = (np.round(1.2e-3 * np.sin(angle) / step) * step)[:, None, None]
-    trial.phi[:, 1] = 0.1 * np.cos(angle)[:, None]  # something always moves
-    repeats = Rows.of(trial).repeats
-    assert repeats.shape == (2, 9)
-    assert np.all(repeats[:, 3:6] > 0.7 * 40 * 0.6037)
-    assert np.all(repeats[0, [0, 1, 2, 6, 7, 8]] < 4.0)
 
 
 @pytest.mark.slow
@@ -194,33 +125,6 @@ def test_derivatives_of_the_balance():
     assert not rowed.by_bases[:, BALANCE].any()
 
 
-def test_derivatives_of_averaged_rows_are_taken_at_the_mean():
-    """Signals of a row vary: what that leaves is below three percent of the largest."""
-    units, held, exact = exact_trial(3)
-    rows = Rows.of(exact.recording).take(np.array([5, 15]))
-    equations = TrialEquations.of(rows, Sensing.of([exact.recording]))
-    found = equations.at(units, held.shared, exact.bases).by_units[:, BALANCE][..., FREE]
-
-    def by(dx):
-        return equations.residual(units.moved(dx.reshape(3, COUNT)), held.shared, exact.bases)[:, BALANCE]
-
-    expected = differences(by, 3 * COUNT, 1e-6).reshape(-1, 6, 3, COUNT)[..., FREE]
-    for k in range(len(FREE)):
-        assert np.abs(found[..., k] - expected[..., k]).max() < 0.03 * np.abs(expected[..., k]).max()
-
-
-def test_derivatives_by_the_payload_are_averaged_over_a_row():
-    units, held, exact = exact_trial(3)
-    rows = Rows.of(exact.recording).take(np.array([5, 15]))
-    equations = TrialEquations.of(rows, Sensing.of([exact.recording]))
-    here = units, held.shared, exact.bases
-    found = equations.at(*here, curvature=equations.curvature(*here)).by_carried[:, BALANCE]
-    expected = differences(
-        lambda dx: equations.residual(units, held.shared.moved(dx), exact.bases)[:, BALANCE], 22, 1e-6
-    )
-    assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
-
-
 def with_signals(equations: TrialEquations, change) -> TrialEquations:
     rows = replace(equations.rows, s=equations.rows.s + change)
     return replace(equations, rows=rows, mean=rows.s)
@@ -278,21 +182,6 @@ def test_adjustment_is_the_least_that_closes_loops_and_balance():
     assert spent == pytest.approx(chi2, rel=1e-6)
 
 
-@pytest.mark.parametrize("shift", [0.0, 1e-9])
-def test_gimbals_near_zero(shift):
-    """At zero, and a hair from it, poses and derivatives are smooth."""
-    units, held, exact = exact_trial(8)
-    equations = instants(exact, units)
-    s = equations.rows.s.copy()
-    s[..., 9:18] = shift
-    rowed = with_signals(equations, s - equations.rows.s).at(
-        ArmUnit(DESIGN, 0.0 * units.x), held.shared, exact.bases
-    )
-    for part in rowed:
-        assert np.isfinite(part).all()
-    assert (np.linalg.eigvalsh(rowed.covariance) > 0).all()
-
-
 @pytest.mark.parametrize("name", ["radius", "proximal_length", "rod_length"])
 def test_length_jacobians(name):
     rng = np.random.default_rng(1)
@@ -331,11 +220,6 @@ def compared(equations, units, shared, bases, within):
     )
     assert by_bases == pytest.approx(differences(lambda dx: at(bases=bases.moved(dx)), 8, 1e-6), abs=within)
     assert np.abs(expected[..., AT["rod_length"]]).max() > 0.3
-
-
-def test_derivatives_are_those_of_the_averaged_residual():
-    units, held, exact = exact_trial(4, prior=Prior())
-    compared(few_rows(units, exact, 5), units, held.shared, exact.bases, within=2e-7)
 
 
 def test_derivatives_where_a_calibration_starts():

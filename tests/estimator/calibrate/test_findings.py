@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
-from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import GRASPS, INERTIAL
 from estimator.calibrate.equations import TrialEquations
@@ -20,12 +19,10 @@ from estimator.calibrate.least_squares import (
     Fit,
     Given,
     Layout,
-    Problem,
     Quadratic,
     TrialFit,
     Unknowns,
     fit,
-    solved,
 )
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
@@ -114,22 +111,6 @@ def test_a_recording_of_other_robots_is_told(team: Team, stranger: Recording) ->
     )
 
 
-def test_of_two_recordings_neither_is_the_wrong_one(team: Team, stranger: Recording) -> None:
-    found = calibrate([team[2][0], stranger]).findings
-    assert len(found) == 1
-    assert found[0].startswith("first and stranger contradict each other: without either")
-
-
-def test_a_recording_of_other_robots_that_rub_fits_no_team(team: Team, stranger: Recording) -> None:
-    tau = stranger.tau.copy()
-    tau[:, 0, 1] += 0.1 * np.sign(np.gradient(low_pass(stranger.phi[:, 0, 1], 100.0, 5.0)))
-    found = calibrate([team[2][0], replace(stranger, tau=tau), team[2][1]]).findings
-    assert len(found) == 1
-    assert found[0].startswith(
-        "stranger contradicts the other recordings: the others fit one team of robots, and it fits none."
-    )
-
-
 def test_robots_in_another_order_are_told(team: Team) -> None:
     """Grasps on a regular triangle stay where they are when the robots go round; the centre of mass does not."""
     order, third = [1, 2, 0], team[2][2]
@@ -185,22 +166,6 @@ def test_a_sensitivity_to_arm_masses_is_that_of_heavier_arms(team: Team) -> None
                       for _ in range(2)]  # fmt: skip
         off.append(100.0 * (calibrate(recordings).payloads[0].parameters[0] / held.mass - 1.0))
     assert 0.5 * share < np.sqrt(np.mean(np.square(off))) < 1.7 * share
-
-
-def test_the_recording_that_fits_worst_is_named(team: Team) -> None:
-    """All robots rub in both, and in one of them more."""
-    rubbing = []
-    for recording, size in zip(team[2][:2], (0.1, 0.3), strict=True):
-        tau = recording.tau.copy()
-        tau[:, 0, 1] += size * np.sign(np.gradient(low_pass(recording.phi[:, 0, 1], 100.0, 5.0)))
-        rubbing.append(replace(recording, tau=tau))
-    (found,) = calibrate(rubbing).findings
-    assert found.startswith("No calibration explains first (")
-    assert "; second (" in found
-    assert "most in second" in found
-
-
-HELD = Prior(*[0.0] * 7)
 
 
 def test_held_out_is_what_a_calibration_without_the_trial_says():
@@ -284,62 +249,3 @@ def test_shares_are_those_of_the_noise() -> None:
         assert 0.98 < sum(share[kind] for share in found) < 1.0  # the rest is the prior's
     assert "tilt" not in found[0]
     assert found[2][INERTIAL] < 0.1 < found[2]["rod_length"]
-
-
-def problem_of(teams: int) -> Problem:
-    """Two trials of one payload, carried by one team or by two, and where a calibration begins."""
-    rng = np.random.default_rng(33)
-    held = load(3, rng)
-    units = [draw_units(3, Prior(), rng) for _ in range(teams)]
-    exact = [carry(units[k % teams], held, draw_path(held, rng), rng, 12.0) for k in range(2)]
-    recordings = [with_noise(one.recording, 2e-5, 0.01, rng) for one in exact]
-    sensing = Sensing.of(recordings)
-    trials = [CarriedTrial(Rows.of(one), 0, sensing) for one in recordings]
-    designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
-    start = Unknowns(designed, (held.shared,), tuple(one.bases for one in exact))
-    return Problem(Given(trials, start, Prior()))
-
-
-def test_steps_of_one_team_are_whole() -> None:
-    problem = problem_of(1)
-    point, damping = problem.start(), 0.0
-    for _ in range(3):
-        whole = solved(*problem.normal(point))[0]
-        lower, tried, damping = problem.lower(point, damping, 5)
-        assert lower is not None
-        assert tried == 1
-        assert lower.z == pytest.approx(point.z + whole, rel=1e-12, abs=1e-15)
-        point = lower
-    assert point.value / point.rows < 1.1
-
-
-def test_steps_between_two_teams_go_down_where_whole_ones_go_up() -> None:
-    problem = problem_of(2)
-    whole = problem.start()
-    highest = whole.value
-    for _ in range(2):
-        whole = problem.moved(whole, solved(*problem.normal(whole))[0])
-    assert whole.value > 3.0 * highest
-    problem = problem_of(2)
-    point, damping = problem.start(), 0.0
-    damped = 0
-    for _ in range(4):
-        lower, tried, damping = problem.lower(point, damping, 10)
-        assert lower is not None
-        assert lower.value < point.value * (1.0 + rules.RISE)
-        damped += tried > 1
-        point = lower
-    assert damped > 0
-    assert point.value < highest
-
-
-def test_where_no_step_goes_down_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    again, problem = problem_of(1), problem_of(1)
-    point = again.start()
-    expected = again.at(point.unknowns, point.z).g
-    point = problem.start()
-    monkeypatch.setattr(rules, "RISE", -1.0)
-    assert problem.lower(point, 0.0, 4)[:2] == (None, 4)
-    np.testing.assert_array_equal(
-        problem.at(point.unknowns, point.z).g, expected
-    )  # signals are where they were

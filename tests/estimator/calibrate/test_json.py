@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -146,48 +146,6 @@ def test_what_is_no_calibration_is_refused(change: Callable[[dict[str, Any]], No
         calibration_from_dict(values, "team.json")
 
 
-def test_other_keys_at_the_top_are_ignored() -> None:
-    values = through_text(calibration_to_dict(invented_calibration(2))) | {"note": "of Monday"}
-    assert asdict(calibration_from_dict(values).prior)["geometry_m"] == 1e-3
-
-
-def test_inertia_about_the_centre_of_mass_is_that_of_point_masses() -> None:
-    """Sums over points know no theorem of parallel axes; the scatter of many draws knows no Jacobian."""
-    rng = np.random.default_rng(4)
-    points, masses = rng.normal(0.3, 0.4, (6, 3)), rng.uniform(0.5, 2.0, 6)
-
-    def about(origin: np.ndarray) -> np.ndarray:
-        r = points - origin
-        return sum(m * (x @ x * np.eye(3) - np.outer(x, x)) for m, x in zip(masses, r, strict=True))
-
-    com = masses @ points / masses.sum()
-    J = about(np.zeros(3))
-    parameters = np.array(
-        [masses.sum(), *(masses @ points), J[0, 0], J[0, 1], J[0, 2], J[1, 1], J[1, 2], J[2, 2]]
-    )
-    spread = 1e-4 * rng.normal(size=(10, 10))
-    payload = invented_calibration(2).payloads[0]
-    covariance, by_scale = payload.covariance.copy(), payload.by_scale.copy()
-    covariance[-10:, -10:], by_scale[-10:] = (
-        spread @ spread.T,
-        -parameters,
-    )  # heavier springs, heavier payload
-    made = type(payload)(None, payload.grasps, parameters, covariance, by_scale)
-    found = carried(made, 0.01)
-    assert found.mass_kg == pytest.approx(masses.sum())
-    np.testing.assert_allclose(found.p_1c, com, atol=1e-12)
-    np.testing.assert_allclose(found.inertia, about(com), atol=1e-12)
-    np.testing.assert_allclose(found.principal.moments, np.linalg.eigvalsh(about(com)))
-    draws = (
-        parameters + rng.normal(size=(40000, 10)) @ spread.T - 0.01 * rng.normal(size=(40000, 1)) * parameters
-    )
-    c = draws[:, 1:4] / draws[:, :1]
-    xx = draws[:, 4] - draws[:, 0] * (c[:, 1] ** 2 + c[:, 2] ** 2)
-    assert found.mass_se_kg == pytest.approx(draws[:, 0].std(), rel=0.02)
-    np.testing.assert_allclose(found.p_1c_se_m, c.std(axis=0), rtol=0.02)
-    assert found.inertia_se[0, 0] == pytest.approx(xx.std(), rel=0.02)
-
-
 UNITS = {
     "phi_zero": ("encoder zero phi [deg]", 180 / np.pi),
     "theta_zero": ("encoder zero theta [deg]", 180 / np.pi),
@@ -250,21 +208,6 @@ def test_every_deviation_is_shown_in_its_unit(all_free: Calibration) -> None:
             assert re.findall(r"(\w+): ", line) == [entry for entry in group.entries if entry]
 
 
-def test_what_is_held_is_not_shown(made: Calibration) -> None:
-    text = format_calibration(made)
-    names = {group.name for group in shown_groups(made)}
-    assert names == set(UNITS) - {"tilt", "proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio"}
-    theta = next(line for line in of_section(text, "Robot 1") if "theta" in line)
-    assert theta.endswith("x: held")
-    assert len(numbers(theta)) == 2
-    mass = of_section(text, "All arms together")[1]
-    at = AT["wrist_mass_ratio"].start
-    same(numbers(mass), 100 * made.units.x[0, [at]], 100 * made.sd[0, [at]])
-    free = replace(made, prior=Prior(arm_mass_ratio=0.05))
-    assert "All arms together" not in format_calibration(free)
-    assert "wrist_mass_ratio" in {group.name for group in shown_groups(free)}
-
-
 def test_the_payload_is_shown(made: Calibration) -> None:
     lines = of_section(format_calibration(made), "Payload (c)")
     found, grasps = carried(made.payloads[0], made.scale_sd), grasps_of(made.payloads[0], made.scale_sd)
@@ -283,49 +226,6 @@ def test_the_payload_is_shown(made: Calibration) -> None:
     assert found.mass_se_kg == pytest.approx(np.hypot(scale, noise), rel=1e-6)
     weighed = replace(made, scale_sd=0.0, payloads=(replace(payload, label=None),))
     assert not any("common scale" in line for line in of_section(format_calibration(weighed), "Payload]]"))
-
-
-def test_recordings_are_shown(made: Calibration) -> None:
-    text = format_calibration(made)
-    assert text.startswith("[[Calibration]]  3 robots, 4 recordings, 150 s, 4 steps\n")
-    head, *rows = of_section(text, "Recordings")[1:]
-    assert head.split() == ["length", "as", "designed", "calibrated", "left", "out"]
-    cells = [re.split(r"\s{2,}", row.strip()) for row in rows]
-    assert cells == [
-        ["random.parquet", "random", "40.0 s", "60000 / 9000", "0.90 / 1.00", "1.50 / 1.10"],
-        ["periodic.parquet", "periodic", "40.0 s", "66000 / 9900", "0.99 / 1.10", "1.65 / 1.21"],
-        ["static.parquet", "static", "40.0 s", "72600 / 10890", "1.09 / 1.21", "1.82 / 1.33"],
-        ["free.parquet", "free", "30.0 s", "-", "- / 1.02", "-"],
-    ]
-    assert len({len(row.split("  0.")[0]) for row in rows[:2]}) == 1
-    once = format_calibration(replace(made, trials=made.trials[:1]))
-    assert "1 recording, 40 s" in once
-
-
-def test_sentences_are_shown(made: Calibration) -> None:
-    text = format_calibration(made)
-    assert of_section(text, "Findings")[1] == "    the payload slipped"
-    assert of_section(text, "What stays open")[1].strip() == made.open[0]
-    bare = format_calibration(replace(made, findings=(), open=()))
-    assert "[[Findings]]" not in bare
-    assert of_section(bare, "What stays open")[1] == "    Nothing."
-    words = "word " * 60
-    long = of_section(format_calibration(replace(made, findings=(words,))), "Findings")[1:]
-    assert max(map(len, long)) <= 118
-    assert min(map(len, long[:-1])) > 110
-    assert [line[:9].count(" ") >= 8 for line in long] == [False, True, True]
-
-
-def test_deviations_that_were_hardly_touched(made: Calibration) -> None:
-    assert made.untouched == ()
-    assert "Hardly touched" not in format_calibration(made)
-    covariance = made.covariance.copy()
-    for name, share in (("tau_zero", 0.91), ("rod_length", 0.89)):
-        at = COUNT + AT[name].start + 1
-        covariance[at, at] = (share * made.prior_sd[1, AT[name].start + 1]) ** 2
-    touched = replace(made, covariance=covariance)
-    assert touched.untouched == ("omnid2.tau_zero2",)
-    assert "[[Hardly touched by these recordings]]\n    omnid2.tau_zero2\n" in format_calibration(touched)
 
 
 def test_frames(made: Calibration, all_free: Calibration) -> None:
@@ -404,17 +304,6 @@ def test_the_projects_payloads_have_parallel_flanges_that_decide_all_zeros(paylo
     angles = Rotation.from_matrix(turned(held.grasps.R_1i, found.zeros) @ np.swapaxes(R, 1, 2)).magnitude()
     assert angles.max() < 1e-5
     assert found.misfit_rad < 1e-7
-
-
-def test_two_robots_across_each_other_are_an_euler_angle_problem() -> None:
-    """Rx(-z_1) Rz(90 deg) Rx(z_2): the zeros are the outer two of X-Z-X Euler angles."""
-    truth = np.array([0.02, -0.015])
-    turn = np.array([np.eye(3), Rotation.from_euler("z", 90.0, degrees=True).as_matrix()])
-    R = as_encoders_say(turn, truth)
-    first, _, last = Rotation.from_matrix(R[1]).as_euler("XZX")
-    found = parallel_flanges([payload_of(R, np.array([[0.0, 0, 0], [1.0, 0, 0]]))], ONE_DEG)
-    np.testing.assert_allclose(found.zeros, [-first, last], atol=1e-8)
-    np.testing.assert_allclose(found.zeros, truth, atol=1e-8)
 
 
 def test_a_common_turn_about_parallel_x_axes_stays_open() -> None:

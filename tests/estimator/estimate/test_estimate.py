@@ -13,18 +13,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
-from estimator.estimate import uncertainty
 from estimator.estimate.consistency import Trial
 from estimator.estimate.payload import (
     Method,
-    check_one_payload,
     estimate_from_trials,
     estimate_payload,
-    mass_alone,
 )
 from estimator.estimate.result import PayloadEstimate, format_estimate
-from estimator.estimate.statics import MassEstimate
-from estimator.signals import GraspData, find_holds
+from estimator.signals import GraspData
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry
 from rigid_body_data import make_body, moving, still
 
@@ -114,11 +110,6 @@ def test_joint_signals_pass_through_the_whole_chain():
         np.testing.assert_allclose(estimate.grasps.p_1i[k], p_1i, atol=1e-4)
 
 
-def test_unknown_method():
-    with pytest.raises(InputError, match="method is 'best'"):
-        estimate_from_trials(team()[:1], "best")
-
-
 # ---- data that do not determine everything ------------------------------------------------------------------
 
 
@@ -135,20 +126,6 @@ def test_no_motion_leaves_the_mass():
     steps = {weak.step for weak in estimate.undetermined}
     assert {"rotation R_12", "rotation R_13"} <= steps
     assert "not determined" in format_estimate(estimate)
-
-
-def test_nothing_at_all_is_an_error():
-    pose = {"angle_amplitude": (0.05, 0, 0)}
-    data = moving(BODY, 20, pose_options=pose, **NOISE)
-    with pytest.raises(InputError, match=r"nothing can be estimated.*about x of \{1\}"):
-        estimate_from_trials([Trial("one axis", "random", None, data)], "auto")
-    with pytest.raises(InputError, match="nothing can be estimated jointly"):
-        estimate_from_trials([Trial("one axis", "random", None, data)], "joint")
-
-
-def test_no_recording_is_an_error():
-    with pytest.raises(InputError, match="no recording"):
-        estimate_payload([])
 
 
 # ---- data that are wrong ------------------------------------------------------------------------------------
@@ -174,13 +151,6 @@ def test_exchanged_robots_in_one_of_three_recordings_are_named(which):
         estimate_from_trials(trials)
 
 
-def test_exchanged_robots_in_one_of_two_recordings_name_both():
-    trials = team()[:2]
-    trials[0] = replace(trials[0], data=exchanged(trials[0].data, 1, 2))
-    with pytest.raises(InputError, match=r"random1 and periodic2 disagree.*robots 2 and 3 were exchanged"):
-        estimate_from_trials(trials)
-
-
 def test_another_payload_under_the_same_name_is_an_error():
     trials = [*team(), trial("random", name="intruder", body=make_body(3, seed=9))]
     with pytest.raises(InputError, match=r"intruder disagrees.*same payload and grasps"):
@@ -200,45 +170,12 @@ def test_a_heavier_payload_in_the_same_grasps_shows_only_where_masses_are_compar
         estimate_from_trials(trials, compare_masses=True)
 
 
-def test_one_payload_has_one_mass_by_each_recording_alone():
-    """The mass that is compared is that of an estimate from the recording alone, to the last bit."""
-    trials = [*team(), still_trial()]
-    estimate = estimate_from_trials(trials, compare_masses=True)
-    for one, record in zip(trials, estimate.recordings, strict=True):
-        alone = estimate_from_trials([one])
-        assert mass_alone(one.data, find_holds(one.data), record.grasps) == alone.mass
-
-
-def test_masses_are_compared_by_share_and_by_error():
-    def masses(*values):
-        return [(f"r{k}", m and MassEstimate(*m, 0.0)) for k, m in enumerate(values)]
-
-    check_one_payload(masses((10.0, 0.01), None, (10.49, 0.01)))
-    check_one_payload(masses((10.0, 0.1), (11.1, 0.1)))
-    check_one_payload(masses(None, None))
-    with pytest.raises(
-        InputError, match=r"^r2 says 10\.00 kg and r0 says 10\.60 kg; recordings must be of one"
-    ):
-        check_one_payload(masses((10.6, 0.01), None, (10.0, 0.01)))
-    with pytest.raises(InputError, match=r"r0 says 10.00 kg and r1 says 11.30 kg"):
-        check_one_payload(masses((10.0, 0.1), (11.3, 0.1)))
-
-
 def test_an_exchange_in_the_only_recording_is_a_renumbering():
     data = exchanged(team()[1].data, 1, 2)
     estimate = estimate_from_trials([Trial("x", "periodic", None, data)])
     straight = estimate_from_trials([Trial("x", "periodic", None, team()[1].data)])
     np.testing.assert_allclose(estimate.grasps.p_1i[[0, 2, 1]], straight.grasps.p_1i, atol=1e-8)
     np.testing.assert_allclose(estimate.inertia.inertia, straight.inertia.inertia, atol=1e-6)
-
-
-@pytest.mark.parametrize("channel", [slice(0, 3), slice(3, 6)], ids=["gimbal", "delta"])
-def test_half_exchanged_columns_are_not_one_rigid_body(channel):
-    data = team()[0].data
-    twist = data.twist.copy()
-    twist[:, [0, 1], channel] = twist[:, [1, 0], channel]
-    with pytest.raises(InputError, match=r"random1: robots . and . do not move like one rigid body"):
-        estimate_from_trials([replace(team()[0], data=replace(data, twist=twist))])
 
 
 def test_a_loose_grasp_is_flagged():
@@ -277,34 +214,12 @@ def test_wrong_torques_in_one_recording_are_flagged_there(change):
     assert all(flag.startswith("random1") for flag in flagged)
 
 
-@pytest.mark.parametrize("change", [flip, swap])
-def test_wrong_torques_everywhere_are_seen(change):
-    estimate = estimate_from_trials([replace(t, data=wrong_wrench(t.data, change)) for t in team()])
-    doubts = [*estimate.flags, *(str(weak) for weak in estimate.undetermined)]
-    assert any("torques" in doubt for doubt in doubts)
-
-
 def test_all_torques_reversed_is_an_error():
     def reverse(wrench):
         wrench *= -1
 
     with pytest.raises(InputError, match="check the sign of the torques"):
         estimate_from_trials([replace(t, data=wrong_wrench(t.data, reverse)) for t in team()])
-
-
-def test_an_impossible_inertia_is_flagged():
-    body = replace(BODY, inertia=np.diag([1.0, 1.5, 3.5]))
-    estimate = estimate_from_trials(team(body))
-    assert any("exceeds the sum" in flag for flag in estimate.flags)
-
-
-def test_equal_moments_are_reported_without_axes():
-    body = replace(BODY, inertia=np.diag([2.0, 2.0, 3.0]))
-    estimate = estimate_from_trials(team(body))
-    assert estimate.inertia.principal.R_1c is None
-    assert any("axes are not determined" in flag for flag in estimate.flags)
-    assert PayloadEstimate.from_dict(estimate.to_dict()).inertia.principal.R_1c is None
-    assert "R_1c:" in format_estimate(estimate)
 
 
 # ---- JSON and report ----------------------------------------------------------------------------------------
@@ -407,25 +322,6 @@ def test_report_shows_values_errors_and_doubts():
     assert "[[Not determined]]" in format_estimate(estimate_from_trials([still_trial()]))
 
 
-def test_recordings_of_the_same_name_are_told_apart():
-    estimate = estimate_from_trials([trial("random", name="a", seed=1), trial("random", name="a", seed=2)])
-    assert [r.name for r in estimate.recordings] == ["a", "a (2)"]
-
-
-def test_no_percentages_of_what_may_be_zero():
-    """A component may be zero where its vector is not, and a value within its error of zero has no share."""
-    estimate = estimate_from_trials(team())
-    lines = format_estimate(estimate).splitlines()
-    components = [line for line in lines if line.split(":")[0].rsplit(" ", 1)[-1] in ("x", "y", "z")]
-    assert len(components) > 15
-    assert not any("%" in line for line in components)
-    assert all("%" in line for line in lines if line.strip().startswith(("m:", "|p_")))
-    doubtful = replace(estimate, mass=MassEstimate(0.02, 0.011, 0.0))
-    (mass,) = (line for line in format_estimate(doubtful).splitlines() if line.strip().startswith("m:"))
-    assert "0.020 +- 0.011 kg" in mass
-    assert "%" not in mass
-
-
 @cache
 def whole():
     """Three exact robots that squeeze the payload while they turn it."""
@@ -457,23 +353,6 @@ def test_one_of_three_robots_tells_no_mass(robot):
     assert format_estimate(estimate).startswith("[[Payload]]  1 robot, ")
     assert "robots apart" not in format_estimate(estimate)
     assert estimate_payload([part([robot])], withhold=False).mass is not None
-
-
-def test_two_of_three_robots_tell_no_mass():
-    estimate = estimate_payload([part([0, 2])])
-    assert estimate.mass is None
-    assert "withheld" in estimate.flags[0]
-    assert "is a robot missing" in estimate.flags[0]
-
-
-def test_metadata_of_a_larger_team_are_believed():
-    forces = [[0.0, 0.0, 30.0]] * 4
-    estimate = estimate_payload([part([0, 1, 2], {"feed_forward_N": forces})])
-    assert nothing_told(estimate)
-    assert "a team of 4 robots and the samples of 3 robots" in estimate.flags[0]
-    told = estimate_payload([part([0, 1, 2], {"feed_forward_N": forces[:3]})])
-    assert told.mass.mass == pytest.approx(MASS, rel=1e-3)
-    assert not any("withheld" in flag for flag in told.flags)
 
 
 def test_a_lone_robot_that_carries_all_keeps_its_numbers():
@@ -562,42 +441,6 @@ def test_forces_in_other_units(method: Method) -> None:
     data = [replace(each, wrench=1.5 * each.wrench) for each in trials()]
     # Holds begin and end by newtons.
     same(estimated(data, method), plain(method), mass=1.5, rtol=1e-5 if method == "joint" else 0.05)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_lengths_in_other_units(method: Method) -> None:
-    """Gravity is a length over the square of a time, and so are forces at the same mass."""
-    f = 1.1
-    own = np.repeat([1.0, f], 3)
-    data = [
-        replace(
-            each, p_bi=f * each.p_bi, twist=own * each.twist, twist_dot=own * each.twist_dot,
-            gravity_mps2=f * each.gravity_mps2, wrench=np.repeat([f * f, f], 3) * each.wrench,
-        )
-        for each in trials()
-    ]  # fmt: skip
-    same(estimated(data, method), plain(method), length=f, rtol=1e-3 if method == "joint" else 0.05)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_times_in_other_units(method: Method, monkeypatch: pytest.MonkeyPatch) -> None:
-    f = 1.1
-    expected = estimated(trials()[:1], method) if method == "joint" else plain(method)
-    monkeypatch.setattr(uncertainty, "WINDOW_S", f * uncertainty.WINDOW_S)
-    data = [
-        replace(
-            each, time=f * each.time, rate_hz=each.rate_hz / f, twist=each.twist / f, twist_dot=each.twist_dot / f**2,
-            wrench=each.wrench / f**2, gravity_mps2=each.gravity_mps2 / f**2,
-        )
-        for each in trials()
-    ]  # fmt: skip
-    if method == "joint":
-        same(estimated(data[:1], method), expected, rtol=1e-4)
-    else:
-        found = estimated(data, method)
-        assert found.mass is not None
-        assert expected.mass is not None
-        assert found.mass.mass == pytest.approx(expected.mass.mass, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -185,15 +185,6 @@ def test_recordings_that_do_not_serve_a_fit(good: tuple[Load, list[Recording]], 
         estimate([recording], "fit")
 
 
-def test_recordings_of_two_calibrations_do_not_serve_a_fit(good: tuple[Load, list[Recording]]) -> None:
-    units = [ArmUnit(DESIGN, np.full((3, COUNT), size)) for size in (1e-9, 2e-9)]
-    told = [
-        replace(recording, metadata=replace(recording.metadata, units=its))
-        for recording, its in zip(good[1], units, strict=True)
-    ]
-    assert "the recordings say different things of their robots" in estimate(told).why_not_fit
-
-
 def test_robots_that_the_recordings_know_are_held_so_and_their_errors_missed() -> None:
     units = draw_units(3, Prior(), np.random.default_rng(4))
     held, recordings = team(3, units)
@@ -231,14 +222,6 @@ def recordings() -> list[Recording]:
 @pytest.fixture(scope="module")
 def made(recordings: list[Recording]) -> Calibration:
     return calibrate(recordings)
-
-
-def test_a_recording_takes_the_robots_and_keeps_its_samples() -> None:
-    calibration, recording = invented_calibration(3), small_recording()
-    known = calibrated(recording, calibration)
-    assert known.metadata.units is calibration.units
-    assert known.phi is recording.phi
-    assert recording.metadata.units is None
 
 
 def test_a_calibration_of_other_robots_is_refused() -> None:
@@ -297,28 +280,3 @@ def test_estimate_on_robots_held(recordings: list[Recording], made: Calibration,
     assert bare.mass.se < 0.1 * found.mass.se
     assert np.all(np.abs(found.p_1c - COM) < 4 * found.p_1c_se_m)
     assert np.all(found.p_1c_se_m > bare.p_1c_se_m)
-
-
-def test_too_little_for_the_errors_is_said(recordings: list[Recording], made: Calibration) -> None:
-    """One posture: holds give the mass, and no fit of grasps."""
-    still = replace(
-        recordings[0],
-        **{
-            name: np.repeat(getattr(recordings[0], name)[:1], 1200, axis=0)
-            for name in ("phi", "theta", "tau")
-        },
-        time=recordings[0].time[:1200],
-    )
-    still.tau[:] += 1e-6 * np.random.default_rng(0).normal(size=still.tau.shape)  # or it is one reading
-    found = estimate_on(made, [still])
-    assert found.method == "staged"
-    assert found.mass is not None
-    assert "Standard errors lack those of the robots' calibration" in found.flags[-1]
-
-
-def test_an_estimate_is_of_one_payload(recordings: list[Recording], made: Calibration) -> None:
-    other = replace(recordings[0], metadata=replace(recordings[0].metadata, payload="b"))
-    with pytest.raises(
-        InputError, match="of payload 'b'; the calibration has None, and an estimate is of one"
-    ):
-        estimate_calibrated(made, [other])

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.estimate import grasps as module
 from estimator.estimate.grasps import GraspEstimate, estimate_grasps, pair_position, pair_rotation
 from estimator.estimate.inertia import by_upstream
 from estimator.estimate.uncertainty import numerical_jacobian
-from estimator.rigid_team import fuse, fusion_changes, fusion_matrix, fusion_with, inertia_regressor
+from estimator.rigid_team import fuse, inertia_regressor
 from estimator.signals import GraspData
 from rigid_body_data import Body, make_body, moving
 
@@ -32,14 +31,6 @@ def test_exact_data_give_exact_grasps(N):
     assert len(reports) == 2 * (N - 1)
     np.testing.assert_allclose(estimate.R_1i, body.R_1i, atol=1e-12)
     np.testing.assert_allclose(estimate.p_1i, body.p_1i, atol=1e-12)
-
-
-def test_one_robot_has_nothing_to_estimate():
-    estimate, reports = estimate_grasps([moving(make_body(1), 5)])
-    assert estimate is not None
-    assert estimate.robots == 1
-    assert estimate.covariance.shape == (0, 0)
-    assert reports == ()
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 1.0, np.pi - 1e-4, np.pi - 1e-9, np.pi])
@@ -94,22 +85,6 @@ def test_renumbering_the_robots_changes_nothing():
     np.testing.assert_allclose(b.pair(2, 3).covariance, a.pair(1, 2).covariance, rtol=1e-3, atol=1e-12)
 
 
-def test_residuals_equal_those_of_the_samples():
-    data = moving(make_body(3), 20, **NOISE)
-    estimate, _ = estimate_grasps([data])
-    assert estimate is not None
-    for i, j in ((1, 2), (3, 1)):
-        pair = estimate.pair(i, j)
-        V_i, V_j = data.twist[:, i - 1], data.twist[:, j - 1]
-        e_w = V_i[:, :3] - V_j[:, :3] @ pair.R_ij.T
-        mean = sum(data.twist[:, k, :3] @ estimate.T(i, k + 1)[:3, :3].T for k in range(3)) / 3
-        e_v = V_i[:, 3:] - V_j[:, 3:] @ pair.R_ij.T - np.cross(pair.p_ij, mean)
-        assert estimate.angular_residual_rms[i - 1, j - 1] == pytest.approx(np.sqrt(np.mean(e_w**2)))
-        assert estimate.linear_residual_rms[i - 1, j - 1] == pytest.approx(np.sqrt(np.mean(e_v**2)))
-    expected = np.sqrt(np.mean(data.twist[..., :3] ** 2, axis=(0, 2)))
-    np.testing.assert_allclose(estimate.angular_motion_rms, expected)
-
-
 def test_pooling_trials_equals_one_long_trial():
     body = make_body(3)
     trials = [moving(body, 20, seed=k, **NOISE) for k in (1, 2)]
@@ -138,24 +113,6 @@ def test_refinement_uses_what_the_pair_alone_does_not():
     assert np.sqrt(np.mean(np.square(refined_error))) < 0.8 * np.sqrt(np.mean(np.square(pair_error)))
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-7, 0.00999, 0.01001, 0.5, 2.0, np.pi - 1e-7, np.pi])
-def test_left_jacobian_against_finite_differences(angle):
-    phi, h = angle * np.array([0.48, -0.6, 0.64]), 1e-6
-    columns = []
-    for d in h * np.eye(3):
-        plus, minus = Rotation.from_rotvec(phi + d), Rotation.from_rotvec(phi - d)
-        columns.append((plus * minus.inv()).as_rotvec() / (2 * h))
-    np.testing.assert_allclose(so3.left_jacobian(phi), np.column_stack(columns), atol=2e-9)
-
-
-@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3, 0.00999, 0.0101, 1.0, np.pi - 1e-6, np.pi, 4.0])
-def test_inverse_left_jacobian(angle):
-    axes = np.array([[0.6, -0.48, 0.64], [0.0, 0.0, 1.0]])
-    inverse = so3.inverse_left_jacobian(angle * axes)
-    for one, axis in zip(inverse, axes, strict=True):
-        np.testing.assert_allclose(one @ so3.left_jacobian(angle * axis), np.eye(3), atol=1e-11)
-
-
 def test_residual_jacobian_against_finite_differences():
     rng = np.random.default_rng(3)
     N = 4
@@ -172,14 +129,6 @@ def test_residual_jacobian_against_finite_differences():
             moved_R = np.concatenate([R[:1], Rotation.from_rotvec(x[:, :3]).as_matrix() @ R[1:]])
             sides.append(module._residuals(V, moved_R, np.concatenate([p[:1], p[1:] + x[:, 3:]])))
         np.testing.assert_allclose(J[..., k], (sides[0] - sides[1]) / (2 * h), atol=1e-8)
-
-
-def test_chordal_mean_of_symmetric_rotations_is_their_centre():
-    centre = Rotation.from_rotvec([0.2, -1.0, 2.5])
-    spread = Rotation.from_rotvec([[0.1, 0, 0], [-0.1, 0, 0], [0, 0.2, 0], [0, -0.2, 0]])
-    np.testing.assert_allclose(
-        so3.chordal_mean((centre * spread).as_matrix()), centre.as_matrix(), atol=1e-14
-    )
 
 
 ROBOTS, SAMPLES = 4, 30
@@ -201,30 +150,6 @@ def motion(samples: int = SAMPLES) -> GraspData:
     R = Rotation.random(samples * ROBOTS, rng=rng).as_matrix().reshape(samples, ROBOTS, 3, 3)
     twist, twist_dot, wrench = rng.normal(size=(3, samples, ROBOTS, 6))
     return GraspData(np.arange(samples) / 100.0, R, R[..., 0], twist, twist_dot, wrench, 100.0, 9.81)
-
-
-@pytest.mark.parametrize("linear", [0.05, 0.01])  # the weight changes with the grasps, or is at its bound
-def test_changes_of_the_fused_motion(linear: float) -> None:
-    data, held = motion(), grasps(linear)
-    found = fusion_changes(data.twist, data.twist_dot, data.R_bi, data.wrench, held)
-
-    def fused(x: np.ndarray) -> np.ndarray:
-        moved = held.moved(x)
-        twists = [part.reshape(SAMPLES, -1) @ fusion_matrix(moved).T for part in (data.twist, data.twist_dot)]
-        body = fuse(data, moved)
-        return np.concatenate([*twists, body.up, body.force, body.moment], axis=1)
-
-    expected = numerical_jacobian(fused, np.zeros(K)).T.reshape(K, SAMPLES, -1)
-    assert np.concatenate(found, axis=2) == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
-
-
-def test_changes_with_a_weight_that_is_held() -> None:
-    data, held = motion(), grasps()
-    found = fusion_changes(data.twist, data.twist_dot, data.R_bi, data.wrench, held, 2.5)
-    expected = numerical_jacobian(
-        lambda x: data.twist.reshape(SAMPLES, -1) @ fusion_with(held.moved(x), 2.5).T, np.zeros(K)
-    )
-    assert found.twist == pytest.approx(expected.T.reshape(K, SAMPLES, 6), abs=1e-7)
 
 
 def test_inertia_by_errors_of_grasps_and_centre_of_mass() -> None:

@@ -6,15 +6,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import inertia_matrix, inertia_parameters
-from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.inertia import estimate_inertia, principal_inertia, project_positive
 from estimator.estimate.joint import estimate_joint
-from estimator.estimate.uncertainty import standard_errors
-from estimator.rigid_team import inertia_regressor, momentum_regressor, newton_euler_regressor
+from estimator.rigid_team import inertia_regressor, newton_euler_regressor
 from mocobot_sim.paper.scoring import PAYLOADS, payload_truth
 from mujoco_body import mujoco_data
-from rigid_body_data import RATE, make_body, make_data, moving, still
+from rigid_body_data import make_body, moving, still
 
 PIN_ORDER = [4, 5, 7, 6, 8, 9]  # Pinocchio lists xx, xy, yy, xz, yz, zz after m and m c; ours xx, xy, xz, ...
 
@@ -39,16 +37,6 @@ def printed_B(w):
     )
 
 
-def test_regressor_is_newton_euler():
-    rng = np.random.default_rng(0)
-    omega, alpha = rng.normal(size=(2, 50, 3))
-    inertia = random_inertia(rng)
-    moment = alpha @ inertia + np.cross(omega, omega @ inertia)
-    theta = inertia_parameters(inertia)
-    np.testing.assert_allclose(inertia_regressor(omega, alpha) @ theta, moment, atol=1e-13)
-    np.testing.assert_allclose(momentum_regressor(omega) @ theta, omega @ inertia, atol=1e-13)
-
-
 def test_regressor_is_pinocchios():
     rng = np.random.default_rng(1)
     for omega, alpha in rng.normal(size=(20, 2, 3)):
@@ -64,22 +52,6 @@ def test_equation_22_is_right_when_rejoined_and_wrong_when_transposed():
         printed = printed_B(omega)
         np.testing.assert_allclose(np.hstack([printed[:3], printed[3:]]), B, atol=1e-14)
         assert np.max(np.abs(printed.T - B)) > 0.1 * np.max(np.abs(B))
-
-
-def test_the_transpose_of_22_spoils_the_inertia():
-    body = make_body(1)
-    data = moving(body, 30, pose_options={"angle_amplitude": (0.4, 0.5, 0.3)})
-    omega, alpha = data.twist[:, 0, :3], data.twist_dot[:, 0, :3]
-    moment = data.wrench[:, 0, :3] - np.cross(body.p_1c, data.wrench[:, 0, 3:])
-
-    def solve(B):
-        X = (momentum_regressor(alpha) + B).reshape(-1, 6)
-        return inertia_matrix(np.linalg.lstsq(X, moment.ravel(), rcond=None)[0])
-
-    right = solve(inertia_regressor(omega, np.zeros_like(omega)))
-    wrong = solve(np.array([printed_B(w).T for w in omega]))
-    np.testing.assert_allclose(right, body.inertia, atol=1e-9)
-    assert np.max(np.abs(wrong - body.inertia)) > 0.02 * np.max(body.inertia)
 
 
 @pytest.mark.parametrize("N", [1, 2, 5])
@@ -153,15 +125,6 @@ def test_principal_standard_errors_against_sampling():
     np.testing.assert_allclose(claimed.axis_angle_se_rad, np.std(angles, axis=0), rtol=0.1)
 
 
-def test_equal_moments_have_no_axes():
-    result = principal_inertia(np.diag([1.0, 2.0, 2.0]), 1e-6 * np.eye(6))
-    assert result.R_1c is None
-    assert result.axis_angle_rad is None
-    np.testing.assert_allclose(result.moments, [1, 2, 2])
-    exact = principal_inertia(np.diag([1.0, 2.0, 2.0]), np.zeros((6, 6)))
-    assert exact.R_1c is None
-
-
 def test_negative_eigenvalues_are_projected_and_reported():
     R = Rotation.from_rotvec([0.3, 0.2, -1.0]).as_matrix()
     projected, acted = project_positive(R @ np.diag([-0.1, 1.0, 2.0]) @ R.T)
@@ -170,19 +133,6 @@ def test_negative_eigenvalues_are_projected_and_reported():
     same, acted = project_positive(np.diag([0.0, 1.0, 2.0]))
     assert not acted
     np.testing.assert_array_equal(same, np.diag([0.0, 1.0, 2.0]))
-
-
-def test_a_rod_measured_with_noise_is_projected():
-    body = make_body(1)
-    thin = type(body)(body.mass, body.p_1c, np.diag([0.0, 2.0, 2.5]), body.R_1i, body.p_1i)
-    grasps, _ = estimate_grasps([moving(thin, 5)])
-    acted = 0
-    for seed in range(6):
-        data = moving(thin, 30, seed=seed, wrench_noise=0.3)
-        estimate, _ = estimate_inertia([data], grasps, thin.p_1c)
-        acted += estimate.projected
-        assert estimate.principal.moments[0] >= -1e-12
-    assert 0 < acted < 6
 
 
 PIN_TEN = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
@@ -256,58 +206,6 @@ def test_one_pose_gives_the_mass_only_and_names_the_direction():
     assert estimate.inertia is None
     assert [weak.direction for weak in com.weak] == ["along z of {1}"]
     assert not inertia.determined
-
-
-def test_reversed_torques_are_an_error():
-    body = make_body(2)
-    data = moving(body, 10)
-    grasps, _ = estimate_grasps([data])
-    data.wrench[:] *= -1
-    with pytest.raises(InputError, match=r"mass is -11 kg.*sign of the torques"):
-        estimate_joint([data], grasps)
-
-
-def yawing(body, tilt, seed=0, **noise):
-    """Yaw about an axis 0.6 m off {1}, with tilts of that many rad at other frequencies."""
-    t = np.arange(round(20 * RATE)) / RATE
-    w = 2 * np.pi * np.array([0.37, 0.53, 0.6])
-    turn = Rotation.from_euler("xyz", np.sin(np.outer(t, w)) * [tilt, tilt, 0.08])
-    step = 1e-4  # derivatives by differences
-    near = [np.sin(np.outer(t + k * step, w)) * [tilt, tilt, 0.08] for k in (-1, 0, 1)]
-    before, R, after = (Rotation.from_euler("xyz", e) for e in near)
-    omega = (before.inv() * after).as_rotvec() / (2 * step)
-    alpha = ((R.inv() * after).as_rotvec() - (before.inv() * R).as_rotvec()) / step**2
-    pivot = np.array([0.5, -0.3, 0.0])
-    places = [pivot - r.apply(pivot) for r in (before, R, after)]
-    v, a = (places[2] - places[0]) / (2 * step), (places[2] - 2 * places[1] + places[0]) / step**2
-    return make_data(body, (turn.as_matrix(), omega, alpha, places[1], v, a), t, seed=seed, **noise)
-
-
-def test_a_part_of_the_centre_that_goes_with_the_inertia_is_not_reported():
-    """Level yaw about one axis: the height of the centre moves the moments as products of inertia do."""
-    body = make_body(3)
-    grasps, _ = estimate_grasps([moving(body, 15)])
-    estimate, (com, _) = estimate_joint([yawing(body, 0.0)], grasps)
-    assert estimate.mass.mass == pytest.approx(body.mass, abs=1e-3)
-    assert estimate.com is None
-    assert [weak.direction for weak in com.weak] == ["along z of {1}"]
-
-
-def test_weak_directions_of_the_inertia_are_errors_of_the_centre():
-    """Yaw with tilts that show the inertia hardly and the height of the centre a little, 40 times with noise."""
-    body = make_body(3)
-    grasps, _ = estimate_grasps([moving(body, 15)])
-    off, claimed = [], []
-    for seed in range(40):
-        trial = yawing(body, 4e-4, seed, twist_noise=2e-4, linear_noise=2e-5, wrench_noise=0.02)
-        estimate, (com, inertia) = estimate_joint([trial], grasps)
-        assert com.determined
-        assert not inertia.determined
-        off.append(estimate.com.p_1c - body.p_1c)
-        claimed.append(standard_errors(estimate.com.covariance[1:, 1:]))
-    rms = np.sqrt(np.mean((np.array(off) / claimed) ** 2, axis=0))
-    assert np.all((rms > 0.7) & (rms < 1.4)), rms
-    assert np.min(claimed, axis=0)[2] > 1e-3
 
 
 def test_turning_about_one_axis_leaves_the_inertia_open_and_nothing_else():

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.leftover import Steps, rounded, steps_of
+from estimator.estimate.leftover import Steps
 from estimator.estimate.statics import estimate_com, estimate_mass
 from estimator.signals import GraspData, Hold, find_holds
-from recordings import small_recording
 from rigid_body_data import GRAVITY, make_body, moving, still
 
 TILTS = [(0, 0), (0.08, 0), (-0.08, 0), (0, 0.08), (0, -0.08), (0.05, 0.05)]
@@ -107,11 +105,6 @@ def test_all_holds_are_found_and_the_motion_between_is_not(N, options):
         assert hold.robots == N
 
 
-def test_too_short_a_stop_is_no_hold():
-    assert find_holds(still(make_body(3), TILTS, seconds=5.5, travel=2.0)) == []
-    assert find_holds(still(make_body(3), [(0, 0)], seconds=5.0)) == []
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.016])
 @pytest.mark.parametrize(
     "shape",
@@ -130,27 +123,11 @@ def test_slow_motion_is_no_hold(noise, shape):
     assert find_holds(force_record(force)) == []
 
 
-def test_settling_is_left_out():
-    t = np.arange(2000) / 100
-    force = slow_noise(np.random.default_rng(2), len(t), 0.016) + 3 * np.exp(-t / 0.7)[:, None]
-    (hold,) = find_holds(force_record(force))
-    assert 2.0 < hold.start_s < 4.5
-    assert hold.end_s == pytest.approx(19.99)
-    assert abs(hold.wrench[0, 5]) < 0.01
-
-
 def test_vibration_that_looks_like_noise_is_rejected_by_the_encoders():
     t = np.arange(1000) / 100
     data = force_record(0.5 * np.sin(2 * np.pi * 4.9 * t)[:, None] * np.ones(3))
     data.twist[:, 0, 5] = 0.02 * np.cos(2 * np.pi * 4.9 * t)
     assert find_holds(data) == []
-
-
-@pytest.mark.parametrize("noise", [{}, NOISE], ids=["exact", "noise"])
-@pytest.mark.parametrize("amplitude", [0.02, 0.08])
-def test_random_motion_has_no_holds(noise, amplitude):
-    options = {"angle_amplitude": (amplitude,) * 3}
-    assert find_holds(moving(make_body(3), 60, pose_options=options, **noise)) == []
 
 
 # ---- mass and centre of mass --------------------------------------------------------------------------------
@@ -210,14 +187,6 @@ def test_standard_errors_of_mass_and_com_against_sampling(bias):
     assert np.all(np.abs(np.mean(estimates, axis=0) - [body.mass, *body.p_1c]) < 4 * np.std(estimates) / 17)
 
 
-def test_reversed_torques_are_an_error():
-    body = make_body(2)
-    hold = exact_hold(body, np.eye(3), np.random.default_rng(0))
-    hold.wrench[:] *= -1
-    with pytest.raises(InputError, match=r"mass is -11 kg.*sign of the torques"):
-        estimate_mass([hold], GRAVITY)
-
-
 STEP_N = 0.25
 STEPS = Steps(1e-4, 1e-4, 0.05, 0.2, 5.0, force_N=STEP_N, read_hz=100.0, still_rad2=np.zeros(1))
 
@@ -235,56 +204,6 @@ def test_one_hold_of_coarse_readings(noise: float, least: float, most: float) ->
             ratios.append((mass.mass - force[2] / GRAVITY) / mass.se)
     assert len(ratios) > 80
     assert least < np.sqrt(np.mean(np.square(ratios))) < most
-
-
-def test_rounding_does_not_count_twice_beside_scatter_between_holds() -> None:
-    body = make_body(3)
-    rng = np.random.default_rng(5)
-    tilts = [Rotation.from_euler("xy", tilt).as_matrix() for tilt in TILTS]
-    loose = [exact_hold(body, R, rng, bias=0.1, noise=0.0) for R in tilts]
-    exact = [exact_hold(body, R, rng) for R in tilts]
-    for holds, same in ((loose, True), (exact, False)):
-        told = [STEPS.of_hold(hold) for hold in holds] if not same else [
-            Steps(1e-4, 1e-4, 0.05, 0.2, 5.0, 0.01, 100.0, np.zeros(1)).of_hold(hold) for hold in holds
-        ]  # fmt: skip
-        mass, grasps = estimate_mass(told, GRAVITY), exact_grasps(body)
-        com, _ = estimate_com(told, mass, grasps, GRAVITY)
-        assert com is not None
-        if same:
-            assert mass == estimate_mass(holds, GRAVITY)
-        else:
-            least = np.sqrt(3 * STEP_N**2 / 12 / len(TILTS)) / GRAVITY
-            assert mass.se == pytest.approx(least)
-            levers = np.sqrt(np.mean(np.sum(grasps.p_1i**2, axis=1)) * 3)
-            typical = levers * STEP_N / np.sqrt(12) / (body.mass * GRAVITY)
-            assert np.sqrt(np.trace(com.covariance[1:, 1:])) > 0.3 * typical
-
-
-def test_what_noise_leaves_of_rounding() -> None:
-    """The variance of the mean of many rounded readings, over true values anywhere between two codes."""
-    rng = np.random.default_rng(6)
-    for noise in (0.0, 0.1, 0.2, 0.3, 0.5):
-        true = rng.uniform(0.0, 1.0, 2000)
-        read = np.round(true[:, None] + noise * rng.normal(size=(2000, 800)))
-        error = np.mean((read.mean(axis=1) - true) ** 2) - noise**2 / 800
-        told = rounded(1.0, np.mean(np.var(read, axis=1)))
-        assert 0.95 * error - 1e-4 < told < 2.0 * error + 2e-3
-
-
-def test_steps_come_from_the_readings() -> None:
-    recording = small_recording(robots=2)
-    assert steps_of(recording, 5.0).force_N == 0.0  # continuous
-    recording.tau[:] = np.round(recording.tau / 0.05) * 0.05
-    coarse = steps_of(recording, 5.0)
-    assert 0.2 < coarse.force_N < 0.4  # 0.05 N m at legs of 0.2 m
-    recording.tau[:] = 1.5
-    assert steps_of(recording, 5.0).force_N == pytest.approx(
-        coarse.force_N / 5.0
-    )  # 0.01 N m where none shows
-    assert not coarse.still_rad2.any()
-    recording.theta[:] = np.round(recording.theta / 0.01) * 0.01
-    recording.theta[:, 1] = 0.12
-    np.testing.assert_allclose(steps_of(recording, 5.0).still_rad2, [0.0, 0.01**2 / 12], atol=1e-12)
 
 
 def test_tilts_that_rest_on_one_reading_make_grasps_uncertain() -> None:

@@ -10,24 +10,20 @@ import pytest
 
 from estimator.arm.delta import inverse_kinematics
 from estimator.errors import InputError
-from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import (
     Repeats,
     angle_of,
-    doubtful,
     filled,
     held_spans,
-    quantisation_step,
     without_held,
 )
-from estimator.recording.checks import RATE_TOLERANCE, check_duration, check_recording
+from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
 from omnid_design import DESIGN
-from recordings import metadata, small_recording
+from recordings import small_recording
 
 GOOD = small_recording()
-ROWS = len(GOOD.time)
 
 
 def spoiled(field, index, value, recording=GOOD):
@@ -76,11 +72,6 @@ def test_values_that_are_not_finite(field, index, column, value):
     )
 
 
-def test_missing_rows_are_counted():
-    message = complaint(spoiled("tau", (slice(20, 50), 0, 1), np.nan))
-    assert "'omnid1.tau2' is nan in 30 of 600 rows, first in row 20" in message
-
-
 def test_repeated_time():
     message = complaint(spoiled("time", 7, 0.06))
     assert message == "trial.parquet: time repeats in row 7 (from 0.06 s to 0.06 s); it must increase"
@@ -99,39 +90,6 @@ def test_a_gap_says_where_and_how_long():
         "trial.parquet: a gap in time of 0.26 s before row 300 (from 2.99 s to 3.25 s); "
         "samples must be 0.005 to 0.015 s apart at 100 Hz"
     )
-
-
-def test_one_lost_row_is_a_gap():
-    keep = np.delete(np.arange(ROWS), 100)
-    short = dataclasses.replace(small_recording(rows=ROWS - 1), time=GOOD.time[keep], name="trial.parquet")
-    assert "a gap in time of 0.02 s before row 100 (from 0.99 s to 1.01 s)" in complaint(short)
-
-
-def test_crowded_samples():
-    assert "a crowding in time of 0.004 s before row 7" in complaint(spoiled("time", 7, 0.064))
-
-
-def test_jitter_within_half_a_period_passes():
-    rng = np.random.default_rng(0)
-    check_recording(spoiled("time", slice(None), GOOD.time + rng.uniform(-0.0024, 0.0024, ROWS)))
-
-
-@pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
-def test_another_rate_is_not_reported_as_a_gap(rate):
-    message = complaint(dataclasses.replace(GOOD, metadata=metadata(rate_hz=rate), name="trial.parquet"))
-    assert f"samples are 0.01 s apart, but rate_hz is {rate:g}" in message
-
-
-def test_a_slightly_wrong_rate():
-    rows = 6000
-    long = small_recording(rows=rows)
-    slow = spoiled("time", slice(None), long.time * (1 + 2 * RATE_TOLERANCE), long)
-    assert "samples come at 99.8004 Hz on average, but rate_hz is 100" in complaint(slow)
-    check_recording(spoiled("time", slice(None), long.time * (1 + 0.5 * RATE_TOLERANCE), long))
-
-
-def test_time_may_start_anywhere():
-    check_recording(spoiled("time", slice(None), GOOD.time + 1.7e9))
 
 
 def test_driven_angles_in_degrees():
@@ -169,11 +127,6 @@ def test_joint_limits_are_allowed_and_the_next_number_is_not(field, suffix, boun
         in message
     )
     assert "degrees" not in message
-
-
-def test_a_jump_over_the_limit_is_not_called_degrees():
-    assert "degrees" not in complaint(spoiled("phi", (9, 0, 0), 1.58))
-    assert "degrees" not in complaint(spoiled("phi", (9, 0, 0), 400.0))
 
 
 def test_legs_that_cannot_meet():
@@ -244,12 +197,6 @@ def test_a_resting_robot_without_noise_in_its_torques_repeats_itself() -> None:
     assert not Repeats([]).of(np.zeros((3000, 2))).any()  # positions alone tell nothing
 
 
-def test_blocks_do_not_matter() -> None:
-    values = noisy(np.random.default_rng(3))[np.arange(6000) // 5]
-    one, parts = Repeats([6, 7, 8]), Repeats([6, 7, 8])
-    assert np.array_equal(one.of(values), np.concatenate([parts.of(values[:2048]), parts.of(values[2048:])]))
-
-
 def test_a_recording_with_repeated_rows_is_refused(tmp_path) -> None:
     path = tmp_path / "stuck.parquet"
     write_recording(rows_of(small_recording(), np.minimum(np.arange(600), 400)), path)
@@ -257,46 +204,6 @@ def test_a_recording_with_repeated_rows_is_refused(tmp_path) -> None:
         read_recording(path)
     write_recording(rows_of(small_recording(), np.arange(600) - (np.arange(600) == 300)), path)
     assert len(read_recording(path).time) == 600  # one row changes nothing
-
-
-def test_smooth_efforts_tell_nothing() -> None:
-    """Noise-free motion between holds, as a simulation without sensors has it: equal rows are the robot's."""
-    t = np.arange(4000) / 100.0
-    hold = np.clip(np.sin(0.5 * t), -0.5, 0.5)  # moves, then rests
-    values = np.column_stack([hold, np.cos(hold), 3.0 * hold**2])
-    assert not Repeats([2]).of(values).any()
-    noisy = values + np.array([0.0, 0.0, 0.01]) * np.random.default_rng(0).standard_normal(values.shape)
-    noisy[1000:1400] = noisy[1000]
-    assert Repeats([2]).of(noisy).sum() == 399
-
-
-def test_few_levels_tell_a_step_where_asked() -> None:
-    """A payload at rest: the encoder flickers between neighbouring values."""
-    resting = 0.3 + 1e-3 * np.array([0, 1, 1, 0, 2, 1, 0, 0, 2])
-    assert quantisation_step(resting) is None
-    assert quantisation_step(resting, levels=2) == pytest.approx(1e-3, rel=1e-9)
-    assert quantisation_step(resting[:4], levels=2) == pytest.approx(1e-3, rel=1e-9)
-
-
-def test_a_constant_has_no_step_however_few_levels_are_asked_for() -> None:
-    assert quantisation_step(np.full(50, 0.1), levels=1) is None
-    # One value that came out as two that differ in rounding.
-    assert quantisation_step(np.array([0.1, np.nextafter(0.1, 1.0), 0.1]), levels=2) is None
-    assert quantisation_step(np.empty(0), levels=2) is None
-
-
-@pytest.mark.parametrize("digits", [1e-15, 1e-13, 1e-12, 1e-11])
-def test_values_that_differ_in_rounding_are_one(digits: float) -> None:
-    rng = np.random.default_rng(0)
-    values = 2e-7 * rng.integers(0, 400000, 5000)
-    disturbed = values * (1.0 + digits * rng.standard_normal(len(values)))
-    assert quantisation_step(disturbed) == pytest.approx(2e-7, rel=1e-5)
-
-
-def test_gaps_far_wider_than_a_step_do_not_hide_it() -> None:
-    """A channel that visits two distant places only."""
-    here = 1e-4 * np.arange(12)
-    assert quantisation_step(np.concatenate([here, 5.00007 + here])) == pytest.approx(1e-4, rel=1e-9)
 
 
 RATE_HZ, STEP = 100.0, 2.0 * np.pi / 2**16
@@ -330,26 +237,6 @@ def moving_team(held: np.ndarray | None = None) -> Recording:
     if held is not None:
         phi[:, 1, 1] = held
     return replace(recording, phi=phi, theta=angles[1])
-
-
-def test_every_gap_is_found_with_a_reading_more_at_either_end():
-    assert held_spans(holding(rounded(sways())), STEP) == [(first, stop + 1) for first, stop in GAPS]
-
-
-def test_one_more_reading_on_the_way_in_and_out_hides_no_gap():
-    """What is resampled has a reading between the held value and the next."""
-    x = holding(rounded(sways()))
-    first, stop = GAPS[1]
-    x[[first, stop - 1]] += STEP
-    assert (first + 1, stop) in held_spans(x, STEP)
-
-
-def test_a_joint_that_rested_before_is_held_no_longer_than_it_moves():
-    still = np.maximum(TIME - 10.05, 0.0)
-    x = holding(rounded(np.where(TIME < 14.0, 0.4 + 0.5 * still**2, sways())), ((1000, 1015), *GAPS[3:]))
-    (start, stop), *_ = held_spans(x, STEP)
-    assert stop == 1016
-    assert 1000 <= start <= 1003
 
 
 def sticks() -> np.ndarray:
@@ -398,40 +285,6 @@ def test_held_readings_are_interpolated_onto_the_encoders_steps():
     assert np.all(
         np.isin(np.flatnonzero(doubt > 1.0), np.flatnonzero(np.convolve(spoilt, np.ones(5), "same") > 0))
     )
-
-
-def test_a_team_that_moves_is_as_it_was_read():
-    recording = moving_team()
-    same, held, doubt = without_held(recording)
-    assert not held
-    assert not doubt.any()
-    np.testing.assert_array_equal(same.phi, recording.phi)
-
-
-def test_readings_that_scatter_by_more_than_their_steps_are_none_that_are_held():
-    """Some are equal by chance, where the joint is about to turn."""
-    rng = np.random.default_rng(4)
-    for _ in range(200):
-        recording = moving_team(rounded(sways() + rng.normal(0.0, STEP, len(TIME))))
-        assert not without_held(recording)[1]
-
-
-def test_an_encoder_slower_than_the_log_is_left_as_it_is():
-    slow = rounded(sways())[np.arange(len(TIME)) // 10 * 10]
-    assert not without_held(moving_team(slow))[1]
-
-
-def test_beyond_doubtful_samples_held_readings_change_less_than_noise():
-    """In value, rate and acceleration of the filtered angle."""
-    true = rounded(sways())
-    recording, _, doubt = without_held(moving_team(holding(true)))
-    kept = ~doubtful(doubt, RATE_HZ, 5.0)
-    assert 0.3 < kept.mean() < 0.95
-    off, noise = recording.phi[:, 1, 1] - true, true - (sways() + 0.3 * STEP)
-    for _ in range(3):
-        changed, usual = (low_pass(x, RATE_HZ, 5.0) for x in (off, noise))
-        assert np.abs(changed[kept]).max() < 2.0 * usual.std()
-        off, noise = (differentiate(x, RATE_HZ) for x in (off, noise))
 
 
 @pytest.mark.parametrize("digits", [None, 5], ids=["fast", "five digits"])

@@ -20,7 +20,7 @@ from estimator.inputs import set_max_unpacked
 from estimator.recording.checks import check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
-from estimator.recording.parquet import METADATA_KEY, claimed_bytes, read_recording, write_recording
+from estimator.recording.parquet import METADATA_KEY, read_recording, write_recording
 from estimator.signals import process_recording
 from mocobot.cli import main
 from omnid_design import DESIGN
@@ -85,13 +85,6 @@ def _folder(path: Path) -> Path:
     return path
 
 
-def test_longest_allowed_name_is_written(tmp_path: Path) -> None:
-    path = tmp_path / ("x" * 255)
-    write_text(path, "text")
-    assert path.read_text() == "text"
-    assert len(list(tmp_path.iterdir())) == 1
-
-
 def test_interrupted_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(self: Path, target: Path) -> None:
         raise KeyboardInterrupt
@@ -111,10 +104,6 @@ def test_a_recording_is_never_overwritten(
     for target in (rec, tmp_path / ".." / tmp_path.name / rec.name, link):
         assert "is an input" in refusal(capsys, "estimate", rec, "--out", target, "--force")
         assert rec.read_bytes() == before
-
-
-def test_the_same_file_twice(rec: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "twice" in refusal(capsys, "estimate", rec, rec.parent / "." / rec.name)
 
 
 @pytest.mark.parametrize("cutoff_hz", ["0", "-1", "60", "1e-6", "0.4"])
@@ -243,39 +232,3 @@ def test_the_option_changes_the_limit(bomb: Path, tmp_path: Path) -> None:
         assert len(read_recording(path).time) == 50  # never below a file's own size
     finally:
         set_max_unpacked(None)
-
-
-def varint(value: int, length: int = 0) -> bytes:
-    """A whole number of Thrift's compact protocol, in so many bytes."""
-    value, parts = value << 1, []
-    while value or len(parts) < max(length, 1):
-        parts.append(value & 127)
-        value >>= 7
-    return bytes([*(part | 128 for part in parts[:-1]), parts[-1]])
-
-
-def test_pages_are_counted_whatever_the_footer_says(tmp_path: Path) -> None:
-    """A page of 8 MiB under a footer that tells of 1000 values."""
-    path, rows = tmp_path / "a.parquet", 1 << 20
-    pq.write_table(
-        pa.table({"a": np.zeros(rows), "b.c": np.zeros(rows)}), path, compression="zstd", use_dictionary=False,
-        write_statistics=False, data_page_size=1 << 30, write_batch_size=rows, max_rows_per_page=rows,
-    )  # fmt: skip
-    honest = pq.ParquetFile(path).metadata.row_group(0).column(0).total_uncompressed_size
-    assert claimed_bytes(path, ["a", "b.c"], ["b.c"]) == honest > 8 * rows
-    content = path.read_bytes()
-    begin = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
-    footer = content[begin:]
-    for value, told in ((rows, 1000), (honest, 9000)):
-        assert varint(value) in footer
-        footer = footer.replace(varint(value), varint(told, len(varint(value))))
-    path.write_bytes(content[:begin] + footer)
-    assert pq.ParquetFile(path).metadata.num_rows == 1000
-    assert claimed_bytes(path, ["a", "b.c"], ["a"]) > 8 * rows - 100
-
-
-def test_lists_are_counted_by_their_values(tmp_path: Path) -> None:
-    pq.write_table(pa.table({"a": [[0.0] * 5000] * 20, "other": [1.0] * 20}), path := tmp_path / "a.parquet")
-    columns = [pq.ParquetFile(path).schema.column(k).path for k in range(2)]
-    assert claimed_bytes(path, columns, ["a"]) >= 8 * 100_000
-    assert claimed_bytes(path, columns, ["other"]) < 8 * 100_000

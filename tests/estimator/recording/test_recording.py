@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from discrepancy.team.diagnosis import diagnose_team
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.calibrate.rows import Resolution
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.metadata import RecordingMetadata, Sampling
@@ -116,13 +113,6 @@ def test_foreign_files_may_have_other_order_types_and_chunks(path, table):
     assert np.array_equal(read.theta, expected.theta)
 
 
-def test_folder_names_are_not_data(tmp_path):
-    path = tmp_path / "payload=a" / "trial.parquet"
-    path.parent.mkdir()
-    write_recording(small_recording(rows=20), path)
-    assert read_recording(path).metadata.robots == 3
-
-
 # Columns
 
 
@@ -133,11 +123,6 @@ def test_missing_column(path, table):
         "missing column 'omnid2.tau3'; the columns are time and, for i = 1..3, omnid{i}."
     )
     assert "theta_z, theta_y, theta_x" in message
-
-
-def test_missing_time(path, table):
-    pq.write_table(table.drop_columns("time"), path)
-    assert "missing column 'time'" in complaint(path)
 
 
 def test_ref_for_some_robots_only(path, table):
@@ -165,11 +150,6 @@ def test_unknown_columns(path, table, name, hint):
     assert ("did you mean" in message) == bool(hint)
 
 
-def test_column_twice(path, table):
-    pq.write_table(table.append_column("omnid1.phi2", table["time"]), path)
-    assert "column 'omnid1.phi2' appears 2 times" in complaint(path)
-
-
 @pytest.mark.parametrize(
     "values",
     [
@@ -192,11 +172,6 @@ def test_empty_cells(path, table):
     index = table.column_names.index("omnid3.tau2")
     pq.write_table(table.set_column(index, "omnid3.tau2", pa.array(values)), path)
     assert "column 'omnid3.tau2' is nan in 2 of 50 rows, first in row 5" in complaint(path)
-
-
-def test_no_rows(path, table):
-    pq.write_table(table.slice(0, 0), path)
-    assert complaint(path) == "the file has no rows"
 
 
 # Metadata
@@ -283,37 +258,6 @@ def test_metadata_is_strict(path, table, changes, message):
     assert complaint(path).startswith(f"metadata: {message}")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (b"{", "not valid JSON"),
-        (b"\xff\xfe\x00", "not valid JSON"),
-        (b"[]", "must be a JSON object"),
-        (b"3", "must be a JSON object"),
-        (b'{"seed": 1, "seed": 2}', "not valid JSON (key 'seed' appears twice)"),
-        (b'{"rate_hz": NaN}', "not valid JSON (NaN is not a JSON number)"),
-        (b'{"rate_hz": -Infinity}', "not valid JSON (-Infinity is not a JSON number)"),
-        (b"[" * 100_000, "not valid JSON"),
-        (b"9" * 10_000, "not valid JSON"),
-    ],
-    ids=range(9),
-)
-def test_metadata_that_is_not_an_object(path, table, text, message):
-    pq.write_table(table.replace_schema_metadata({b"mocobot": text}), path)
-    assert complaint(path).startswith(f"metadata: {message}")
-
-
-def test_more_robots_than_columns(path, table):
-    for robots, missing in ((4, "omnid4.phi1"), (10**12, "omnid4.phi1")):
-        pq.write_table(with_metadata(table, robots=robots), path)
-        assert f"missing column '{missing}'" in complaint(path)
-
-
-def test_fewer_robots_than_columns(path, table):
-    pq.write_table(with_metadata(table, robots=2), path)
-    assert "unknown column 'omnid3.phi1'" in complaint(path)
-
-
 def test_metadata_that_could_not_be_read_back_is_not_written(path):
     for changes in (
         {"trial": "walk"},
@@ -332,33 +276,7 @@ def test_design_numbers_that_json_or_toml_could_smuggle_in(value):
         OmnidDesign.from_dict(DESIGN.to_dict() | {"rod_length_m": value})
 
 
-def test_metadata_json_round_trip():
-    written = metadata(control={"a": [1, 2.5, None, "x"]}, seed=0, payload="d", source="")
-    assert RecordingMetadata.from_json(written.to_json()) == written
-
-
 # Files
-
-
-def test_missing_file(path):
-    assert complaint(path) == "there is no such file"
-
-
-def test_directory(tmp_path):
-    assert complaint(tmp_path) == "is a directory; it must be a recording file"
-
-
-def test_special_file(tmp_path):
-    """A pipe would wait for a writer for ever."""
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    assert complaint(pipe) == "is not a regular file; it must be a recording file"
-
-
-@pytest.mark.parametrize("name", ["a" * 5000, "nul\0byte"], ids=["long", "nul"])
-def test_impossible_names(name):
-    with pytest.raises(InputError, match=r"no such file|not a usable file name"):
-        read_recording(name)
 
 
 @pytest.mark.parametrize(
@@ -367,20 +285,6 @@ def test_impossible_names(name):
 def test_files_that_are_not_parquet(path, content):
     path.write_bytes(content)
     assert complaint(path).startswith("not a readable Parquet file, or a damaged one (")
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root reads everything")
-def test_unreadable_file(path, table):
-    path.chmod(0)
-    assert complaint(path) == "cannot be read (permission denied)"
-
-
-def test_an_unreadable_file_is_said_to_be_so(path, table, monkeypatch):
-    def deny(*args, **kwargs):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(pq, "ParquetFile", deny)
-    assert complaint(path) == "cannot be read (permission denied)"
 
 
 def test_truncated_at_every_sort_of_place(path, table):
@@ -440,12 +344,6 @@ def test_a_failed_write_keeps_the_old_file(path, monkeypatch):
     assert os.listdir(path.parent) == [path.name]
 
 
-def test_new_files_have_ordinary_permissions(path):
-    write_recording(small_recording(rows=20), path)
-    path.with_name("other").touch()
-    assert path.stat().st_mode == path.with_name("other").stat().st_mode
-
-
 # The class
 
 
@@ -462,13 +360,6 @@ def test_new_files_have_ordinary_permissions(path):
 def test_shapes_must_agree(changes, message):
     with pytest.raises(InputError, match=message):
         dataclasses.replace(small_recording(rows=20), **changes)
-
-
-def test_lists_become_float64():
-    good = small_recording(rows=20, ref=False)
-    recording = Recording(good.time.tolist(), good.phi.tolist(), good.theta, good.tau, None, good.metadata)
-    assert recording.phi.dtype == np.float64
-    assert np.array_equal(recording.phi, good.phi)
 
 
 SAMPLING = tuple(Sampling(100.0, 0.0, 0.0, 0.0, False, "filtered", "joint", (0.01,) * 9) for _ in range(3))
@@ -498,53 +389,9 @@ def test_a_newer_version_is_written_only_where_it_is_needed(changes: dict[str, o
     assert RecordingMetadata.from_json(text) == metadata(**changes)
 
 
-def test_a_payload_that_nobody_holds_is_not_written(tmp_path: Path) -> None:
-    recording = small_recording(rows=40, trial="free", payload="a")
-    with pytest.raises(
-        InputError, match="payload is 'a'; it must be null in a free trial, whose robots hold nothing"
-    ):
-        write_recording(recording, tmp_path / "free.parquet")
-    assert not list(tmp_path.iterdir())
-
-
-def test_nothing_of_a_payload_comes_out_of_it() -> None:
-    carried = small_recording()
-    free = replace(carried, metadata=replace(carried.metadata, trial="free"), name="free.parquet")
-    sentence = (
-        "free.parquet: trial is 'free': the robots hold nothing, so nothing can be {}; "
-        "mocobot calibrate --free takes it"
-    )
-    for recordings in ([free], [carried, free]):
-        with pytest.raises(InputError) as caught:
-            estimate_payload(recordings)
-        assert str(caught.value) == sentence.format("estimated")
-        with pytest.raises(InputError) as caught:
-            diagnose_team(recordings)
-        assert str(caught.value) == sentence.format("diagnosed")
-
-
 TOLD = Sampling(
     400.0, 0.25, 2e-4, 0.02, False, "interpolated", "joint", (1e-4,) * 3 + (2e-4,) * 3 + (0.01, 0.0, 0.02)
 )
-
-
-def test_it_is_written_and_read() -> None:
-    values = json.loads(json.dumps(TOLD.to_dict()))
-    assert Sampling.from_dict(values, "m") == TOLD
-    whole = values | {"native_hz": 400, "first_s": 0, "jitter_s": 0, "missing": 0, "steps": [0] * 9}
-    found = Sampling.from_dict(whole, "m")
-    assert [type(x) for x in (found.native_hz, found.first_s, found.jitter_s, found.missing)] == [float] * 4
-    assert {type(step) for step in found.steps} == {float}
-
-
-def test_steps_of_each_kind() -> None:
-    assert [TOLD.steps_of(kind) for kind in range(3)] == [(1e-4,) * 3, (2e-4,) * 3, (0.01, 0.0, 0.02)]
-    wrist = replace(TOLD, level="wrist")
-    assert [wrist.steps_of(kind) for kind in range(3)] == [(0.0,) * 3, (2e-4,) * 3, (0.0,) * 3]
-
-
-def test_a_part_begins_later() -> None:
-    assert TOLD.later(1.5) == replace(TOLD, first_s=-1.25)
 
 
 @pytest.mark.parametrize(
@@ -597,15 +444,6 @@ def test_versions(changes: dict[str, Any], version: int) -> None:
             RecordingMetadata.from_json(json.dumps(json.loads(text) | {"version": other}), "there")
 
 
-def test_readings_that_a_sample_is_made_of() -> None:
-    """At 100 Hz of 400 and of 50 Hz: a quarter of a reading's variance, and twice."""
-    slow, untold = replace(TOLD, native_hz=50.0), small_recording()
-    found = Resolution.of(small_recording(sampling=(TOLD, slow, TOLD)))
-    np.testing.assert_allclose(found.share, [[0.25], [2.0], [0.25]])
-    np.testing.assert_allclose(found.step, np.tile(TOLD.steps, (3, 1)))
-    np.testing.assert_allclose(Resolution.of(untold).share, np.ones((3, 1)))
-
-
 def at_wrist(recording: Recording) -> Recording:
     return dataclasses.replace(recording, metadata=dataclasses.replace(recording.metadata, level="wrist"))
 
@@ -635,14 +473,6 @@ def test_the_file_at_wrist_level_is_the_documented_one(wrist_path, ref: bool) ->
     assert (read.ref is not None) == ref
 
 
-def test_joint_level_may_be_said_in_version_2(wrist_path) -> None:
-    write_recording(small_recording(rows=20), wrist_path)
-    table = pq.read_table(wrist_path)
-    values = json.loads(table.schema.metadata[b"mocobot"]) | {"version": 2, "level": "joint"}
-    pq.write_table(table.replace_schema_metadata({"mocobot": json.dumps(values)}), wrist_path)
-    assert np.array_equal(read_recording(wrist_path).phi, small_recording(rows=20).phi)
-
-
 def spoiled(wrist_path, column: str, change) -> str:
     """What is said about a file of 50 rows whose row 7 is changed in one column."""
     write_recording(at_wrist(small_recording(rows=50)), wrist_path)
@@ -659,44 +489,6 @@ def spoiled(wrist_path, column: str, change) -> str:
     return message[len(f"{wrist_path}: ") :]
 
 
-@pytest.mark.parametrize(
-    ("column", "change", "words"),
-    [
-        (
-            "omnid2.h_z",
-            lambda _: 0.7,
-            "omnid2.h_x, .h_y, .h_z in row 7: leg 1 cannot reach the wrist position (",
-        ),
-        ("omnid2.h_z", lambda _: -0.2, "omnid2.h_x, .h_y, .h_z in row 7: the wrist position ("),
-        ("omnid3.h_x", lambda _: np.nan, "column 'omnid3.h_x' is nan in 1 of 50 rows, first in row 7"),
-        (
-            "omnid3.force_x",
-            lambda _: np.inf,
-            "column 'omnid3.force_x' is inf in 1 of 50 rows, first in row 7",
-        ),
-        (
-            "omnid1.force_z",
-            lambda _: 1e4,
-            "tau1 of omnid1, which follows from its force_x, force_y, force_z and",
-        ),
-        ("omnid1.theta_y", lambda _: 1.2, "column 'omnid1.theta_y' reaches 1.2 rad"),
-        ("time", lambda _: 0.0, "time goes back in row 7"),
-    ],
-)
-def test_faults_name_the_files_own_columns(wrist_path, column: str, change, words: str) -> None:
-    assert words in spoiled(wrist_path, column, change)
-
-
-def test_driven_angles_out_of_range_are_said_of_the_position(wrist_path) -> None:
-    recording = at_wrist(small_recording(rows=20))
-    recording.phi[3, 1, 2] = -0.9
-    write_recording(recording, wrist_path)
-    with pytest.raises(
-        InputError, match=r"phi3 of omnid2, which follows from its h_x, h_y, h_z, reaches -0\.9 rad"
-    ):
-        read_recording(wrist_path)
-
-
 def test_millimetres_are_recognised(wrist_path) -> None:
     write_recording(at_wrist(small_recording(rows=20)), wrist_path)
     table = pq.read_table(wrist_path)
@@ -706,17 +498,6 @@ def test_millimetres_are_recognised(wrist_path) -> None:
             table = table.set_column(index, name, pa.array(1e3 * table[name].to_numpy()))
     pq.write_table(table, wrist_path)
     with pytest.raises(InputError, match=r"omnid1.h_x, .h_y, .h_z in row 0: leg .* - .* millimetres$"):
-        read_recording(wrist_path)
-
-
-def test_columns_of_the_other_level_are_unknown(wrist_path) -> None:
-    write_recording(at_wrist(small_recording(rows=20)), wrist_path)
-    table = pq.read_table(wrist_path)
-    names = [name.replace("h_x", "phi1") for name in table.column_names]
-    pq.write_table(table.rename_columns(names).replace_schema_metadata(table.schema.metadata), wrist_path)
-    with pytest.raises(
-        InputError, match=r"unknown column 'omnid1.phi1'.*; the columns at wrist level are .* h_x"
-    ):
         read_recording(wrist_path)
 
 

@@ -4,7 +4,6 @@ import resource
 import struct
 import time
 import warnings
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
-from mcap_ros2._dynamic import generate_dynamic
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import bags
-from bags import EPOCH_NS, NO_SUMMARY, OMNID, UNCHUNKED, Team, raw_mcap, rosbags_bag
+from bags import NO_SUMMARY, UNCHUNKED, Team, raw_mcap, rosbags_bag
 from estimator.errors import InputError
 from fuzzing import damaged
 from mocobot_logs.bag.cdr import CdrReader, Selector, message_type
@@ -136,79 +134,11 @@ def test_any_type(structure, little):
             reader.read(messages(payload[:cut]))
 
 
-@settings(max_examples=100, deadline=None, derandomize=True, database=None)
-@given(
-    st.lists(st.text("abc", max_size=5), max_size=5),
-    st.integers(0, 5),
-    st.integers(0, 5),
-    st.text("fr", max_size=9),
-)
-def test_joint_states_of_any_length(names, positions, efforts, frame):
-    rng = np.random.default_rng(len(names))
-    names = list(dict.fromkeys(names))
-    message = bags.joint_state(
-        rng.normal(size=positions), rng.normal(size=efforts), EPOCH_NS, names, frame=frame
-    )
-    payload = bags.cdr(message)
-    decode = generate_dynamic(bags.JOINT_STATE, bags.definition(bags.JOINT_STATE))[bags.JOINT_STATE]
-    theirs = decode(payload)
-    kind = message_type(Topic("/t", bags.JOINT_STATE, "cdr"), "bag")
-    reader = CdrReader(kind, [Selector(f, n) for f in ("position", "effort") for n in names], stamp=True)
-    stamps, values = reader.read(messages(payload))
-    assert stamps.tolist() == [theirs.header.stamp.sec * 10**9 + theirs.header.stamp.nanosec] == [EPOCH_NS]
-    # JointState.msg: "All arrays in this message should have the same size, or be empty."
-    want = [
-        array if len(array) == len(names) else [np.nan] * len(names)
-        for array in (theirs.position, theirs.effort)
-    ]
-    np.testing.assert_array_equal(values[0], np.ravel(want))
-    assert tuple(reader.joints) == tuple(theirs.name if names else ())
-    assert [lacking is not None for lacking in reader.lacking] == np.isnan(np.ravel(want)).tolist()
-
-
 KIND = message_type(Topic("/t", bags.JOINT_STATE, "cdr"), "bag")
 
 
 def joint_reader(*names):
     return CdrReader(KIND, [Selector("position", name) for name in names], stamp=True)
-
-
-def test_layouts_are_told_apart_by_names_and_lengths():
-    """Messages of one size whose joints are in another order, or whose numbers are in another array."""
-    forth = bags.joint_state([1, 2], [3, 4], names=["aa", "bb"])
-    back = bags.joint_state([5, 6], [7, 8], names=["bb", "aa"])
-    other = bags.joint_state([9, 10, 11], [12], names=["aa", "bb"])  # whose they are is not known
-    payloads = [bags.cdr(m) for m in (forth, back, other, forth)]
-    assert len({*map(len, payloads)}) == 1
-    reader = joint_reader("aa", "bb")
-    _, values = reader.read(messages(*payloads))
-    np.testing.assert_array_equal(values, [[1, 2], [6, 5], [np.nan, np.nan], [1, 2]])
-    assert list(reader.joints) == ["aa", "bb"]
-
-
-def test_thousands_of_layouts():
-    """More than are kept, among as many messages of the same size."""
-    rng = np.random.default_rng(8)
-    payloads, want = [], []
-    for _ in range(3000):
-        order = rng.permutation(6)
-        names = [f"{OMNID[0]}{k}" for k in order]
-        position = rng.normal(size=6)
-        payloads.append(bags.cdr(bags.joint_state(position, [], names=names)))
-        want.append([position[list(order).index(2)], position[list(order).index(5)]])
-    _, values = joint_reader("x2", "x5").read(messages(*payloads))
-    np.testing.assert_array_equal(values, want)
-
-
-def test_padding_may_hold_anything():
-    """FastDDS leaves what was in memory between fields."""
-    payload = bytearray(bags.cdr(bags.joint_state([1.0], [2.0], names=["abcd"])))
-    at = payload.index(b"abcd\0") + 5
-    assert payload[at : at + 3] == b"\0\0\0"
-    dirty = bytes(payload[:at] + b"\xff\xfe\xfd" + payload[at + 3 :])
-    reader = joint_reader("abcd")
-    assert reader.read(messages(bytes(payload), dirty, bytes(payload)))[1].tolist() == [[1.0], [1.0], [1.0]]
-    assert len(reader._layouts[len(payload)]) == 1
 
 
 GOOD = bags.cdr(bags.joint_state([1.0, 2.0], [3.0, 4.0], names=["a", "b"]))
@@ -245,27 +175,6 @@ def test_broken_messages(payload, what):
         reader.read(messages(GOOD, payload))
 
 
-@pytest.mark.parametrize(("more", "unread"), [(3, 0), (4, 4), (8, 8)])
-def test_bytes_after_the_last_field(more: int, unread: int):
-    """Recorders in the field write them, and ROS 2 leaves them unread."""
-    reader = joint_reader("a", "b")
-    assert reader.read(messages(GOOD, GOOD + b"\1" * more))[1].tolist() == [[1.0, 2.0]] * 2
-    assert reader.unread == unread
-
-
-def test_a_sequence_of_ten_gigabytes():
-    at = GOOD.index(struct.pack("<d", 1.0)) - 4
-    claim = GOOD[:at] + struct.pack("<I", 1_250_000_000) + GOOD[at + 4 :]
-    with pytest.raises(InputError, match=r"99999999\d\d less than its lengths say"):
-        joint_reader("a").read(messages(claim))
-
-
-def test_names_that_appear_twice():
-    reader = joint_reader("a")
-    reader.read(messages(bags.cdr(bags.joint_state([1, 2], [], names=["a", "a"]))))
-    assert reader.lacking == ["is named more than once"]
-
-
 @pytest.mark.parametrize(
     ("text", "what"),
     [
@@ -280,14 +189,6 @@ def test_definitions_that_cannot_be_used(text, what):
         message_type(Topic("/t", "lab/msg/Root", "cdr", "ros2msg", text), "bag")
 
 
-def test_structures_without_end():
-    """A type that takes no bytes, a billion times."""
-    text = f"Nothing[1000000000] much\n{SEPARATOR}MSG: lab/Nothing\n"
-    kind = message_type(Topic("/t", "lab/msg/Root", "cdr", "ros2msg", text), "bag")
-    with pytest.raises(InputError, match="it holds more than 10000 strings and structures"):
-        CdrReader(kind, [], stamp=False).read(messages(b"\0\1\0\0" + b"\0" * 100))
-
-
 def test_definitions_in_idl():
     idl = (
         f"{SEPARATOR}IDL: lab/msg/Root\nmodule lab {{ module msg {{ struct Root {{ double x; sequence<float> y; "
@@ -299,53 +200,9 @@ def test_definitions_in_idl():
     np.testing.assert_array_equal(reader.read(messages(payload))[1], [[0.1, 0.25, np.nan]])
 
 
-@pytest.mark.parametrize(
-    ("path", "what"),
-    [
-        ("poimt.x", r"has no field 'poimt'; the fields of geometry_msgs/msg/PointStamped are header, point"),
-        ("point.w", r"point has no field 'w'; the fields of geometry_msgs/msg/Point are x, y, z"),
-        ("point", r"field 'point' is a geometry_msgs/msg/Point, not a number"),
-        ("point.x.y", r"field 'point.x' is a number and has no fields"),
-        ("point.x[0]", r"field 'point.x\[0\]' is not an array"),
-        ("header.frame_id", r"field 'header.frame_id' is a string, not a number"),
-        ("point..x", r"point has no field ''"),
-    ],
-)
-def test_paths_that_lead_nowhere(path, what):
-    with pytest.raises(InputError, match=rf"bag: topic /t: {what}"):
-        message_type(Topic("/t", bags.POINT, "cdr"), "bag").require(path)
-    with pytest.raises(
-        InputError, match=r"field 'position' is an array; name one element, such as position\[0\]"
-    ):
-        KIND.require("position")
-
-
 RUNS = 60
 TEAM = Team.draw(robots=2, rows=40)
 MESSAGES = TEAM.said()
-
-
-def chunked(path: Path, content: bytes) -> Path:
-    """A file whose only chunk holds ``content``, checksum and index in order."""
-    head = b"".join(
-        [
-            bytes(16),
-            len(content).to_bytes(8, "little"),
-            zlib.crc32(content).to_bytes(4, "little"),
-            bytes(4),
-            len(content).to_bytes(8, "little"),
-        ]
-    )
-    tail = bags.record(Opcode.DATA_END, bytes(4)) + bags.record(Opcode.FOOTER, bytes(20))
-    magic = b"\x89MCAP0\r\n"
-    path.write_bytes(
-        magic
-        + bags.record(Opcode.HEADER, bytes(8))
-        + bags.record(Opcode.CHUNK, head + content)
-        + tail
-        + magic
-    )
-    return path
 
 
 def inside(tmp_path: Path) -> bytes:
@@ -393,35 +250,6 @@ def test_damaged_mcap_files(tmp_path, options):
     assert_sound(path, lambda rng: path.write_bytes(damaged(content, rng)), 1)
 
 
-def test_damaged_records_in_a_sound_chunk(tmp_path):
-    path, content = tmp_path / "a.mcap", inside(tmp_path)
-    assert outcome(chunked(path, content)) == "read"
-    assert_sound(path, lambda rng: chunked(path, damaged(content, rng)), 2)
-
-
-def test_damaged_messages_in_a_sound_file(tmp_path):
-    path = tmp_path / "a.mcap"
-
-    def write(rng):
-        spoiled = [
-            bags.Said(s.topic, s.log_ns, s.kind, damaged(s.data, rng) if rng.random() < 0.05 else s.data)
-            for s in MESSAGES
-        ]
-        raw_mcap(path, spoiled, enable_crcs=False)
-
-    assert_sound(path, write, 3)
-
-
-def test_damaged_definitions_in_a_sound_file(tmp_path):
-    path, text = tmp_path / "a.mcap", bags.definition(bags.JOINT_STATE).encode()
-
-    def write(rng):
-        spoiled = damaged(text, rng).decode(errors="replace")
-        raw_mcap(path, MESSAGES, definitions={bags.JOINT_STATE: ("ros2msg", spoiled)})
-
-    assert_sound(path, write, 4)
-
-
 def test_damaged_databases(tmp_path):
     path = rosbags_bag(tmp_path / "bag", MESSAGES, "sqlite3") / "bag.db3"
     content = path.read_bytes()
@@ -440,10 +268,3 @@ def test_damaged_compressed_bags(tmp_path, compression, storage):
 
     assert outcome(folder) == "read"
     assert_sound(folder, write, 6, RUNS // 2)
-
-
-def test_damaged_metadata(tmp_path):
-    folder = rosbags_bag(tmp_path / "bag", MESSAGES, "sqlite3")
-    path = folder / "metadata.yaml"
-    content = path.read_bytes()
-    assert_sound(folder, lambda rng: path.write_bytes(damaged(content, rng)), 7)

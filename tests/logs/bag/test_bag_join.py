@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
 
 import bags
 from bags import EPOCH_NS, raw_mcap, said
-from estimator.errors import InputError
 from mocobot_logs.bag.read import MAX_GAP_NS, RowAligner, open_bag
-from mocobot_logs.log import CHANNELS, REF, Samples, collect
+from mocobot_logs.log import CHANNELS, Samples, collect
 from mocobot_logs.maps import parse_map
 
 
@@ -66,17 +64,6 @@ def test_equal_stamps_are_taken_bit_by_bit(data):
     assert len(rows.stamp_ns) == 60 - sum(gap - 1 for gap in gaps if gap > 6)
 
 
-def test_what_is_not_a_number_does_not_spread():
-    stamps = uniform(100, 1)
-    values = np.zeros((100, 1))
-    values[50] = np.nan
-    rows = all_of(
-        aligner_of((1e7, 1e7), [0], [1]),
-        [{0: part(stamps, values, [0]), 1: part(stamps, values, [1])}],
-    )
-    assert np.flatnonzero(np.isnan(rows.values).any(axis=1)).tolist() == [50]
-
-
 def wave(stamps, hz, columns):
     time = (np.asarray(stamps) - EPOCH_NS) * 1e-9
     return np.sin(2 * np.pi * hz * time[:, None] + np.arange(columns))
@@ -122,18 +109,6 @@ def test_interpolation_is_as_good_as_stated(hz, bound):
     assert error.max() < 1.01 * (2 * np.pi * hz * 0.01) ** 2 / 8
 
 
-def test_interpolation_against_a_spline_with_jitter():
-    rng = np.random.default_rng(1)
-    fast, slow = uniform(500, 5), uniform(100, 5, 0.001) + rng.integers(-2_000_000, 2_000_000, 500)
-    streams = [(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 2), [1, 2])]
-    rows = all_of(aligner_of((2e6, 1e7), [0], [1, 2]), blocks_of(streams, 37))
-    spline = CubicSpline((slow - EPOCH_NS) * 1e-9, wave(slow, 1.0, 2))
-    middle = slice(20, -20)
-    np.testing.assert_allclose(
-        rows.values[middle, 1:], spline((rows.stamp_ns[middle] - EPOCH_NS) * 1e-9), atol=1.5e-6
-    )
-
-
 def test_there_are_no_rows_where_a_topic_has_a_gap():
     fast, slow = uniform(1000, 4), uniform(100, 4, 0.003)
     gap = (slow > EPOCH_NS + 1_000_000_000) & (slow < EPOCH_NS + 1_100_000_000)
@@ -162,34 +137,6 @@ def test_a_topic_that_falls_silent_holds_nothing_up():
     assert aligner.finish() is None
     assert count == np.sum(fast <= slow[-1])
     assert held < 70_000
-
-
-def test_repeated_stamps_of_a_slow_topic():
-    fast, slow = uniform(1000, 2), np.repeat(uniform(100, 2), 2)
-    streams = [(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 1), [1])]
-    rows = all_of(aligner_of((1e6, 1e7), [0], [1]), blocks_of(streams))
-    assert np.abs(rows.values[20:-20, 1] - wave(rows.stamp_ns, 1.0, 1)[20:-20, 0]).max() < 1e-6
-
-
-def test_crowded_samples_do_not_swing():
-    """Two noisy samples a moment apart: no cubic through both."""
-    fast = uniform(1000, 2)
-    slow = np.sort(np.concatenate([uniform(100, 2), uniform(100, 2)[50:60] + 1000]))
-    noise = np.random.default_rng(2).normal(scale=0.01, size=(len(slow), 1))
-    streams = [(fast, np.zeros((len(fast), 1)), [0]), (slow, noise, [1])]
-    rows = all_of(aligner_of((1e6, 1e7), [0], [1]), blocks_of(streams))
-    assert np.abs(rows.values[:, 1]).max() < 1.3 * np.abs(noise).max()
-
-
-def test_stamps_that_run_back_cannot_be_aligned():
-    slow = uniform(100, 2)
-    slow[70] -= 35_000_000
-    aligner = aligner_of((1e6, 1e7), [0], [1])
-    aligner.push({1: part(slow[:70], np.zeros(70), [1])})
-    with pytest.raises(
-        InputError, match=r"bag: robot 2: the stamps of topic /b run back by 0.025 s; topics can be"
-    ):
-        aligner.push({1: part(slow[70:], np.zeros(130), [1])})
 
 
 WRENCH = "geometry_msgs/msg/WrenchStamped"
@@ -253,42 +200,3 @@ def test_commands_that_do_not_go_with_the_samples_are_left_out(tmp_path, sent):
     log = collect(open_bag(raw_mcap(tmp_path / "a.mcap", messages)))
     assert log.channels == CHANNELS["wrist"]
     np.testing.assert_array_equal(log.streams[0].values, team.wrist(0))
-
-
-def test_commands_that_a_map_insists_on_are_interpolated(tmp_path):
-    team = bags.Team.draw(robots=1, rows=200)
-    messages = team.said()
-    messages += [
-        said("/omnid1/wrist/command", int(t), bags.point([1, 2, 3], int(t)))
-        for t in team.stamps[0] + 3_000_000
-    ]
-    messages.sort(key=lambda s: s.log_ns)
-    path = raw_mcap(tmp_path / "a.mcap", messages)
-    topic = "/omnid{robot}/wrist/command"
-    log_map = bags.wrist_map()
-    log_map["channels"] |= {f"ref_{a}": {"topic": topic, "field": f"point.{a}", "unit": "m"} for a in "xyz"}
-    log = collect(open_bag(path, parse_map(log_map, "test")))
-    assert log.channels == CHANNELS["wrist"] + REF
-    np.testing.assert_array_equal(log.streams[0].stamp_ns, team.stamps[0][1:])
-    np.testing.assert_allclose(log.streams[0].values[:, 9:], np.tile([1.0, 2, 3], (199, 1)), rtol=1e-12)
-
-
-def test_topics_with_one_stamp_only(tmp_path):
-    """Set once by a driver and never again: nothing to interpolate between."""
-    team = bags.Team.draw(robots=1)
-    messages = [
-        said("/r1/pose", s.log_ns, bags.point([0, 0, 0], int(team.stamps[0, 7]) + 1)) for s in team.said()
-    ]
-    messages += [
-        said("/r1/gimbal", s.log_ns, team.message(0, k, names=["gx", "gy", "gz", "a", "b", "c"]))
-        for k, s in enumerate(team.said())
-    ]
-    messages += [
-        said("/r1/ft", s.log_ns, wrench(t, [1, 2, 3]))
-        for s, t in zip(team.said(), team.stamps[0], strict=True)
-    ]
-    path = raw_mcap(tmp_path / "a.mcap", sorted(messages, key=lambda s: s.log_ns))
-    with pytest.raises(
-        InputError, match=r"topic /r1/pose has too few stamps to be brought onto one time with the other"
-    ):
-        collect(open_bag(path, parse_map(MAP, "test")))

@@ -125,14 +125,6 @@ def test_publishers_that_share_the_arm_come_onto_one_time(tmp_path, values) -> N
     assert drafted(path)[1] == ()
 
 
-def test_names_may_change_their_order(tmp_path, values) -> None:
-    orders = ([0, 1, 2], [2, 0, 1], [1, 2, 0])
-    path = write(tmp_path, arm(values, lambda k, fields: part(fields, orders[k % 3])))
-    (log,) = serial.read_logs(path, tmp_path / "arm.xml")
-    assert_arm(log, values)
-    assert log.notes == ()
-
-
 def test_efforts_that_are_fewer_than_names(tmp_path, capsys, values) -> None:
     """JointState.msg: arrays are of one size or empty, else nobody knows whose numbers they are."""
     short = arm(values, lambda _, fields: fields | {"effort": fields["effort"][:2]})
@@ -160,24 +152,6 @@ def test_empty_arrays(tmp_path, capsys, values) -> None:
         in message
     )
     assert "nothing to compare the model with" in message
-
-
-@pytest.mark.parametrize("velocity", [np.full(3, np.nan), []], ids=["NaN", "empty"])
-def test_velocities_that_are_none(tmp_path, capsys, values, velocity) -> None:
-    """Positions and efforts suffice, whatever the map says of velocities."""
-    path = write(tmp_path, arm(values, lambda _, fields: fields | {"velocity": velocity}))
-    (log,) = serial.read_logs(path, tmp_path / "arm.xml")
-    assert_arm(log, values)
-    assert log.dq is None
-    assert log.notes == ("No row has a value of dq of turret, shoulder, elbow; it is left out.",)
-    code, out, _ = run(capsys, "inspect", path, "--model", tmp_path / "arm.xml", "--strict")
-    assert (code, out.splitlines()[-1]) == (0, "ready for: a diagnosis from torques of 3 joints")
-    assert "[[Wrong]]" not in out
-    text, missing = drafted(path)
-    assert missing == ()
-    assert "\ndq =" not in text
-    write_map(tmp_path, text)
-    assert serial.read_logs(path, tmp_path / "arm.xml")[0].notes == ()
 
 
 def test_one_joint_without_effort(tmp_path, values) -> None:
@@ -229,13 +203,6 @@ def test_all_header_stamps_are_zero(tmp_path, values) -> None:
     assert 'clock = "log"' in text
     write_map(tmp_path, text)
     assert serial.read_logs(path, tmp_path / "arm.xml")[0].notes == ()
-
-
-def test_a_simulated_clock_begins_at_zero(tmp_path, values) -> None:
-    clock = arm(values, lambda k, fields: fields | {"stamp_ns": stamp(values, k) - EPOCH_NS})
-    (log,) = serial.read_logs(write(tmp_path, clock), tmp_path / "arm.xml")
-    assert_arm(log, values)
-    assert log.notes == ()
 
 
 def test_joints_on_several_topics_and_on_none(tmp_path, values) -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +16,6 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_text
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.cut import LATEST_NS, Drop, Span, parse_choice
 from recordings import small_recording
 
 ROWS = 4000
@@ -87,11 +84,6 @@ def test_single_rows_without_a_value_are_filled_in(tmp_path: Path, name: str) ->
     np.testing.assert_array_equal(gone.tau[:, 1], found.recording.tau[:, 1])
 
 
-def test_rows_without_a_value_at_the_ends_shorten_the_log(tmp_path: Path, name: str) -> None:
-    found = mocobot.convert(written(holed({0: slice(0, 20), 1: slice(ROWS - 30, ROWS)}), tmp_path / name))
-    assert_rows(found.recording, slice(20, ROWS - 30))
-
-
 # Crop and drop
 
 
@@ -148,23 +140,6 @@ def test_crop_and_drop(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[
         assert read.metadata.source == "log log.csv (10 to 30 s)"
 
 
-def test_seconds_count_from_the_first_sample_of_any_robot(tmp_path: Path) -> None:
-    """Robot 3 begins two seconds late; stamps are of 2023."""
-    columns = {k: v.copy() for k, v in RECORDING.columns().items()}
-    for key, values in columns.items():
-        if key.startswith("omnid3"):
-            values[:200] = np.nan
-    stamps = [f"{1_700_000_000 + k // 100}.{k % 100:02d}" for k in range(ROWS)]
-    lines = [",".join(columns)]
-    for k in range(ROWS):
-        row = [repr(float(v[k])) if np.isfinite(v[k]) else "" for key, v in columns.items() if key != "time"]
-        lines.append(",".join([stamps[k], *row]))
-    log = tmp_path / "log.csv"
-    log.write_text("\n".join(lines) + "\n")
-    assert_rows(mocobot.convert(log, crop="5:10").recording, slice(500, 1001))
-    assert_rows(mocobot.convert(log, crop=":10").recording, slice(200, 1001))
-
-
 def test_a_crop_leaves_faults_behind(tmp_path: Path) -> None:
     """What is cropped or dropped is not looked at: here, infinity and time that runs back."""
     bad = {k: v.copy() for k, v in RECORDING.columns().items()}
@@ -214,16 +189,6 @@ def test_what_cannot_be_cut(tmp_path: Path, capsys: pytest.CaptureFixture[str], 
     assert [path.name for path in tmp_path.iterdir()] == ["log.parquet"]
 
 
-def test_spans_are_exact() -> None:
-    choice = parse_choice("0.1:1700000000.123456789", ["robot=2:.3-30."])
-    assert choice.crop == Span(100_000_000, 1_700_000_000_123_456_789)
-    assert choice.drops == (Drop(2, Span(300_000_000, 30_000_000_000)),)
-    assert str(choice.crop) == "0.1 to 1700000000.123456789 s"
-    assert parse_choice("3:").crop == Span(3_000_000_000, LATEST_NS)
-    assert str(parse_choice("3:").crop) == "3 to the end"
-    assert not parse_choice(None)
-
-
 # Split
 
 
@@ -262,23 +227,6 @@ def test_a_trial_of_every_part_between_gaps(
     assert len(values["left_out"]) == 4
 
 
-def test_a_whole_log_is_one_part(tmp_path: Path) -> None:
-    (found,) = mocobot.convert_parts(written(RECORDING, tmp_path / "log.parquet"))
-    assert_rows(found.recording, slice(0, ROWS))
-    assert found.left_out == ()
-
-
-def test_parts_end_where_any_robot_ends(tmp_path: Path) -> None:
-    """Robot 1 begins at 3 s, robot 2 ends at 30 s; without a split that is refused."""
-    log = written(holed({0: slice(0, 300), 1: slice(3001, ROWS)}), tmp_path / "log.parquet")
-    with pytest.raises(InputError, match=r"robot 2 ends .* --crop keeps what all have"):
-        mocobot.convert(log)
-    (found,) = mocobot.convert_parts(log)
-    assert_rows(found.recording, slice(300, 3001))
-    assert [str(each.span) for each in found.left_out] == ["0 to 3 s", "30 to 39.99 s"]
-    assert_rows(mocobot.convert(log, crop=":30").recording, slice(300, 3001))
-
-
 def test_parts_of_no_use_are_left_out_with_the_reason(tmp_path: Path) -> None:
     """The second part holds infinity; alone, it is what is said of the log."""
     bad = {k: v.copy() for k, v in holed({2: slice(1500, 1600)}).columns().items()}
@@ -298,78 +246,3 @@ def test_a_part_must_not_overwrite_the_log(tmp_path: Path, capsys: pytest.Captur
     assert "is an input; write somewhere else" in message
     assert log.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["out-2.parquet"]
-
-
-@pytest.mark.parametrize("jitter_s", [0.0, 2e-3])
-def test_gaps_at_the_limit_split_as_they_are_refused(tmp_path: Path, jitter_s: float) -> None:
-    """A part that the split takes for whole is never refused for a gap."""
-    rng = np.random.default_rng(4)
-    gone = np.concatenate([np.arange(k, k + 5) for k in range(300, ROWS - 100, 300)])
-    keep = np.delete(np.arange(ROWS), gone)
-    time = RECORDING.time[keep] + jitter_s * rng.uniform(-1, 1, len(keep))
-    slow = {
-        key: np.sin(RECORDING.time[keep]) * 0.01 + values[0] for key, values in RECORDING.columns().items()
-    }
-    log = write_text(tmp_path / "log.csv", slow | {"time": time})
-    parts = mocobot.convert_parts(log, max_gap_s=0.05 + 2 * jitter_s)
-    assert sum(len(part.recording.time) for part in parts) == pytest.approx(ROWS, abs=30)
-    assert not any(re.search("no samples for", each.why) for each in parts[0].left_out)
-
-
-@pytest.fixture
-def robots_on_other_clocks(tmp_path: Path) -> Callable[[float], Path]:
-    """Three robots that turn together; the clock of robot 2 is ahead, and both loggers stop at once."""
-
-    def write(ahead_s: float) -> Path:
-        time = np.arange(ROWS) / 100.0
-        turn = 0.1 * np.sin(2 * np.pi * 0.7 * time + 3 * np.sin(0.5 * time))
-        lines = ["time," + ",".join(k for k in RECORDING.columns() if k != "time")]
-        for k in range(ROWS):
-            for robot in range(3):
-                stamp = time[k] + (ahead_s if robot == 1 else 0.0)
-                own = [0.6, 0.6, 0.6, turn[k], 0.0, 0.0, 3.0, 3.0, 3.0]
-                cells = [repr(float(v)) if i // 9 == robot else "" for i, v in enumerate(own * 3)]
-                lines.append(",".join([f"{stamp:.3f}", *cells]))
-        path = tmp_path / "log.csv"
-        path.write_text("\n".join(lines) + "\n")
-        return path
-
-    return write
-
-
-def test_clocks_far_apart_do_not_hinder_a_crop(robots_on_other_clocks: Callable[[float], Path]) -> None:
-    """The crop is by stamps; what robots on other clocks then lack at its ends is no log that breaks off."""
-    log = robots_on_other_clocks(2.0)
-    found = mocobot.convert(log, crop="10:30", clock="correct")
-    assert found.clocks.estimate.offset_s[1] == pytest.approx(2.0, abs=1e-3)
-    assert len(found.recording.time) == pytest.approx(1800, abs=2)
-    np.testing.assert_allclose(found.recording.theta[:, 1], found.recording.theta[:, 0], atol=1e-5)
-
-
-def test_only_what_is_taken_as_it_is_is_said_to_be(tmp_path: Path) -> None:
-    """Robots 2 and 3 sample 3.7 and 7.4 ms after robot 1: each on a grid of its own, but not on that of robot 1."""
-    time = np.arange(ROWS) / 100.0
-    lines = ["time," + ",".join(k for k in RECORDING.columns() if k != "time")]
-    for k in range(ROWS):
-        for robot in range(3):
-            own = [0.6, 0.6, 0.6, 0.1 * np.sin(time[k]), 0.0, 0.0, 3.0, 3.0, 3.0]
-            cells = [repr(float(v)) if i // 9 == robot else "" for i, v in enumerate(own * 3)]
-            lines.append(",".join([f"{time[k] + 3.7e-3 * robot:.4f}", *cells]))
-    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
-    found = mocobot.convert(tmp_path / "log.csv")
-    report = found.report("out.parquet")
-    assert "samples of robot 1: taken as they are\n" in report
-    assert "samples of robots 2, 3: interpolated onto the grid of robot 1\n" in report
-    assert [s["on_grid"] for s in found.to_dict()["recordings"][0]["streams"]] == [True, False, False]
-
-
-def test_how_sensors_were_read_moves_with_a_crop(tmp_path: Path) -> None:
-    """Of a recording that was interpolated once: its first sample is then before the part begins."""
-    slow = {k: 0.01 * np.sin(RECORDING.time) + v[0] for k, v in RECORDING.columns().items()}
-    log = write_text(tmp_path / "log.csv", slow | {"time": np.arange(ROWS) * 0.004})
-    whole = mocobot.convert(log)
-    whole.write(tmp_path / "whole.parquet")
-    part = mocobot.convert(tmp_path / "whole.parquet", crop="5:10").recording
-    for one, other in zip(whole.recording.metadata.sampling or (), part.metadata.sampling or (), strict=True):
-        assert other.first_s == pytest.approx(one.first_s - 5.0, abs=1e-9)
-        assert other.native_hz == pytest.approx(250.0)

@@ -12,7 +12,7 @@ from array_log import ArrayLog, stream, tones
 from estimator.arm.delta import wrist_of
 from estimator.errors import InputError
 from estimator.estimate.leftover import steps_of
-from estimator.recording.metadata import RecordingMetadata, Sampling
+from estimator.recording.metadata import Sampling
 from mocobot_inspect.survey import survey
 from mocobot_logs.log import CHANNELS, REF, Samples
 from mocobot_logs.one_clock import to_recording
@@ -114,32 +114,6 @@ def test_what_is_given_takes_the_place_of_what_the_log_says():
 # --- other grids, other clocks
 
 
-def expected_tone(result, start_s):
-    return tones(start_s + result.time, [5.0], 6)
-
-
-def test_grids_between_each_other():
-    """Robot 2 samples 3.7 ms later; stamps are right."""
-    result, report = made(moving(starts_s=(0.0, 0.1037)))
-    assert report.untouched == (True, False)
-    assert report.start_s == pytest.approx(0.11)
-    np.testing.assert_allclose(report.lost_s, [[0.11, 0.0], [0.0063, 0.0037]], rtol=0, atol=1e-9)
-    tone = expected_tone(result, report.start_s)
-    np.testing.assert_allclose(result.phi[:, 0], tone[:, :3], rtol=0, atol=1e-12)
-    error = np.abs(result.tau[:, 1] - tone[:, 3:])
-    assert error[20:-20].max() < 1e-7
-    assert error.max() < 2e-5
-
-
-@pytest.mark.parametrize(("late_s", "same"), [(0.9e-6, True), (-0.9e-6, True), (2e-6, False)])
-def test_stamps_within_a_microsecond_are_the_same(late_s, same):
-    log = moving(starts_s=(0.1, 0.1 + late_s))
-    result, report = made(log)
-    assert report.untouched == (True, same)
-    if same:
-        np.testing.assert_array_equal(result.tau[:, 1], log.streams[1].values[: len(result.time), 6:])
-
-
 def test_correction_undoes_offset_and_drift():
     """Against the tone of 5 Hz: at the instants that the estimate stands for to 1e-7, at the true ones to its error."""
     skew = (0.0, 0.0234, -1.71), (0.0, 5e-5, -2e-4)
@@ -174,37 +148,7 @@ def test_kept_clocks_keep_their_error():
     assert report.estimate.offset_s[1] == pytest.approx(0.02, abs=1e-7)
 
 
-def test_a_late_start_shortens_the_recording():
-    result, report = made(moving(starts_s=(0.0, 7.0)))
-    assert (len(result.time), result.time[0]) == (3300, 0.0)
-    np.testing.assert_allclose(report.lost_s, [[7.0, 0.0], [0.0, 0.0]], rtol=0, atol=1e-12)
-
-
-def test_one_robot():
-    streams = moving().streams[:1]
-    result, report = made(ArrayLog(streams), correct=True)
-    np.testing.assert_array_equal(result.theta[:, 0], streams[0].values[:, 3:6])
-    assert report.untouched == (True,)
-
-
 # --- refused
-
-
-def test_a_log_that_ends_early():
-    message = refused(moving(ends_s=(40.0, 31.5)))
-    assert "the log of robot 2 ends 8.5 s before that of robot 1; at most 1 s is allowed" in message
-    assert "clock" not in message
-    made(moving(ends_s=(40.0, 39.1)))
-
-
-def test_a_clock_that_makes_a_log_seem_to_end_early():
-    log = moving((0.0, -4.0), ends_s=(40.0, 36.0), starts_s=(4.0, 0.0))
-    message = refused(log)
-    assert "the log of robot 2 ends 4 s before that of robot 1" in message
-    assert "the clock of robot 2 differs from that of robot 1 by -4 s: correct the clocks" in message
-    result, report = made(log, correct=True)
-    assert len(result.time) > 3590
-    np.testing.assert_allclose(report.lost_s, 0.0, atol=0.011)
 
 
 def test_clocks_that_cannot_be_corrected():
@@ -212,16 +156,6 @@ def test_clocks_that_cannot_be_corrected():
     message = refused(ArrayLog(still), correct=True)
     assert "the clock of robot 2 cannot be told from the motion and so not be corrected: " in message
     made(ArrayLog(still))
-
-
-def test_hardly_anything_in_common():
-    message = refused(moving(starts_s=(0.0, 39.9), ends_s=(40.0, 40.3)))
-    assert "the robots have 10 samples in common; at least 16" in message
-
-
-@pytest.mark.parametrize("key", ["design", "trial"])
-def test_what_nobody_says(key):
-    assert f"says nothing about its {key}, which must be given" in refused(moving(), **{key: None})
 
 
 def test_a_wrist_out_of_reach(random_a):
@@ -257,38 +191,6 @@ def converted(times, **options):
     return to_recording(resample(log), design=DESIGN, trial="random", **options)[0]
 
 
-def test_samples_on_one_grid_need_no_words():
-    time = np.arange(3000) / 100.0
-    assert converted([time, time]).metadata.sampling is None
-
-
-def test_what_is_told(rng):
-    even = 0.0037 + np.arange(12000) / 400.0
-    jittered = np.sort(np.arange(3000) / 100.0 + 3e-4 * rng.standard_normal(3000)) + 0.001
-    jittered = np.delete(jittered, rng.choice(np.arange(5, 2900), 60, replace=False))
-    recording = converted([even, jittered, np.arange(3000) / 100.0])
-    filtered, interpolated, shifted = recording.metadata.sampling
-    assert [s.method for s in (filtered, interpolated, shifted)] == ["filtered", "interpolated", "untouched"]
-    assert not any(s.aligned for s in recording.metadata.sampling)
-    assert filtered.native_hz == pytest.approx(400.0, rel=1e-6)
-    assert interpolated.missing == pytest.approx(0.02, abs=1e-3)
-    assert interpolated.jitter_s == pytest.approx(3e-4, rel=0.1)
-    # Robot 1's grid starts where its low-pass is filled: its first reading is so much earlier.
-    start_s = 0.0037 - filtered.first_s
-    assert shifted.first_s == pytest.approx(-start_s, abs=1e-9)
-    for sampling in recording.metadata.sampling:
-        np.testing.assert_allclose(sampling.steps[:6], STEP, rtol=1e-6)
-        assert sampling.steps[6:] == (0.0, 0.0, 0.0)
-
-
-def test_metadata_go_round(rng):
-    recording = converted([np.arange(3000) / 100.0, 0.004 + np.arange(3000) / 100.0])
-    text = recording.metadata.to_json()
-    assert '"version": 3' in text
-    assert RecordingMetadata.from_json(text) == recording.metadata
-    assert RecordingMetadata.from_json(replace(recording.metadata, sampling=None).to_json()).sampling is None
-
-
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
@@ -310,11 +212,6 @@ def test_values_are_checked(change, sentence):
     with pytest.raises(InputError, match=sentence):
         Sampling.from_dict(KNOWN.to_dict() | change, "x")
     assert Sampling.from_dict(KNOWN.to_dict(), "x") == KNOWN
-
-
-def test_steps_of_wrist_positions_are_none_of_joints():
-    wrist = replace(KNOWN, level="wrist")
-    assert [tuple(wrist.steps_of(kind)) for kind in range(3)] == [(0.0,) * 3, (STEP,) * 3, (0.0,) * 3]
 
 
 @pytest.mark.parametrize(

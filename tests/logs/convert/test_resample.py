@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -11,8 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
-from scipy.interpolate import make_interp_spline
-from scipy.signal import firwin
 
 import mocobot
 from array_log import ArrayLog, stream, tones
@@ -20,7 +17,7 @@ from estimator.errors import InputError
 from mocobot.options import Convert
 from mocobot_logs.log import Samples
 from mocobot_logs.resample import MAX_GAP_S, Resampled, resample
-from mocobot_logs.resample_filter import Grid, Interpolator, Merger, fill_gaps, low_pass_taps
+from mocobot_logs.resample_filter import Grid, Interpolator, low_pass_taps
 
 EPOCH_NS = 1_700_000_000_123_456_789
 BAND_HZ = (0.7, 3.0, 5.0, 19.0)
@@ -62,15 +59,6 @@ def test_samples_on_the_grid_are_untouched(off_ns):
     assert report.jitter_max_s == pytest.approx(off_ns * 1e-9, abs=1e-12)
 
 
-def test_samples_beside_the_grid_are_not():
-    time = np.arange(3000) / 100.0
-    time[1::2] += 1.6e-6
-    report = one_robot(time, tones(time, BAND_HZ)).reports[0]
-    assert report.method == "interpolated"
-    # Intervals are 10 ms +- 1.6 us, of median 10 ms + 1.6 us or - 1.6 us.
-    assert report.jitter_max_s == pytest.approx(3.2e-6, abs=1e-9)
-
-
 def test_dropped_samples_of_a_grid_are_filled_and_the_others_untouched():
     time = np.arange(5000) / 100.0
     values = tones(time, (0.5, 2.0))
@@ -109,18 +97,6 @@ def test_the_band_comes_through_at_its_place_in_time(rate_hz, share, tolerance):
     np.testing.assert_allclose(result.values[0], tones(grid_s(result), BAND_HZ), rtol=0, atol=tolerance)
 
 
-@pytest.mark.parametrize(("rate_hz", "at_ends"), [(25.0, 5e-2), (30.0, 2e-2), (50.0, 1e-5), (100.2, 1e-5)])
-def test_five_hertz_of_slow_logs(rate_hz, at_ends):
-    """Loss and images are those of the cardinal quintic spline: sinc^6 over the sum of its copies."""
-    time = np.arange(round(20 * rate_hz)) / rate_hz
-    result = one_robot(time, tones(time, [5.0]))
-    copies = np.sinc(5.0 / rate_hz + np.arange(-20, 21)) ** 6
-    loss = 1.0 - copies[20] / copies.sum()
-    error = np.abs(result.values[0] - tones(grid_s(result), [5.0]))
-    assert error[200:-200].max() < 2.0 * loss + 5e-6
-    assert error.max() < at_ends
-
-
 def low_band_amplitude(values: np.ndarray) -> float:
     """Largest amplitude below 20 Hz, through a window whose side lobes are below -92 dB."""
     window = np.blackman(len(values)) ** 2
@@ -142,47 +118,7 @@ def test_nothing_folds_below_20_hz(rate_hz):
         assert low_band_amplitude(result.values[0]) < 1e-4
 
 
-def test_a_thinned_log_without_the_filter_would_fold():
-    """The measure above sees a fold where there is one."""
-    time = np.arange(8000) / 1000.0
-    tone = np.sin(2 * np.pi * 103.0 * time)[:, None]
-    assert low_band_amplitude(tone[::10]) > 0.9
-    assert low_band_amplitude(one_robot(time, tone).values[0]) < 1e-5
-
-
-def test_dropped_samples_at_1_khz():
-    time = jittered(1000.0, 10.0, 0.1, drop=0.02)
-    result = one_robot(time, tones(time, BAND_HZ))
-    np.testing.assert_allclose(result.values[0], tones(grid_s(result), BAND_HZ), rtol=0, atol=1e-5)
-    report = result.reports[0]
-    assert report.filled == 200
-    assert report.native_hz == pytest.approx(1000.0, abs=0.05)
-    assert report.jitter_rms_s == pytest.approx(1e-4 * np.sqrt(2 / 3), rel=0.05)  # difference of two uniforms
-
-
 # --- blocks and chunks
-
-
-@pytest.mark.parametrize(("rate_hz", "k", "jitter"), [(130.0, 4, 0.2), (1000.0, 10, 0.1)])
-def test_blocks_make_the_same_as_the_whole_signal(rate_hz, k, jitter):
-    """Against one spline through all rows and one convolution."""
-    rng = np.random.default_rng(2)
-    time = jittered(rate_hz, 13000 / rate_hz, jitter)
-    values = rng.normal(size=(len(time), 9))
-    result = one_robot(time, values)
-    stamps = np.rint(time * 1e9) * 1e-9
-    fine = make_interp_spline(stamps, values, k=5)(np.arange(int(stamps[-1] * 100.0 * k) + 1) / (100.0 * k))
-    taps = firwin(24 * k + 1, 35.0, window=("kaiser", 0.1102 * (110 - 8.7)), fs=100.0 * k)
-    expected = np.stack([np.convolve(x, taps, "valid")[::k] for x in fine.T], axis=1)
-    np.testing.assert_allclose(result.values[0], expected, rtol=0, atol=1e-11)
-    assert result.start_s[0] == pytest.approx(0.12)
-
-
-def test_the_last_sample_is_the_last_instant():
-    time = np.arange(400) / 25.0
-    result = one_robot(time, tones(time, [1.0]))
-    assert grid_s(result)[-1] == pytest.approx(time[-1])
-    np.testing.assert_allclose(result.values[0][-1], tones(time[-1:], [1.0])[0], rtol=0, atol=1e-9)
 
 
 def made_stream(kind: str) -> Samples:
@@ -219,12 +155,6 @@ def test_pieces_change_nothing(kind, cuts):
     assert (mine["merged"] > 0) == (kind == "merged")
 
 
-def test_rows_one_by_one():
-    whole = made_stream("interpolated")
-    expected, result = resample(ArrayLog([whole], 10**6)), resample(ArrayLog([whole], 1))
-    np.testing.assert_array_equal(result.values[0], expected.values[0])
-
-
 # --- faults that are mended
 
 
@@ -239,69 +169,6 @@ def test_duplicates_are_dropped_and_counted(piece):
     assert (result.reports[0].duplicates, result.reports[0].samples) == (5, 3005)
 
 
-def test_crowding_samples_do_not_make_noise_large():
-    """A late callback and one in time, 50 us apart: the noise of the result stays that of the samples."""
-    rng = np.random.default_rng(4)
-    time = np.arange(4000) / 100.0 + np.append(0.0, rng.uniform(-1e-4, 1e-4, 3999))
-    time[50::100] = time[51::100] - 50e-6
-    result = one_robot(time, rng.normal(size=(4000, 9)))
-    assert (result.reports[0].merged, result.reports[0].filled) == (40, 40)
-    assert np.abs(result.values[0]).max() < 5.0
-
-
-def test_a_stream_that_leaves_the_grid_is_read_again():
-    time = np.arange(9000) / 100.0
-    time[5000:] += 3e-5 * np.arange(4000) / 100.0  # a clock that is adjusted
-    log = ArrayLog([stream(np.arange(9000) / 100.0, tones(time, [1.0])), stream(time, tones(time, [1.0]))])
-    progress = []
-    result = resample(log, advance=progress.append)
-    assert (log.reads, sum(progress)) == (2, log.size)
-    assert [report.method for report in result.reports] == ["untouched", "interpolated"]
-    np.testing.assert_array_equal(result.values[0], log.streams[0].values)
-    np.testing.assert_allclose(result.values[1], tones(grid_s(result, 1), [1.0]), rtol=0, atol=1e-5)
-
-
-def test_robots_keep_their_own_grids():
-    time = np.arange(3000) / 100.0
-    log = ArrayLog(
-        [stream(time, tones(time, [1.0]), EPOCH_NS + 5_003_000), stream(time, tones(time, [1.0]), EPOCH_NS)]
-    )
-    result = resample(log)
-    assert result.origin_ns == EPOCH_NS
-    np.testing.assert_allclose(result.start_s, [0.005003, 0.0], rtol=0, atol=1e-12)
-
-
-def test_progress_counts_every_row_once():
-    seen = []
-    log = ArrayLog([made_stream("untouched"), made_stream("interpolated")], 100)
-    resample(log, advance=seen.append)
-    assert sum(seen) == log.size
-
-
-def test_only_the_result_is_kept():
-    """Twice the log takes more memory by no more than what comes out, and a little."""
-
-    class Endless(ArrayLog):
-        def chunks(self, advance):
-            rng = np.random.default_rng(5)
-            for block in range(self.rows):
-                stamp = 1_000_000 * np.arange(1000 * block, 1000 * (block + 1)) + rng.integers(
-                    -9e4, 9e4, 1000
-                )
-                yield 0, Samples(np.maximum(stamp, 0), rng.normal(size=(1000, 9)))
-
-    def peak(seconds: int) -> int:
-        tracemalloc.start()
-        resample(Endless([made_stream("untouched")], seconds))
-        size = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return size
-
-    short, long = peak(20), peak(80)
-    result_bytes, log_bytes = (rate * 60 * 9 * 8 for rate in (100, 1000))
-    assert long - short < 2.5 * result_bytes < 0.3 * log_bytes
-
-
 @pytest.mark.parametrize("k", [2, 3, 7, 10, 30])
 def test_low_pass_is_what_it_says(k):
     taps = low_pass_taps(k)
@@ -311,83 +178,6 @@ def test_low_pass_is_what_it_says(k):
     np.testing.assert_array_equal(taps, taps[::-1])
     assert np.abs(gain[frequency <= 0.2] - 1.0).max() < 5e-6
     assert np.abs(gain[frequency >= 0.5]).max() < 10 ** (-108 / 20)
-
-
-EVERY_M = [1, 2, 3, 5, 12, 49]
-
-
-def with_gap(missing: int, around: int = 120, jitter: float = 0.0, seed: int = 0):
-    """Times of samples one unit apart with one gap in the middle; the gap's length per interval."""
-    rng = np.random.default_rng(seed)
-    time = np.r_[np.arange(around), np.arange(around, 2 * around) + missing].astype(float)
-    time += jitter * rng.uniform(-1, 1, len(time))
-    holes = np.zeros(len(time) - 1, np.int64)
-    holes[around - 1] = missing
-    return time, holes
-
-
-def filled_part(time, values, holes, missing):
-    at, out = fill_gaps(time, values, holes)
-    assert np.all(np.diff(at) > 0)
-    inside = ~np.isin(at, time)
-    assert inside.sum() == missing
-    np.testing.assert_array_equal(out[~inside], values)
-    return at[inside], out[inside]
-
-
-@pytest.mark.parametrize("missing", EVERY_M)
-def test_polynomials_of_degree_seven_are_met(missing):
-    time, holes = with_gap(missing, jitter=0.2)
-    curves = [Polynomial(np.random.default_rng(k).normal(size=8), domain=[0, time[-1]]) for k in range(3)]
-    at, out = filled_part(time, np.stack([c(time) for c in curves], axis=1), holes, missing)
-    np.testing.assert_allclose(out, np.stack([c(at) for c in curves], axis=1), rtol=0, atol=1e-9)
-    edges = time[119:121]
-    np.testing.assert_allclose(at, np.linspace(*edges, missing + 2)[1:-1], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("missing", "hertz", "most"), [(1, 1.0, 5e-12), (5, 1.0, 1e-8), (1, 5.0, 1.5e-6), (5, 5.0, 3.5e-3)]
-)
-def test_sines_at_100_hz(missing, hertz, most):
-    time, holes = with_gap(missing)
-    wave = np.exp(2j * np.pi * hertz / 100 * time)
-    at, out = filled_part(time, np.stack([wave.real, wave.imag], axis=1), holes, missing)
-    error = np.abs(out @ [1, 1j] - np.exp(2j * np.pi * hertz / 100 * at))
-    assert 0.1 * most < error.max() < most
-
-
-@pytest.mark.parametrize("missing", EVERY_M)
-def test_noise_does_not_grow_with_the_gap(missing):
-    """Unit impulses at every sample give the weights, whose root sum of squares is the gain of white noise."""
-    time, holes = with_gap(missing)
-    weights = filled_part(time, np.eye(len(time)), holes, missing)[1]
-    gain = np.sqrt(np.sum(weights**2, axis=1)).max()
-    assert 0.5 < gain < 1.9
-    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-9)
-
-
-def test_gaps_at_the_ends_and_of_many_lengths_at_once():
-    rng = np.random.default_rng(1)
-    full = np.arange(400.0)
-    gone = np.r_[1, 5:7, 100:103, 110, 200:206, 397:399]
-    time = np.delete(full, gone)
-    signal = np.sin(0.06 * full[:, None] + rng.uniform(0, 6, 4))
-    at, out = fill_gaps(time, np.delete(signal, gone, axis=0), np.diff(time).astype(np.int64) - 1)
-    np.testing.assert_allclose(at, full, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(out, signal, rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize("cuts", [[], [3], [2, 3, 4, 5, 6, 7], [6]])
-def test_crowding_rows_become_their_mean(cuts):
-    time = np.array([0, 100, 190, 210, 225, 300, 400, 401], np.int64)
-    values = np.arange(16.0).reshape(8, 2) ** 2
-    merger = Merger(period_ns=100.0)
-    parts = [merger.push(t, v) for t, v in zip(np.split(time, cuts), np.split(values, cuts), strict=True)]
-    at, out = (np.concatenate(x) for x in zip(*parts, merger.finish(), strict=True))
-    np.testing.assert_array_equal(at, [0, 100, 208, 300, 400])  # whole nanoseconds, rounded down
-    expected = [values[0], values[1], values[2:5].mean(axis=0), values[5], values[6:].mean(axis=0)]
-    np.testing.assert_allclose(out, expected, rtol=1e-15)
-    assert merger.merged == 3
 
 
 def test_four_in_a_row_lost_at_50_hz_are_filled_within_the_sensors_noise():
@@ -461,13 +251,6 @@ def test_noise_is_averaged_nearly_as_over_even_samples(rng):
     below_5_hz = np.abs(np.fft.rfft(low, axis=0)[1:300]) ** 2
     spectrum = np.mean(below_5_hz) / len(low) / 100.0
     assert 0.9 < spectrum * RATE_HZ < 1.35
-
-
-def test_a_hole_is_still_refused(rng):
-    time = poisson(rng)
-    time = time[(time < 9.0) | (time > 9.2)]
-    with pytest.raises(InputError, match=r"robot 1: no samples for 0\.2"):
-        resample(ArrayLog([stream(time, tones(time, (1.0,)))]))
 
 
 TIME = np.arange(3000) / 100.0

@@ -18,7 +18,7 @@ from joint_logs import (
     write_lerobot,
     write_table,
 )
-from mocobot_logs.joints.read import mean_supply, unwrapped
+from mocobot_logs.joints.read import unwrapped
 
 TIME = np.arange(1500) / 500.0
 
@@ -109,27 +109,6 @@ def test_a_free_torque_constant_leaves_amperes_times_gear(tmp_path) -> None:
     assert np.isnan(log.drive.torque_constant).tolist() == [False, False, True]
     np.testing.assert_allclose(log.torque[:, 2], 300 * values["i3"] * 1e-3, rtol=1e-12)
     np.testing.assert_allclose(log.torque[:, 0], 50 * 0.05 * values["i1"] * 1e-3, rtol=1e-12)
-
-
-def test_both_sides_of_a_gear_are_kept(tmp_path) -> None:
-    """Position at the link, and the motor's beside it: what twists between them shows."""
-    q, _ = motion(TIME)
-    twist = 1e-3 * np.sin(TIME)
-    values = {"t": TIME, "m": 100 * (q[:, 0] + twist)}
-    values |= {f"q{k}": q[:, k] for k in range(3)} | {f"f{k}": torques(TIME)[:, k] for k in range(3)}
-    text = """
-joints = ["hip", "knee", "lift"]
-time = { column = "t", unit = "s" }
-channels.q = { column = "q{index}", unit = "rad" }
-channels.link_torque = { column = "f{index}", unit = "Nm" }
-joint.hip = { gear = 100, zero = 0.5, channels.motor_position = { column = "m", unit = "rad" } }
-joint.lift.channels = { q.unit = "m", link_torque.unit = "N" }
-"""
-    (log,) = read(write_csv(tmp_path / "log.csv", values), text)
-    np.testing.assert_allclose(log.q[:, 0], q[:, 0] + 0.5, atol=1e-14)
-    np.testing.assert_allclose(log.motor[:, 0] - log.q[:, 0], twist, atol=1e-12)
-    assert np.isnan(log.motor[:, 1:]).all()
-    assert log.drive.link_side.all()
 
 
 def test_a_joint_without_a_torque_has_none(tmp_path) -> None:
@@ -269,19 +248,6 @@ motor_voltage = { column = "knee.volts", unit = "V" }
 """
 
 
-def test_a_supply_that_rings_is_read_as_its_mean() -> None:
-    # White readings of variance 2/3 V^2 at 200 Hz through about 1 Hz of bandwidth.
-    assert np.std(mean_supply(VOLTS + RINGS, RATE_HZ) - VOLTS) < 0.15
-    slow = VOLTS - 0.5 * np.sin(2.0 * np.pi * 0.1 * SUPPLY_TIME)  # a battery sags
-    seen = mean_supply(slow, RATE_HZ)
-    np.testing.assert_allclose(seen, slow, atol=0.1)
-    np.testing.assert_allclose(seen[400:-400], slow[400:-400], atol=0.01)
-
-
-def test_a_supply_that_is_steady_stays_as_it_is() -> None:
-    np.testing.assert_allclose(mean_supply(np.full(40, VOLTS), 20.0), VOLTS, rtol=1e-12)
-
-
 def test_a_motors_voltage_does_not_ring_with_the_supply(tmp_path) -> None:
     """What a drive turns into torque is duty times supply: of a voltage that is told, that voltage."""
     told = 3.0 * np.sin(2.0 * SUPPLY_TIME)
@@ -311,16 +277,6 @@ def test_even_stamps_are_left_alone(tmp_path, rate_hz) -> None:
     np.testing.assert_allclose(log.q, motion(time)[0], rtol=1e-13)
 
 
-def test_stamps_rounded_to_milliseconds_are_even(tmp_path) -> None:
-    true = np.arange(900) / 300.0
-    path = write_csv(tmp_path / "log.csv", columns(true) | {"t": np.round(true, 3)})
-    (log,) = read(path)
-    assert log.rate_hz == pytest.approx(300.0, rel=1e-5)
-    assert not log.resampled
-    np.testing.assert_allclose(log.q, motion(true)[0], rtol=1e-13)
-    assert "rounded to 0.001 s" in log.notes[0]
-
-
 def test_uneven_stamps_are_interpolated(tmp_path) -> None:
     rng = np.random.default_rng(1)
     time = np.arange(1200) / 200.0 + rng.uniform(-0.3, 0.3, 1200) / 200.0
@@ -333,18 +289,6 @@ def test_uneven_stamps_are_interpolated(tmp_path) -> None:
     assert log.usable.all()
 
 
-def test_noise_of_uneven_samples_is_not_amplified(tmp_path) -> None:
-    rng = np.random.default_rng(2)
-    time = np.arange(2000) / 200.0 + rng.uniform(-0.3, 0.3, 2000) / 200.0
-    noise = 1e-3 * rng.standard_normal((2000, 1))
-    path = write_csv(
-        tmp_path / "log.csv", columns(time) | {"hip.pos": np.degrees(motion(time)[0][:, 0] + noise[:, 0])}
-    )
-    (log,) = read(path)
-    error = log.q[:, 0] - motion(log.time + log.start_s + time[0])[0][:, 0]
-    assert 0.5e-3 < np.std(error) < 1.1e-3
-
-
 def test_a_rate_that_is_asked_for(tmp_path) -> None:
     time = np.arange(4000) / 2000.0
     (log,) = read(written(tmp_path, time), MAP.replace('column = "t"', 'column = "t"\nrate_hz = 500'))
@@ -354,15 +298,6 @@ def test_a_rate_that_is_asked_for(tmp_path) -> None:
     np.testing.assert_allclose(log.q, motion(log.time + log.start_s)[0], atol=1e-5)
     with pytest.raises(InputError, match="rate_hz is 5000, but the log has 2000 samples a second"):
         read(written(tmp_path, time), MAP.replace('column = "t"', 'column = "t"\nrate_hz = 5000'))
-
-
-def test_a_rate_that_changes_by_half(tmp_path) -> None:
-    """As servos have it: 190 Hz while they are driven, 285 Hz when not."""
-    time = np.concatenate([np.arange(400) / 190.0, 400 / 190.0 + np.arange(900) / 285.0])
-    (log,) = read(written(tmp_path, time))
-    assert log.rate_hz == pytest.approx(190.0, rel=0.02)
-    assert log.usable.all()
-    np.testing.assert_allclose(log.q, motion(log.time + log.start_s)[0], atol=2e-5)
 
 
 def test_short_gaps_are_bridged_and_marked(tmp_path) -> None:
@@ -451,10 +386,3 @@ def test_positions_within_one_turn_are_unwrapped() -> None:
     assert np.allclose(out[known], true[known])
     assert len(notes) == 1
     assert notes[0].startswith("q of elbow is told within one turn; ")
-
-
-def test_positions_of_motors_that_turn_fast_stay_as_they_are() -> None:
-    fast = np.cumsum(np.full(100, 5.0))[:, None]
-    out, notes = unwrapped(fast, ["motor_position of wheel"])
-    assert out is fast
-    assert not notes

@@ -8,7 +8,6 @@ import tracemalloc
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +15,16 @@ import pytest
 from scipy.io import savemat
 
 from estimator import inputs
-from estimator.errors import InputError
 from estimator.inputs import set_max_unpacked
 from log_files import assert_same, read_log, refused
-from mocobot_logs.maps import CsvMap, TimeMap, builtin_map
-from mocobot_logs.open_log import open_log, open_table
+from mocobot_logs.maps import CsvMap
+from mocobot_logs.open_log import open_table
 from mocobot_logs.table import table as tables
 from mocobot_logs.table.table import Wanted
 from recordings import metadata, small_recording
 
 RECORDING = small_recording(rows=60)
 ARRAYS = {name: getattr(RECORDING, name) for name in ("time", "phi", "theta", "tau", "ref")}
-GIB = 1 << 30
 
 
 @pytest.fixture
@@ -88,23 +85,6 @@ def test_columns_by_name(path: Path) -> None:
     assert_same(read_log(path), RECORDING)
 
 
-def test_without_commands(path: Path) -> None:
-    np.savez(path, time=RECORDING.time, phi=RECORDING.phi, theta=RECORDING.theta, tau=RECORDING.tau)
-    assert_same(read_log(path), replace(RECORDING, ref=None))
-
-
-def test_whole_numbers_and_halves(path: Path) -> None:
-    """Encoder counts and half floats; stamps as whole nanoseconds, which no float could hold."""
-    start, counts = 1_700_000_000_123_456_789, np.arange(540, dtype=np.int16).reshape(60, 3, 3)
-    stamps = start + 10_000_000 * np.arange(60)
-    np.savez(path, time=stamps, phi=counts, theta=counts.astype(np.float16), tau=counts.astype(np.uint8))
-    log = read_log(path, replace(builtin_map("mocobot-arrays"), time=TimeMap("time", "ns")))
-    assert np.array_equal(log.streams[2].stamp_ns, stamps)
-    assert np.array_equal(log.streams[2].values[:, :3], counts[:, 2])
-    assert np.array_equal(log.streams[2].values[:, 3:6], np.float16(counts[:, 2]))
-    assert np.array_equal(log.streams[2].values[:, 6:], np.uint8(counts[:, 2] % 256))
-
-
 def test_metadata_travel_along(path: Path) -> None:
     np.savez(path, mocobot=np.array(metadata(payload="a").to_json()), **ARRAYS)
     log = read_log(path)
@@ -112,50 +92,7 @@ def test_metadata_travel_along(path: Path) -> None:
     assert_same(log, RECORDING)
 
 
-def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tables, "CELLS", 1)
-    recording = small_recording(rows=333)
-    np.savez_compressed(
-        path, time=recording.time, phi=recording.phi, theta=recording.theta, tau=recording.tau
-    )
-    source, steps = open_log(path), []
-    assert sum(len(samples.stamp_ns) for _, samples in source.chunks(steps.append)) == 333 * 3
-    assert len(steps) == 6
-    assert sum(steps) == source.size == 333
-    assert_same(read_log(path), replace(recording, ref=None))
-
-
 # Claims
-
-
-@pytest.mark.parametrize(
-    ("header", "words"),
-    [
-        (
-            "{'descr': '<f8', 'fortran_order': False, 'shape': (1250000000,), }",
-            ["10000000000 bytes", "but has 0"],
-        ),
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (-1,), }", ["claims the shape (-1,)"]),
-        (
-            "{'descr': '<f8', 'fortran_order': False, 'shape': (10000000000000000000000,), }",
-            ["claims the shape"],
-        ),
-        (
-            "{'descr': '|O', 'fortran_order': False, 'shape': (60,), }",
-            ["Python objects, which are never loaded"],
-        ),
-        ("{'descr': 'nonsense', 'fortran_order': False, 'shape': (60,), }", ["damaged"]),
-        ("{'descr': '<f8', 'fortran_order': False}", ["damaged"]),
-        ("__import__('os').system('true')", ["damaged"]),
-        ("", ["damaged"]),
-    ],
-    ids=range(8),
-)
-def test_headers_that_lie(path: Path, header: str, words: list[str]) -> None:
-    archive(path, members(phi=npy_header(header)))
-    message = refused(path)
-    for word in words:
-        assert word in message
 
 
 def test_claims_are_refused_before_anything_is_allocated(path: Path) -> None:
@@ -201,34 +138,6 @@ def test_arrays_have_one_limit_together(path: Path, monkeypatch: pytest.MonkeyPa
         set_max_unpacked(None)
 
 
-@pytest.mark.parametrize("packing", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
-def test_packing_that_unpacks_without_a_limit(path: Path, packing: int) -> None:
-    archive(path, members(), packing)
-    assert "is not packed as numpy does it" in refused(path)
-
-
-@pytest.mark.parametrize("also_header", [False, True])
-def test_a_directory_that_lies_about_an_entry(path: Path, also_header: bool) -> None:
-    """The archive's directory claims 3.2 GB for an entry of 480 bytes, with or without the array's header."""
-    text = "{'descr': '<f8', 'fortran_order': False, 'shape': (400000000,), }"
-    time = npy_header(text) + RECORDING.time.tobytes() if also_header else npy(RECORDING.time)
-    archive(path, members(time=time), zipfile.ZIP_STORED)
-    content = bytearray(path.read_bytes())
-    entry = content.rindex(b"PK\x01\x02", 0, content.rindex(b"time.npy"))
-    content[entry + 20 : entry + 28] = struct.pack("<II", 3_200_000_128, 3_200_000_128)
-    path.write_bytes(content)
-    message = refused(path)
-    assert ("unpacks to at least 2.98 GiB" if also_header else "claims the shape (60,)") in message
-
-
-def test_data_that_are_not_all_there(path: Path) -> None:
-    phi = npy(RECORDING.phi)
-    archive(path, members(phi=phi[:-8]))
-    assert "claims the shape (60, 3, 3)" in refused(path)
-    archive(path, members(phi=phi + b"\0"))
-    assert "claims the shape (60, 3, 3)" in refused(path)
-
-
 # Arrays
 
 
@@ -263,18 +172,6 @@ def test_arrays_that_do_not_fit(path: Path, changes: dict[str, np.ndarray | None
     assert words in refused(path)
 
 
-def test_vectors_need_an_index(path: Path) -> None:
-    np.savez(path, **ARRAYS)
-    common = {**builtin_map("mocobot-arrays").common}
-    for column, words in (
-        ("phi", "column 'phi' has (3, 3) numbers in a row; name one of them in the map, such as 'phi[0, 0]'"),
-        ("phi[{robot0}]", "'phi[0]' has 1 indices, but a row of 'phi' has the shape (3, 3)"),
-        ("phi[-1, 0]", "missing column 'phi[-1, 0]'"),
-    ):
-        common["phi1"] = replace(common["phi1"], column=column)
-        assert words in refused(path, replace(builtin_map("mocobot-arrays"), common=common))
-
-
 def test_objects_are_never_unpickled(path: Path) -> None:
     class Bomb:
         def __reduce__(self) -> tuple:
@@ -282,20 +179,6 @@ def test_objects_are_never_unpickled(path: Path) -> None:
 
     np.savez(path, **ARRAYS, extra=np.array([Bomb()], dtype=object))
     assert "array 'extra' holds Python objects, which are never loaded" in refused(path)
-
-
-def test_numbers_beyond_floats_are_infinite(path: Path) -> None:
-    """As what came out of a log; no warning on the terminal."""
-    np.savez(path, **(ARRAYS | {"phi": np.full((60, 3, 3), 1e308, np.longdouble) * 1e5}))
-    common = {**builtin_map("mocobot-arrays").common}
-    common["tau1"] = replace(common["tau1"], scale=1e300, offset=1e308)
-    log = read_log(path, replace(builtin_map("mocobot-arrays"), common=common))
-    assert np.isposinf(log.streams[0].values[:, [0, 1, 2, 6]]).all()
-
-
-def test_no_rows_is_an_empty_log(path: Path) -> None:
-    np.savez(path, **{name: array[:0] for name, array in ARRAYS.items()})
-    assert [len(stream.stamp_ns) for stream in read_log(path).streams] == [0, 0, 0]
 
 
 # Files
@@ -313,39 +196,6 @@ def test_files_that_are_no_archives(path: Path) -> None:
     ):
         path.write_bytes(spoiled)
         assert words in refused(path)
-
-
-def test_an_archive_of_something_else(path: Path) -> None:
-    assert "the columns are none" in refused(archive(path, {"a.txt": b"x"}))
-
-
-def test_the_same_array_twice(path: Path) -> None:
-    archive(path, members())
-    with zipfile.ZipFile(path, "a") as file, pytest.warns(UserWarning, match="Duplicate name"):
-        file.writestr("phi.npy", npy(RECORDING.phi))
-    assert "array 'phi' is in the archive twice" in refused(path)
-
-
-@pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
-@pytest.mark.parametrize("fortran", [False, True])
-def test_a_flipped_bit_in_a_sample_is_found(path: Path, compression: int, fortran: bool) -> None:
-    """By the sum over the entry, even where it does not disturb the unpacking."""
-    tau = np.asfortranarray(RECORDING.tau) if fortran else RECORDING.tau
-    archive(path, members(tau=npy(tau)), compression)
-    content = bytearray(path.read_bytes())
-    entry = content.rindex(b"PK\x01\x02", 0, content.rindex(b"tau.npy"))
-    content[entry + 16] ^= 1  # of the sum: packed data would not unpack
-    path.write_bytes(content)
-    assert "damaged one (Bad CRC-32" in refused(path)
-
-
-def test_what_zip_can_but_should_not(path: Path) -> None:
-    archive(path, members())
-    content = bytearray(path.read_bytes())
-    for start in (content.index(b"PK\x03\x04"), content.index(b"PK\x01\x02")):
-        content[start + (6 if content[start + 2] == 3 else 8)] |= 1  # encrypted
-    path.write_bytes(content)
-    assert "damaged one (" in refused(path)
 
 
 MAT_RECORDING = small_recording(rows=60)
@@ -415,12 +265,6 @@ def test_a_recording_comes_back(path_of_mat: Path, monkeypatch, compressed: bool
     assert_same(read_log(path_of_mat), MAT_RECORDING)
 
 
-def test_the_format_shows_in_the_first_bytes(path_of_mat: Path) -> None:
-    savemat(path_of_mat, MAT_ARRAYS)
-    other = path_of_mat.rename(path_of_mat.with_suffix(".log"))
-    assert_same(read_log(other), MAT_RECORDING)
-
-
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("stored", list(TYPES))
 def test_numbers_of_every_type_and_byte_order(path_of_mat: Path, order: str, stored: str) -> None:
@@ -441,11 +285,6 @@ def test_rows_columns_and_matrices(path_of_mat: Path) -> None:
     assert np.array_equal(found["q"], q)
     assert found["on"].tolist() == [0, 0, 1, 1, 1]
     assert found["t"].tolist() == [0, 250_000_000, 500_000_000, 750_000_000, 1_000_000_000]
-
-
-def test_a_single_row_has_small_elements(path_of_mat: Path) -> None:
-    content = [matrix("t", np.ones((1, 1)), stored="u1"), matrix("q", np.full((1, 1), 7.0), stored="i2")]
-    assert columns(saved(path_of_mat, *content), "q")["q"].tolist() == [7]
 
 
 def test_what_is_no_matrix_of_real_numbers_is_left_out(path_of_mat: Path) -> None:
@@ -515,30 +354,6 @@ def test_damage_is_told_in_one_sentence(path_of_mat: Path, name: str) -> None:
     write, said = REFUSED[name]
     write(path_of_mat)
     assert said in refused(path_of_mat)
-
-
-def test_other_numbers_of_rows(path_of_mat: Path) -> None:
-    saved(path_of_mat, GOOD, matrix("q", np.zeros((3, 5))))
-    with pytest.raises(InputError, match=r"variable 'q' has 3 rows, but 't' has 5; all must have as many"):
-        columns(path_of_mat, "q")
-
-
-def test_what_unpacks_to_too_much_is_refused_before_it_is_read(path_of_mat: Path) -> None:
-    big = np.zeros((1 << 17, 1))
-    saved(path_of_mat, packed(matrix("t", np.arange(float(1 << 17))[:, None])), packed(matrix("q", big)))
-    set_max_unpacked(1e-3)
-    try:
-        with pytest.raises(InputError, match=r"unpacks to at least 0\.00\d+ GiB"):
-            columns(path_of_mat, "q")
-    finally:
-        set_max_unpacked(None)
-
-
-def test_packed_numbers_that_end_early(path_of_mat: Path) -> None:
-    whole = matrix("q", np.zeros((5, 1)))
-    saved(path_of_mat, GOOD, packed(whole[:-16]))
-    with pytest.raises(InputError, match="not a readable MATLAB file, or a damaged one"):
-        columns(path_of_mat, "q")
 
 
 def test_a_team_needs_the_maps_columns(path_of_mat: Path) -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -17,7 +14,6 @@ from hypothesis import strategies as st
 
 from estimator.errors import InputError
 from log_files import assert_same, channels_of, read_log, refused, write_text
-from mocobot_logs.draft import draft_of
 from mocobot_logs.maps import CsvMap, LogMap, TimeMap, builtin_map, builtin_map_text, parse_map
 from mocobot_logs.table import table as tables
 from mocobot_logs.table import text as table_csv
@@ -83,25 +79,6 @@ def test_dialects(path: Path, change) -> None:
     assert_same(read_log(path), RECORDING)
 
 
-def test_pandas_index_column_and_others_are_ignored(path: Path) -> None:
-    columns = {"": np.arange(60), "note with, comma": np.arange(60)} | RECORDING.columns()
-    text = write_text(path, columns).read_text()
-    path.write_text(text.replace("note with, comma", '"note with, comma"'))
-    assert_same(read_log(path), RECORDING)
-
-
-def test_column_names_may_hold_brackets_dots_and_slashes(path: Path) -> None:
-    names = {name: f"/joint{k}/position[{k}]" for k, name in enumerate(RECORDING.columns())}
-    write_text(path, {names[name]: values for name, values in RECORDING.columns().items()})
-    channels = {c: replace(m, column=f"{c}?{{robot}}") for c, m in JOINT.common.items()}
-    own = {
-        robot: {c: replace(channels[c], column=names[f"omnid{robot}.{c}"]) for c in channels}
-        for robot in (1, 2, 3)
-    }
-    time = TimeMap(column=names["time"], unit="s")
-    assert_same(read_log(path, replace(JOINT, robots=3, common=channels, own=own, time=time)), RECORDING)
-
-
 def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_csv, "BLOCK_BYTES", 5000)
     write_text(path, RECORDING.columns())
@@ -113,14 +90,6 @@ def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def tables_source(path: Path) -> tables.TableSource:
     return tables.TableSource(table_csv.CsvTable(path, CsvMap(), str(path)), JOINT)
-
-
-def test_progress_reaches_the_size(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table_csv, "BLOCK_BYTES", 5000)
-    write_text(path, RECORDING.columns())
-    source, steps = tables_source(path), []
-    assert len(list(source.chunks(steps.append))) > 1
-    assert sum(steps) == source.size == path.stat().st_size
 
 
 # Time
@@ -166,15 +135,6 @@ def test_times_that_are_none(path: Path, lines: list[str], text: str, words: lis
         assert word in message
 
 
-def test_every_robot_may_have_its_own_clock(path: Path) -> None:
-    columns = RECORDING.columns()
-    clocks = {f"t{i}": columns["time"] + 1000.0 * i for i in (1, 2, 3)}
-    write_text(path, clocks | {name: values for name, values in columns.items() if name != "time"})
-    log = read_log(path, replace(JOINT, time=TimeMap("t{robot}", "s")))
-    for i, stream in enumerate(log.streams, 1):
-        assert np.array_equal(stream.stamp_ns, np.rint(1e9 * columns["time"]).astype(np.int64) + 10**12 * i)
-
-
 # Cells
 
 
@@ -197,18 +157,6 @@ def test_empty_cells_are_nan_and_rows_without_a_robot_are_no_samples_of_it(
     assert np.array_equal(log.streams[0].values, expected, equal_nan=True)
 
 
-def test_what_is_wrong_with_samples_is_passed_on(path: Path, lines: list[str]) -> None:
-    """Time that runs back, repeats, infinities: for the reader of the log to see and to judge."""
-    table = [line.split(",") for line in lines]
-    table[9][0], table[12][0] = table[3][0], table[11][0]
-    table[20][2], table[21][2] = "inf", "-Infinity"
-    path.write_text("\n".join(",".join(row) for row in table))
-    stream = read_log(path).streams[0]
-    assert stream.stamp_ns[8] == stream.stamp_ns[2]
-    assert stream.stamp_ns[11] == stream.stamp_ns[10]
-    assert stream.values[19:21, 1].tolist() == [np.inf, -np.inf]
-
-
 @pytest.mark.parametrize("cell", ["left", "0x10", "1_000", "true", '"a,b"', "1;2", "\x07"])
 def test_cells_that_are_no_numbers(path: Path, lines: list[str], cell: str) -> None:
     row = lines[7].split(",")
@@ -218,13 +166,6 @@ def test_cells_that_are_no_numbers(path: Path, lines: list[str], cell: str) -> N
     message = refused(path)
     assert "column 'omnid1.phi3' holds" in message
     assert "line 8; it must hold numbers" in message
-
-
-def test_lines_are_counted_with_the_blank_ones(path: Path, lines: list[str]) -> None:
-    lines[9] = lines[9].replace(",", ",x", 1)
-    path.write_text("\n".join(["", *lines[:3], "", "\r", *lines[3:7], "", *lines[7:]]))
-    assert "in line 14; it must" in refused(path)
-    assert path.read_text().split("\n")[13] == lines[9]
 
 
 def test_ragged_rows(path: Path, lines: list[str]) -> None:
@@ -250,61 +191,6 @@ def test_missing_columns_are_named_with_what_there_is(path: Path) -> None:
     columns["omnid2.tau3"] = columns.pop("omnid2.tua3")
     del columns["time"]
     assert "missing column 'time' for time" in refused(write_text(path, columns))
-
-
-def test_commands_of_all_robots_or_none(path: Path) -> None:
-    columns = {
-        name: values for name, values in RECORDING.columns().items() if not name.startswith("omnid3.ref")
-    }
-    assert "missing column 'omnid3.ref_x' for ref_x of robot 3" in refused(write_text(path, columns))
-    columns = {name: values for name, values in RECORDING.columns().items() if ".ref" not in name}
-    assert read_log(write_text(path, columns)).channels[-1] == "tau3"
-
-
-def test_columns_that_appear_twice(path: Path, lines: list[str]) -> None:
-    lines[0] = lines[0].replace("omnid1.phi2", "omnid1.phi1")
-    path.write_text("\n".join(lines))
-    everything = {name: replace(m, column="omnid{robot}.phi3") for name, m in JOINT.common.items()}
-    assert "missing column 'omnid1.phi2'" in refused(path)
-    lines[0] = lines[0].replace("omnid1.phi1,omnid1.phi1", "omnid1.phi1,omnid1.phi2")
-    path.write_text("\n".join([lines[0].replace("omnid1.tau1", "omnid1.tau2"), *lines[1:]]))
-    swapped = {
-        **JOINT.common,
-        "tau1": everything["phi1"],
-        "phi3": replace(JOINT.common["phi3"], column="omnid{robot}.phi1"),
-    }
-    assert "phi1 of robot 1 and phi3 of robot 1 are the same column" in refused(
-        path, replace(JOINT, common=swapped)
-    )
-    assert "column 'omnid1.tau2' appears 2 times" in refused(
-        path,
-        replace(
-            JOINT,
-            robots=1,
-            common={**JOINT.common, "tau1": replace(JOINT.common["tau1"], column="omnid2.tau1")},
-        ),
-    )
-
-
-def test_robots_are_counted_without_a_gap(path: Path) -> None:
-    columns = RECORDING.columns()
-    of_two = {name: values for name, values in columns.items() if not name.startswith("omnid3")}
-    assert read_log(write_text(path, of_two)).robots == 2
-    gap = {name: values for name, values in columns.items() if not name.startswith("omnid2")}
-    assert "columns of robots 1 and 3, but none of robot 2" in refused(write_text(path, gap))
-    assert "missing column 'omnid4.phi1'" in refused(write_text(path, columns), replace(JOINT, robots=4))
-
-
-def test_one_robot_needs_no_placeholder(path: Path) -> None:
-    columns = {name.removeprefix("omnid1."): v for name, v in RECORDING.columns().items() if "omnid1" in name}
-    write_text(path, {"time": RECORDING.time} | columns)
-    log_map = replace(JOINT, common={c: replace(m, column=c) for c, m in JOINT.common.items()})
-    log = read_log(path, log_map)
-    assert log.robots == 1
-    assert np.array_equal(log.streams[0].values, channels_of(RECORDING, 0))
-    assert "phi1 of robot 1 and phi1 of robot 2 are the same column" in refused(
-        path, replace(log_map, robots=2)
-    )
 
 
 def test_a_map_for_bags_says_so(path: Path, lines: list[str]) -> None:
@@ -341,20 +227,9 @@ def test_files_that_are_no_tables(path: Path, content: bytes, words: str) -> Non
     assert words in refused(path)
 
 
-def test_binary_rows_after_a_good_header(path: Path, lines: list[str]) -> None:
-    path.write_bytes(f"{lines[0]}\n{lines[1]}\n".encode() + os.urandom(5000).replace(b"\n", b""))
-    refused(path)
-
-
 def test_one_endless_row(path: Path, lines: list[str]) -> None:
     path.write_bytes(f"{lines[0]}\n{lines[1]}\n".encode() + b"9" * (9 << 20))
     assert "a row is longer than 4 MiB" in refused(path)
-
-
-def test_no_rows_is_an_empty_log(path: Path, lines: list[str]) -> None:
-    for text in (lines[0], lines[0] + "\n", lines[0] + "\n\n"):
-        path.write_text(text)
-        assert [len(stream.stamp_ns) for stream in read_log(path).streams] == [0, 0, 0]
 
 
 def test_truncated_anywhere_is_read_up_to_there_or_refused(path: Path, lines: list[str]) -> None:
@@ -381,10 +256,6 @@ def stamps(*texts: str | None, unit_ns: int | None = 10**9) -> list[int]:
     return read.tolist()
 
 
-def test_the_start_is_pythons() -> None:
-    assert datetime(2026, 3, 1, 12, tzinfo=UTC).timestamp() * 10**9 == START_NS
-
-
 @pytest.mark.parametrize(
     ("text", "after_ns"),
     [
@@ -405,10 +276,6 @@ def test_every_way_to_write_a_date(text: str, after_ns: int) -> None:
     assert is_date(text)
     assert stamps(text) == [START_NS + after_ns]
     assert stamps("2026-03-01T12:00:00.000Z", None, text, unit_ns=None) == [START_NS, 0, START_NS + after_ns]
-
-
-def test_dates_without_a_zone_count_as_utc() -> None:
-    assert stamps("2026-03-01T12:00:00.5", "2026-03-01 12:00:01") == [START_NS + 5 * 10**8, START_NS + 10**9]
 
 
 @settings(max_examples=60, deadline=None)
@@ -448,19 +315,6 @@ def test_what_is_no_date(texts: tuple[str | None, ...], words: str) -> None:
         stamps(*texts)
     assert str(caught.value).startswith("f: column 't' is ")
     assert words in str(caught.value)
-
-
-def test_one_form_from_block_to_block() -> None:
-    clock = TextClock(10**9, "t")
-    clock.read(pa.array([None], pa.string()), 0)
-    clock.read(pa.array(["2026-03-01T12:00:00Z"]), 1)
-    with pytest.raises(InputError, match="in row 2; all times must be with a time zone"):
-        clock.read(pa.array(["2026-03-01T12:00:00"]), 2)
-
-
-def test_numbers_where_the_map_says_dates() -> None:
-    with pytest.raises(InputError, match="the map's unit of time is 'iso', which is for dates"):
-        stamps("12.5", unit_ns=None)
 
 
 # Files
@@ -545,31 +399,11 @@ def test_faults_are_counted_by_the_lines_of_the_file(tmp_path: Path) -> None:
     )
 
 
-def test_remarks_across_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Blocks of any size cut remarks and rows anywhere."""
-    content = [line for k, row in enumerate(lines_of_dates()) for line in ([row, f"# {k}, a remark"])]
-    path = write(tmp_path / "log.csv", content)
-    for size in (2000, 3000, 5000):
-        monkeypatch.setattr(table_csv, "BLOCK_BYTES", size)
-        assert_same(read_log(path), DATES_RECORDING)
-
-
-def test_nothing_but_remarks(tmp_path: Path) -> None:
-    assert "missing column" in refused(write(tmp_path / "log.csv", ["# one", "# two"]))
-
-
 HINTS_RECORDING = small_recording(rows=60)
 
 
 def lines_of_hints(path: Path, **how: str) -> list[str]:
     return write_text(path, HINTS_RECORDING.columns(), **how).read_text().splitlines()
-
-
-def with_times(path: Path, times: list[str]) -> Path:
-    first, *rows = lines_of_hints(path)
-    cut = [f"{time},{row.partition(',')[2]}" for time, row in zip(times, rows, strict=True)]
-    path.write_text("\n".join([first, *cut]))
-    return path
 
 
 def test_columns_of_fixed_width(tmp_path: Path) -> None:
@@ -578,79 +412,3 @@ def test_columns_of_fixed_width(tmp_path: Path) -> None:
     padded = [",".join(f"  {cell} " for cell in row.split(",")) for row in rows]
     (tmp_path / "log.csv").write_text("\n".join([first, *padded]))
     assert_same(read_log(tmp_path / "log.csv"), HINTS_RECORDING)
-
-
-def test_a_decimal_comma(tmp_path: Path) -> None:
-    lines_of_hints(tmp_path / "log.csv", delimiter=";", decimal=",")
-    assert """it must hold numbers (for a decimal comma, decimal = "," in the map's [csv])""" in refused(
-        tmp_path / "log.csv"
-    )
-
-
-@pytest.mark.parametrize("form", ["01.03.2026 12:00:{:05.2f}", "12:00:{:05.2f}"])
-def test_dates_that_are_not_of_iso(tmp_path: Path, form: str) -> None:
-    """They had been called numbers where the map says dates, and the draft had said dates."""
-    path = with_times(tmp_path / "log.csv", [form.format(t) for t in HINTS_RECORDING.time])
-    assert "in row 0; a time must be a number or a date of ISO 8601, such as 2026-" in refused(path)
-    assert 'unit = "s"  # doubtful: its values cannot be read' in draft_of(path).text
-    iso = draft_of(path).text.replace('unit = "s"', 'unit = "iso"')
-    (tmp_path / "my.toml").write_text(iso)
-    from mocobot_logs.maps import read_map
-
-    assert "in row 0; a time must be a date like 2026-" in refused(path, read_map(tmp_path / "my.toml"))
-
-
-def test_a_draft_of_a_file_that_is_cut_off(tmp_path: Path) -> None:
-    """It had guessed units of values that it could not read."""
-    path = tmp_path / "log.csv"
-    content = "\n".join(lines_of_hints(path))
-    path.write_text(content[: len(content) // 2 + 100].rpartition(",")[0])
-    with pytest.raises(InputError, match=r"cells? in line \d+; every row must have 37, like the header"):
-        draft_of(path)
-
-
-def test_a_draft_of_a_file_with_a_title(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join(["Lab log 12", "Operator: me", *lines_of_hints(path)]))
-    with pytest.raises(InputError, match="line 2; every row must have 3, like the header"):
-        draft_of(path)
-
-
-SCRIPT = """
-import sys
-from pathlib import Path
-from estimator.errors import InputError
-from mocobot_logs.maps import CsvMap
-from mocobot_logs.table import text
-from mocobot_logs.table.table import Wanted
-
-text.BLOCK_BYTES = 4096
-for _ in range(60):
-    blocks = text.CsvTable(Path(sys.argv[1]), CsvMap(), "log").blocks(Wanted(("a",), (), 1), lambda _: None)
-    try:
-        next(blocks)
-        next(blocks)
-    except InputError as error:
-        print(error)
-"""
-
-
-@pytest.mark.parametrize("fault", [None, 30, 100])
-def test_a_file_left_early(tmp_path: Path, fault: int | None) -> None:
-    """pyarrow's streaming reader had its thread abort or hang the process, most times out of ten."""
-    rows = [f"{k},{k}.5,{'x' * 40}" for k in range(20_000)]
-    if fault is not None:
-        rows[fault] = f"oops{rows[fault]}"
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join(["a,b,c", *rows]))
-    for _ in range(3):
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT, path], capture_output=True, text=True, timeout=30, check=False
-        )
-        assert (done.returncode, done.stderr) == (0, "")
-        said = (
-            ""
-            if fault is None
-            else f"log: column 'a' holds 'oops{fault}' in line {fault + 2}; it must hold numbers\n"
-        )
-        assert done.stdout == said * 60

@@ -15,9 +15,7 @@ from estimator import inputs
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from log_files import assert_same, channels_of, column, read_log, refused, write_lerobot
-from mocobot_logs.maps import TimeMap, builtin_map
-from mocobot_logs.open_log import open_log
-from mocobot_logs.table import table as tables
+from mocobot_logs.maps import builtin_map
 from recordings import metadata, small_recording
 
 RECORDING = small_recording(rows=60)
@@ -88,38 +86,6 @@ def test_own_metadata_are_checked(path: Path, table: pa.Table) -> None:
 # Those of others
 
 
-@pytest.mark.parametrize("kind", [pa.float32(), pa.float16(), pa.decimal128(20, 9), pa.int8()])
-def test_types_of_numbers(path: Path, table: pa.Table, kind: pa.DataType) -> None:
-    plain = table.replace_schema_metadata(None).cast(
-        pa.schema([(n, pa.float64() if n == "time" else kind) for n in table.column_names]), safe=False
-    )
-    pq.write_table(plain, path)
-    expected = np.stack([plain[f"omnid3.{c}"].cast(pa.float64()).to_numpy() for c in JOINT.names], axis=1)
-    assert np.array_equal(read_log(path).streams[2].values, expected)
-
-
-def test_empty_cells(path: Path, table: pa.Table) -> None:
-    """Null as in a merged table: robot 2 takes every second row."""
-    plain = table.replace_schema_metadata(None)
-    for name in plain.column_names:
-        if name.startswith("omnid2."):
-            plain = column(plain, name, [None if k % 2 else v for k, v in enumerate(plain[name].to_pylist())])
-    pq.write_table(plain, path)
-    log = read_log(path)
-    assert np.array_equal(log.streams[1].values, channels_of(RECORDING, 1)[::2])
-    assert np.array_equal(log.streams[1].stamp_ns, log.streams[0].stamp_ns[::2])
-
-
-@pytest.mark.parametrize("kind", [pa.timestamp("ns"), pa.timestamp("us", "Europe/Vienna"), pa.int64()])
-def test_stamps_of_the_unix_time(path: Path, table: pa.Table, kind: pa.DataType) -> None:
-    stamps = 1_700_000_000_123_456_000 + 10_000_000 * np.arange(60)
-    plain = table.replace_schema_metadata(None)
-    values = pa.array(stamps).cast(pa.timestamp("ns")).cast(kind) if kind != pa.int64() else pa.array(stamps)
-    pq.write_table(plain.set_column(0, "time", values), path)
-    log = read_log(path, replace(JOINT, time=TimeMap("time", "ns")))
-    assert np.array_equal(log.streams[0].stamp_ns, stamps)
-
-
 def test_lists_of_fixed_and_of_open_length(path: Path) -> None:
     columns = {"time": pa.array(RECORDING.time)}
     for name in ("phi", "theta", "tau"):
@@ -151,48 +117,11 @@ def test_lists_of_fixed_and_of_open_length(path: Path) -> None:
     )
 
 
-def test_lists_of_several_lengths(path: Path, table: pa.Table) -> None:
-    """One short row, one that makes up for it, and an inner list that is not there."""
-    rows = RECORDING.phi[:, 0].tolist()
-    nested = RECORDING.phi.tolist()
-    fixed = pa.list_(pa.list_(pa.float64(), 3), 3)
-    cases = [
-        ("(3,)", pa.array([*rows[:40], rows[40][:2], *rows[41:]])),
-        ("(3,)", pa.array([*rows[:40], rows[40][:2], [*rows[41], 0.5], *rows[42:]])),
-        ("(3, 3)", pa.array([*nested[:40], [[1.0] * 3, None, [1.0] * 3], *nested[41:]], fixed)),
-    ]
-    for shape, values in cases:
-        pq.write_table(table.replace_schema_metadata(None).append_column("phi", values), path)
-        index = "[0]" if shape == "(3,)" else "[0, 0]"
-        common = {**JOINT.common, "phi1": replace(JOINT.common["phi1"], column=f"phi{index}")}
-        message = refused(path, replace(JOINT, common=common, robots=1))
-        assert f"column 'phi' has rows of different lengths; all must have the shape {shape}" in message
-
-
-@pytest.mark.parametrize("values", [["a"] * 60, [True] * 60, [b"x"] * 60], ids=["text", "bool", "binary"])
-@pytest.mark.parametrize("name", ["time", "omnid2.tau1"])
-def test_columns_that_hold_no_numbers(path: Path, table: pa.Table, values: list[object], name: str) -> None:
-    pq.write_table(column(table.replace_schema_metadata(None), name, values), path)
-    assert f"column '{name}' holds " in refused(path)
-    assert "it must hold numbers" in refused(path)
-
-
 def test_a_recording_with_a_map_is_read_by_the_map(path: Path, table: pa.Table) -> None:
     common = {**JOINT.common, "tau1": replace(JOINT.common["tau1"], scale=-1.0)}
     log = read_log(path, replace(JOINT, common=common))
     assert np.array_equal(log.streams[0].values[:, 6], -RECORDING.tau[:, 0, 0])
     assert log.metadata == RECORDING.metadata
-
-
-def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tables, "CELLS", 1)
-    recording = small_recording(rows=333)
-    write_recording(recording, path)
-    source, steps = open_log(path), []
-    assert len(list(source.chunks(steps.append))) >= 3
-    assert len(steps) == 6
-    assert sum(steps) == source.size == 333
-    assert_same(read_log(path), recording)
 
 
 def test_a_bomb(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,24 +133,6 @@ def test_a_bomb(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert read_log(path).robots == 3  # 118 MB do no harm
     monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
     assert "unpacks to at least 0.1103 GiB; the limit is 0.0" in refused(path)
-
-
-def test_no_rows_is_an_empty_log(path: Path, table: pa.Table) -> None:
-    for empty in (table.slice(0, 0), table.slice(0, 0).replace_schema_metadata(None)):
-        pq.write_table(empty, path)
-        assert [len(stream.stamp_ns) for stream in read_log(path).streams] == [0, 0, 0]
-
-
-def test_column_twice(path: Path, table: pa.Table) -> None:
-    pq.write_table(table.append_column("omnid1.phi1", table["time"]), path)
-    assert "column 'omnid1.phi1' appears more than once" in refused(path)
-
-
-def test_a_name_of_a_column_that_is_no_text(path: Path, table: pa.Table) -> None:
-    pq.write_table(table.replace_schema_metadata(None), path, store_schema=False)
-    name = table.schema.names[-1].encode()
-    path.write_bytes(path.read_bytes().replace(name, b"\xff" + name[1:]))
-    assert "damaged one ('utf-8' codec can't decode byte 0xff" in refused(path)
 
 
 LEROBOT_JOINT = builtin_map("mocobot")
@@ -260,22 +171,10 @@ def test_which_episode_must_be_said(dataset: Path) -> None:
     assert "there is no episode -1" in refused(dataset, episode=-1)
 
 
-def test_the_only_episode_need_not_be_named(tmp_path: Path, episodes: list[Recording]) -> None:
-    assert_same(read_log(write_lerobot(tmp_path / "set", episodes[:1])), episodes[0])
-
-
 def test_episodes_are_of_lerobot_only(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
     write_recording(small_recording(rows=60), path)
     assert "is not a LeRobot dataset, so it has no episode 0" in refused(path, episode=0)
-
-
-def test_a_recording_that_merely_lies_there(dataset: Path) -> None:
-    recording = small_recording(rows=60)
-    write_recording(recording, dataset / "data" / "chunk-000" / "own.parquet")
-    log = read_log(dataset / "data" / "chunk-000" / "own.parquet")
-    assert_same(log, recording)
-    assert log.metadata == recording.metadata
 
 
 def test_numbers_by_index_and_by_feature_and_name(dataset: Path, episodes: list[Recording]) -> None:
@@ -284,20 +183,6 @@ def test_numbers_by_index_and_by_feature_and_name(dataset: Path, episodes: list[
     common["tau1"] = replace(common["tau1"], column="observation.effort.omnid{robot}.tau1")
     log = read_log(dataset, replace(LEROBOT_JOINT, common=common, robots=1), episode=1)
     assert np.array_equal(log.streams[0].values, channels_of(episodes[1], 0))
-
-
-def test_own_timestamps_are_kept(dataset: Path, episodes: list[Recording]) -> None:
-    """A dataset whose stamps are not those of its frames was sampled unevenly."""
-    file = dataset / "data" / "chunk-000" / "file-000.parquet"
-    table = pq.read_table(file)
-    stamps = table["timestamp"].to_numpy() + np.float32(0.003) * np.random.default_rng(1).uniform(
-        size=len(table)
-    )
-    pq.write_table(column(table, "timestamp", np.float32(stamps)), file)
-    log = read_log(dataset, episode=0)
-    assert np.array_equal(
-        log.streams[0].stamp_ns, np.rint(1e9 * np.float64(np.float32(stamps[:50]))).astype(np.int64)
-    )
 
 
 @pytest.mark.parametrize(
@@ -326,12 +211,6 @@ def test_info_is_checked(dataset: Path, change: dict[str, object], words: str) -
     assert words in refused(dataset, episode=0)
 
 
-@pytest.mark.parametrize("content", [b"", b"[]", b"{", b"\xff", b"[" * 100_000, b"9" * 10_000])
-def test_info_that_is_no_object(dataset: Path, content: bytes) -> None:
-    (dataset / "meta" / "info.json").write_bytes(content)
-    assert "info.json" in refused(dataset, episode=0)
-
-
 def test_damaged_datasets(dataset: Path) -> None:
     data, listing = (dataset / part / "chunk-000" / "file-000.parquet" for part in ("data", "meta/episodes"))
     table, names = pq.read_table(data), pq.read_table(listing)
@@ -348,19 +227,6 @@ def test_damaged_datasets(dataset: Path) -> None:
     assert "not a readable Parquet file, or a damaged one" in refused(dataset, episode=0)
     data.unlink()
     assert "has no Parquet files under data" in refused(dataset, episode=0)
-
-
-@pytest.mark.parametrize(
-    ("file", "column"),
-    [("data/chunk-000/file-000.parquet", b"frame_index"), ("meta/episodes", b"data/chunk_index")],
-)
-def test_names_of_columns_that_are_no_text(dataset: Path, file: str, column: bytes) -> None:
-    path = dataset / file
-    path = path if path.is_file() else next(path.glob("*/*.parquet"))
-    content = path.read_bytes()
-    path.write_bytes(content.replace(column, b"\xff" + column[1:]))
-    assert path.read_bytes() != content
-    assert "damaged one ('utf-8' codec can't decode byte 0xff" in refused(dataset, episode=0)
 
 
 def test_directories_that_are_no_logs(tmp_path: Path) -> None:
