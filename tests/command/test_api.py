@@ -22,7 +22,9 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 ROWS = [
-    name for cell in re.findall(r"^\| (`.+?) \| ", PAGE, re.MULTILINE) for name in re.findall(r"`([\w.]+)", cell)
+    name
+    for cell in re.findall(r"^\| (`.+?) \| ", PAGE, re.MULTILINE)
+    for name in re.findall(r"`([\w.]+)", cell)
 ]
 """Names in the first column of the page's tables."""
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
-import re
 import subprocess
 import sys
 import tomllib
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -80,7 +77,6 @@ def with_value(row: int, value: float) -> Callable[[np.ndarray], np.ndarray]:
 
 THETA = [f"omnid{i}.theta_{axis}" for i in (1, 2, 3) for axis in "zyx"]
 PHI = [f"omnid{i}.phi{k}" for i in (1, 2, 3) for k in (1, 2, 3)]
-TAU = [f"omnid{i}.tau{k}" for i in (1, 2, 3) for k in (1, 2, 3)]
 
 
 @pytest.mark.parametrize(
@@ -116,48 +112,6 @@ def test_bad_recording_is_refused(recording, tmp_path, capsys, edit, words):
     assert [path.name for path in tmp_path.iterdir()] == ["bad.parquet"]
 
 
-def test_exchanged_robots_in_one_of_two_recordings(recording, tmp_path, capsys):
-    bad = tmp_path / "swapped.parquet"
-    suffixes = [
-        name.split(".")[1] for name in pq.read_table(recording).column_names if name.startswith("omnid1.")
-    ]
-    pq.write_table(
-        exchange([(f"omnid1.{c}", f"omnid2.{c}") for c in suffixes])(pq.read_table(recording)), bad
-    )
-    message = refused(capsys, "estimate", str(recording), str(bad))
-    assert "disagree" in message
-    assert "robots 1 and 2" in message
-
-
-def test_torques_of_two_robots_exchanged_are_flagged(recording, tmp_path, capsys):
-    bad = tmp_path / "tau.parquet"
-    pq.write_table(
-        exchange([(f"omnid2.tau{k}", f"omnid3.tau{k}") for k in (1, 2, 3)])(pq.read_table(recording)), bad
-    )
-    code, out, err = run(capsys, "estimate", str(bad), "--strict")
-    assert code == 1
-    assert err.startswith("mocobot: the estimate is flagged: ")
-    assert "p_1c:         not determined" in out
-    assert "the wrenches contradict each other" in out
-    assert "check the signs and columns of the torques" in out
-
-
-def test_no_motion_gives_no_number(recording, tmp_path, capsys):
-    """Every channel at its first value but for a little noise: a hold, so the mass is known, and nothing else."""
-    still, out = tmp_path / "still.parquet", tmp_path / "est.json"
-    hold = columns(PHI + THETA, lambda v: np.full_like(v, v[0]))(pq.read_table(recording))
-    pq.write_table(columns(TAU, lambda v: v[0] + 1e-6 * np.cos(np.arange(len(v))))(hold), still)
-    code, text, _ = run(capsys, "estimate", str(still), "--out", str(out))
-    estimate = json.loads(out.read_text())
-    assert code == 0
-    assert estimate["grasps"] is None
-    assert estimate["com"] is None
-    assert estimate["inertia"] is None
-    assert estimate["mass"]["m_kg"] == pytest.approx(11.672, rel=0.02)
-    assert len(estimate["undetermined"]) >= 6
-    assert "[[Not determined]]" in text
-
-
 def test_estimate_of_a_simulated_trial(recording, tmp_path, capsys):
     out = tmp_path / "est.json"
     code, text, _ = run(capsys, "estimate", str(recording), "--out", str(out), "--strict")
@@ -191,9 +145,6 @@ def test_same_seed_same_bytes_in_place_of_others(recording, tmp_path):
     assert sorted(path.parent.iterdir()) == [path, truth]
 
 
-COMMANDS = ("paper", "estimate", "diagnose", "simulate", "convert", "inspect", "replay", "report")
-
-
 def test_help_lists_commands_by_task_with_examples_that_can_be_read():
     """And needs no numpy: test_api."""
     done = subprocess.run(
@@ -213,48 +164,6 @@ def test_help_lists_commands_by_task_with_examples_that_can_be_read():
 def test_version(capsys, arguments):
     written = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]["version"]
     assert run(capsys, *arguments) == (0, f"mocobot {written}\n", "")
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_help_of_a_command(capsys, name):
-    code, out, err = run(capsys, name, "--help")
-    assert (code, err) == (0, "")
-    assert f"usage: mocobot {name}" in out
-
-
-@pytest.mark.parametrize("terminal", [True, False])
-def test_a_simulation_shows_how_much_there_is(tmp_path, monkeypatch, capsys, terminal):
-    """On standard error, on terminals only."""
-
-    class Screen(io.StringIO):
-        def isatty(self) -> bool:
-            return terminal
-
-    screen = Screen()
-    monkeypatch.setattr(sys, "stderr", screen)
-    main(["simulate", "--vias", "1", "--out", str(tmp_path / "rec.parquet")])
-    assert "s of random motion" in capsys.readouterr().out
-    shown = screen.getvalue()
-    if terminal:
-        (seconds,) = set(re.findall(r"random trial: +\d+%\|.*?\| [\d.]+ of ([\d.]+) s \[", shown))
-        assert float(seconds) == len(pq.read_table(tmp_path / "rec.parquet")) / 100.0
-    else:
-        assert shown == ""
-
-
-def test_a_pool_that_renews_its_workers_says_nothing(capsys, monkeypatch):
-    """On a busy machine joblib warns of workers that idled; any other warning is still one."""
-    told = "A worker stopped while some jobs were given to the executor. This can be caused by a too short timeout."
-    monkeypatch.setattr(
-        "mocobot.cli._command", lambda name: lambda options: warnings.warn(told, stacklevel=1)
-    )
-    main(["effects"])
-    assert capsys.readouterr().err == ""
-    monkeypatch.setattr(
-        "mocobot.cli._command", lambda name: lambda options: warnings.warn("odd", stacklevel=1)
-    )
-    with pytest.raises(UserWarning, match="odd"):
-        main(["effects"])
 
 
 TOML = """
@@ -293,24 +202,6 @@ def test_a_file_says_what_the_command_line_would(file):
     assert (simulate.out, simulate.vias) == (Path("trials"), 4)
 
 
-def test_earlier_spellings_are_taken(capsys):
-    for earlier, now in (
-        (
-            "simulate --duration 9 --out-dir a --trials static",
-            "simulate --duration-s 9 --out a --trials static",
-        ),
-        ("replay a --save b.rrd", "replay a --out b.rrd"),
-        ("convert a --rate 50 b --max-gap=1", "convert a --rate-hz=50 b --max_gap_s 1"),
-        ("convert --out b a --force", "convert a b --force"),
-    ):
-        assert parsed(*earlier.split()) == parsed(*now.split())
-    said = refused(capsys, "replay", "a", "--save", "b.rrd", "--out", "c.rrd")
-    assert "--save and --out are two names of one option; give one of them" in said
-    assert "--duration is for a periodic" in refused(
-        capsys, "simulate", "--duration", 9, "--out", "a.parquet"
-    )
-
-
 def test_the_command_line_goes_before_the_file(file):
     options = parsed(
         "diagnose", "a.parquet", "--config", file, "--jobs=1", "--closed-loop", "--exclude", "slosh"
@@ -339,13 +230,6 @@ def test_the_command_line_goes_before_the_file(file):
 def test_a_file_of_options_is_refused(file, capsys, text, said):
     file.write_text(text)
     assert said in refused(capsys, "diagnose", "a.parquet", "--config", file)
-
-
-def test_what_the_command_line_says_is_not_said_of_the_file(file, capsys):
-    file.write_text("[diagnose]\njobs = 2\nodds = 0.1\n")
-    said = refused(capsys, "diagnose", "a.parquet", "--config", file, "--odds", "-3")
-    assert said == "mocobot: --odds is -3; it must be greater than 0 and at most 1000"
-    assert "mine.toml" not in said
 
 
 def test_a_file_that_is_not_there(capsys, tmp_path):

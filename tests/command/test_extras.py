@@ -89,30 +89,6 @@ def test_a_trial_has_the_same_bits_without_numba():
     assert with_it[1] == "True"
 
 
-def test_drives_have_the_same_bits_without_numba(monkeypatch):
-    from mocobot_sim import kernels
-    from mocobot_sim.kernels import update_drives
-
-    rng = np.random.default_rng(4)
-    addresses = [rng.permutation(20)[:8].reshape(2, 4) for _ in range(3)]
-    fixed = [rng.standard_normal(20), rng.standard_normal(20)]
-    kinematics = [rng.standard_normal((4, 3)), rng.standard_normal((3, 4)), (2.0, 1.5, 4.0, 3.0, 1e-3)]
-    plan = [rng.standard_normal((2, 3)), rng.standard_normal((2, 3))]
-    changed = [rng.standard_normal(shape) for shape in ((20,), (2, 3), (2, 4), (2, 4), (2, 4))]
-
-    def after(update) -> list[np.ndarray]:
-        ctrl, *others = (array.copy() for array in changed)
-        update(*fixed, ctrl, *addresses, *kinematics, *plan, *others)
-        return [ctrl, *others]
-
-    machine = after(update_drives)
-    monkeypatch.setattr(kernels, "njit", None)
-    plain = after(kernels.entry(update_drives.py_func))
-    for one, other, before in zip(machine, plain, changed, strict=True):
-        assert not np.array_equal(one, before)
-        np.testing.assert_array_equal(one, other)
-
-
 @pytest.fixture
 def no_plots(monkeypatch):
     """As where neither matplotlib nor pillow is installed."""
@@ -256,16 +232,6 @@ def test_an_interrupted_run_goes_on_with_the_same_bits(tmp_path, reference, monk
     assert len(simulated) == 5, "trials were simulated again"
     store.drop()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_parts_of_another_run_are_kept_unless_told(tmp_path):
-    Store(tmp_path, "one", force=False).put("stage", 0, 1.5)
-    with pytest.raises(experiment.InputError, match="holds parts of an interrupted run with other options"):
-        Store(tmp_path, "two", force=False)
-    assert Store(tmp_path, "one", force=False).get("stage", 0) == 1.5
-    assert not Store(tmp_path, "two", force=True).has("stage", 0)
-    assert [path.name for path in (tmp_path / PARTIAL).iterdir()] == ["two"]
-    assert PARTIAL == FOLDER
 
 
 def test_a_run_killed_while_it_writes_its_results_goes_on_without_force(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 import command
 import mocobot
-from estimator.recording.parquet import read_recording, write_recording
+from estimator.recording.parquet import read_recording
 from mocobot_view.payload import BodyFacts, Grasps
 from mocobot_view.replay_trial import replay_trial
 from mocobot_view.stream import summary
@@ -39,20 +38,6 @@ def test_simulate_writes_the_same_as_from_python(free, tmp_path, capsys):
     assert truth["as_built"] == carrying["as_built"][:2], "one seed is one team"
 
 
-def test_a_payload_says_how_many_robots_there_are(tmp_path, capsys):
-    arguments = ["--trajectory", "free", "--payload", "a", "--robots", 3, "--out", tmp_path / "new.parquet"]
-    sentence = "--payload and --robots are both given; a payload says how many robots there are"
-    assert command.refused(capsys, "simulate", *arguments) == f"mocobot: {sentence}"
-
-
-@pytest.mark.parametrize(("name", "done"), [("estimate", "estimated"), ("diagnose", "diagnosed")])
-def test_nothing_comes_of_a_payload(free, capsys, name, done):
-    assert command.refused(capsys, name, free) == (
-        f"mocobot: {free}: trial is 'free': the robots hold nothing, so nothing can be {done}; "
-        "mocobot calibrate --free takes it"
-    )
-
-
 def test_inspect_leaves_out_what_needs_a_payload(free, capsys):
     code, said, _ = command.run(capsys, "inspect", free, "--strict")
     assert code == 0
@@ -68,18 +53,6 @@ def test_inspect_leaves_out_what_needs_a_payload(free, capsys):
     assert told["log"]["free"] is True
     assert told["clocks"] is told["wiring"] is told["excitation"]["as_it_is"] is None
     assert told["segments"]["moving_s"] > 3.0
-
-
-def test_inspect_still_looks_at_every_channel(free, tmp_path):
-    recording = read_recording(free)
-    phi = recording.phi.copy()
-    phi[900:1000, 0, 1] = phi[900, 0, 1]  # in the midst of the haste
-    write_recording(replace(recording, phi=phi), tmp_path / "stuck.parquet")
-    found = mocobot.inspect(tmp_path / "stuck.parquet")
-    assert ["omnid1.phi2 is stuck from 9.00 s" in f.sentence for f in found.findings] == [True]
-    assert found.ready_for == (
-        f"ready for: nothing as it is; with the 1 s left out in which omnid1.phi2 stands still: {READY}"
-    )
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".mcap", ".csv"])
@@ -106,17 +79,6 @@ def test_convert_goes_round(free, tmp_path, capsys, suffix):
         target = tmp_path / "refused.parquet"
         assert sentence in command.refused(capsys, "convert", there, target, *trial, *options)
         assert not target.exists()
-
-
-def test_a_map_may_say_that_the_robots_hold_nothing(free, tmp_path, capsys):
-    log, log_map = tmp_path / "log.csv", tmp_path / "map.toml"
-    command.run(capsys, "convert", free, log)
-    command.run(capsys, "map", log, "--out", log_map)
-    log_map.write_text(log_map.read_text().replace("version = 1", 'version = 1\ntrial = "free"', 1))
-    assert mocobot.inspect(log, map=log_map).free
-    assert not mocobot.inspect(log).free
-    assert command.run(capsys, "inspect", log, "--map", log_map)[1].rstrip().endswith(f"ready for: {READY}")
-    assert "the robots hold nothing" in command.refused(capsys, "estimate", log, "--map", log_map)
 
 
 def test_replay_draws_the_robots_alone(free, tmp_path, capsys):

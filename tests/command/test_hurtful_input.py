@@ -9,27 +9,20 @@ import sys
 import time
 import tomllib
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from command import refused, run
 from discrepancy.joints.model import load_model
 from estimator.errors import InputError
 from estimator.recording.parquet import write_recording
-from estimator.strict import parse_json, read_json, read_toml
-from invented_calibration import invented_calibration
+from estimator.strict import read_json, read_toml
 from mocobot_logs.maps import read_map
 from mocobot_logs.open_log import open_log
-from mocobot_report.plots_calibration import save_plots
-from mocobot_sim.plots_plain import plain_numbers, plain_words
 from mocobot_sim.scene.payload import load_payload
 from recordings import small_recording
 
-SRC = Path(__file__).resolve().parents[2] / "src"
 ESCAPE = "\x1b[31m"
 
 
@@ -88,14 +81,6 @@ def test_boundless_toml(tmp_path, text, said):
         with pytest.raises(InputError, match=said):
             read(file)
     assert time.monotonic() - begin < 10.0
-
-
-def test_plain_toml_is_read(tmp_path):
-    file = tmp_path / "file.toml"
-    file.write_text("# " + "a." * 30 + "\na.b.'c.d' = [[1, 2.5], ['" + "x." * 60 + "']]\n[e]\nf = 0x7fff\n")
-    assert read_toml(file, "file")["a"]["b"]["c.d"][0] == [1, 2.5]
-    with pytest.raises(InputError, match="more than 64 levels"):
-        parse_json("{" + '"a":{' * 70 + "}" * 71, "file")
 
 
 @pytest.mark.parametrize(
@@ -183,15 +168,6 @@ def test_a_truth_that_cannot_be_read_is_told_before_the_work(tmp_path, capsys):
     assert "rec.truth.json: not valid JSON" in refused(capsys, "diagnose", tmp_path / "rec.parquet")
 
 
-def test_help_in_a_narrow_terminal():
-    done = subprocess.run(
-        [sys.executable, "-m", "mocobot", "--help"], env=os.environ | {"COLUMNS": "5"}, capture_output=True, timeout=60,
-        check=False,
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert b"estimate" in done.stdout
-
-
 def test_control_characters_are_shown_escaped(tmp_path, capsys, monkeypatch):
     shown = "\\x1b[31m"
     assert shown in refused(capsys, "inspect", tmp_path / f"{ESCAPE}.csv")
@@ -201,33 +177,6 @@ def test_control_characters_are_shown_escaped(tmp_path, capsys, monkeypatch):
     file.write_text("time\u00a0[s],x\n" + "".join(f"{k / 100},{k}\n" for k in range(300)), encoding="utf-8")
     code, draft, _ = run(capsys, "map", file)
     assert (code, tomllib.loads(draft)["time"]["column"]) == (0, "time\u00a0[s]")
-
-
-def test_names_like_formulas_are_drawn_as_they_are(tmp_path):
-    found = invented_calibration()
-    names = (r"$\frac{$_x", "_y$", f"$${ESCAPE}", "日$^_$")
-    trials = tuple(replace(trial, name=names[k % len(names)]) for k, trial in enumerate(found.trials))
-    assert len(save_plots(replace(found, trials=trials), tmp_path)) == 3
-    with plain_words():
-        figure = Figure()
-        axis = figure.subplots()
-        axis.set_xscale("log")
-        axis.set_xlim(2e-4, 3e3)
-        plain_numbers(axis.xaxis)
-        axis.set_title("$a_b$")
-        FigureCanvasAgg(figure).draw()
-        assert "0.001" in [label.get_text() for label in axis.get_xticklabels()]
-        assert not axis.title.get_parse_math()
-
-
-def test_every_picture_and_every_pool_is_of_that_kind():
-    texts = {path: path.read_text(encoding="utf-8") for path in SRC.rglob("*.py")}
-    drawn = [text for text in texts.values() if "FigureCanvasAgg(" in text]
-    assert len(drawn) >= 3
-    assert all("@plain_words()" in text or "parse_math=False" in text for text in drawn)
-    pools = [text for text in texts.values() if " Parallel(" in text]
-    assert len(pools) >= 3
-    assert all("**ends_with_this()" in text for text in pools)
 
 
 COMMAND = """

@@ -147,11 +147,6 @@ def test_refused_and_nothing_written(tmp_path, capsys, log, case):
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_no_time_is_refused_in_python_as_on_the_command_line(tmp_path, log):
-    with pytest.raises(InputError, match="seconds is 0; it must be above 0"):
-        serial.diagnose(tmp_path / "arm.xml", log, seconds=0)
-
-
 def test_a_log_without_torques_or_a_model_with_other_joints(tmp_path, capsys, values):
     log = write_log(tmp_path, values)
     write_map(tmp_path, MAP.replace('torque = { column = "{joint} torque", unit = "Nm" }\n', ""))
@@ -221,32 +216,6 @@ def test_every_command_takes_a_cause_at_the_last_joint(tmp_path, capsys, joints)
     assert code == 0
     entities = {str(path) for path in RrdReader(tmp_path / "log.rrd").store().schema().entity_paths()}
     assert f"/log/series/joint{joints}/torque/model" in entities
-
-
-@pytest.mark.parametrize("joint", [0, 4, 1.5, "1"])
-def test_a_team_s_robots_have_three_joints(tmp_path, capsys, joint):
-    """In a file that somebody has changed; a robot of a team is numbered, any other is not."""
-    cause = {"cause": "friction", "robot": 1, "joint": joint, "sentence": "", "kind": "", "name": ""}
-    values = {
-        "format": "mocobot-diagnosis",
-        "version": 2,
-        "verdict": "explained",
-        "recordings": [],
-        "causes": [cause],
-    }
-    path = tmp_path / "diagnosis.json"
-    path.write_text(json.dumps(values))
-    assert f"diagnosis.json: not a complete diagnosis (ValueError: joint is {joint!r})" in refused(
-        capsys, "compare", path, path
-    )
-
-
-@pytest.mark.parametrize("command", [("watch",), ("inspect",), ("convert", "x.parquet")])
-def test_a_map_of_joints_where_a_team_is_meant(tmp_path, capsys, command):
-    log = write_chain_log(tmp_path, 1, 1, seconds=1.0)
-    said = refused(capsys, command[0], log, "--map", tmp_path / "log.toml", *command[1:])
-    assert "log.toml: is of one robot's joints, not of a team" in said
-    assert "read its log with --model" in said
 
 
 WITH_FINGERS = MODEL.replace(

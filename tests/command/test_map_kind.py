@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import mocobot
 from command import run
 from joint_logs import write_csv
-from made_arm import JOINTS, chain, made, write_model
+from made_arm import chain, made, write_model
 
 TIME = np.arange(400) / 100.0
 NAMES = {
@@ -88,26 +88,6 @@ def test_a_teams_log_still_gets_a_map_of_robots(tmp_path, capsys, where):
     assert tomllib.loads(out)["level"] == "joint"
 
 
-def test_the_joint_states_of_a_bag_get_a_map_of_joints(tmp_path, capsys):
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    stamp, header = types.types["builtin_interfaces/msg/Time"], types.types["std_msgs/msg/Header"]
-    kind = "sensor_msgs/msg/JointState"
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        topic = bag.add_connection("/joint_states", kind, typestore=types)
-        for k, at in enumerate(TIME):
-            values = np.sin(at + np.arange(3.0))
-            said = types.types[kind](
-                header=header(stamp=stamp(sec=k // 100, nanosec=k % 100 * 10_000_000), frame_id=""),
-                name=list(JOINTS), position=values, velocity=values, effort=values,
-            )  # fmt: skip
-            bag.write(topic, round(1e9 * at), bytes(types.serialize_cdr(said, kind)))
-    code, out, err = run(capsys, "map", tmp_path / "bag")
-    assert code == 0
-    assert "3 joints" in err
-    assert tomllib.loads(out)["joints"] == list(JOINTS)
-    assert "named after the log" not in out
-
-
 FRANKA = "std_msgs/Header header\nfloat64[7] q\nfloat64[7] q_d\nfloat64[7] dq\nfloat64[7] tau_J\nfloat64[7] dtau_J\n"
 
 
@@ -130,12 +110,3 @@ def test_the_state_of_a_franka_gets_a_map_of_joints(tmp_path, capsys):
     np.testing.assert_array_equal(read.q, q)
     np.testing.assert_array_equal(read.torque, torque)
     assert read.drive.link_side.all()
-
-
-def test_arrays_of_a_franka_get_a_map_of_joints(tmp_path, capsys):
-    q = np.sin(TIME[:, None] + np.arange(7.0))
-    np.savez(tmp_path / "log.npz", time=TIME, q=q, dq=q, tau_J=q, tau_J_d=q)
-    code, out, err = run(capsys, "map", tmp_path / "log.npz")
-    assert code == 0
-    assert "7 joints" in err
-    assert tomllib.loads(out)["channels"]["link_torque"] == {"column": "tau_J[{index}]", "unit": "Nm"}

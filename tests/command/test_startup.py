@@ -10,10 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from command import refused, run
-from mocobot.cli import COMMANDS
-from mocobot.option_types import TrialKind as Kind
-
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = {"numpy", "scipy", "pyarrow", "mujoco", "dm_control", "numba", "matplotlib", "plotly", "joblib"}
 REFUSED = {
@@ -54,10 +50,6 @@ NUMBERS = {
     "law:target=tau_2_1,function=linear,of=pi,amplitude=1": "of is 'pi'; it must be one of",
 }
 """Mistakes in the numbers of an effect."""
-
-
-def test_every_command_refuses_something_at_once():
-    assert set(REFUSED) == set(COMMANDS)
 
 
 @pytest.mark.parametrize("name", REFUSED | NAMES_AND_FILES)
@@ -139,14 +131,6 @@ def test_matrices_have_one_thread_whatever_is_imported_first(first):
     assert found == {"numpy.linalg._umath_linalg": "1", "scipy.linalg._fblas": "1"}
 
 
-def test_kinds_of_trials_are_those_of_recordings():
-    from typing import get_args
-
-    from estimator.recording.metadata import TRIALS
-
-    assert get_args(Kind) == tuple(TRIALS)
-
-
 def test_simulating_needs_numba_only_when_it_runs():
     """Nor does it filter anything: ``scipy.signal`` takes 0.4 s to load."""
     code = (
@@ -180,11 +164,3 @@ def test_machine_code_goes_to_the_users_cache(tmp_path, home):
     assert done.returncode == 0, done.stderr
     kept = done.stdout.strip()
     assert kept.startswith(str(cache)) if home else kept == "nowhere"
-
-
-def test_a_completion_is_written_where_it_can_be(tmp_path, capsys):
-    code, _, _ = run(capsys, "--tyro-write-completion", "bash", tmp_path / "mocobot")
-    assert code == 0
-    assert "campaign" in (tmp_path / "mocobot").read_text()
-    said = refused(capsys, "--tyro-write-completion", "bash", tmp_path / "none" / "mocobot")
-    assert "cannot be written" in said

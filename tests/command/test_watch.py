@@ -123,11 +123,6 @@ def test_the_page_is_opened(trial, capsys, monkeypatch, no_diagnosis):
     assert Path(address.removeprefix("file://")).is_file()
 
 
-def test_names_of_recordings_are_told_apart(tmp_path, capsys):
-    files = [tmp_path / "a" / "trial.parquet", tmp_path / "b" / "trial.parquet"]
-    assert "trial is the name of two recordings" in refused(capsys, "watch", *files)
-
-
 def test_a_log_with_a_hole_is_cut_and_one_that_cannot_be_used_left_out(trial, tmp_path, capsys, no_diagnosis):
     """One hole or one stamp that runs back had ended the command for all files."""
     columns, out = read_recording(trial).columns(), tmp_path / "seen"

@@ -5,7 +5,6 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import BaseDesign, MecanumKinematics, axle_share, base_design
@@ -13,7 +12,6 @@ from mocobot_sim.base.drive import (
     BaseDrive,
     DriveLog,
     FollowingDrive,
-    Snapshots,
     build_solo,
     compile_solo,
     drive_solo,
@@ -21,8 +19,7 @@ from mocobot_sim.base.drive import (
 from mocobot_sim.guided import FLOAT_GAINS, FloatArms, PushingHand
 from mocobot_sim.kernels import update_drives
 from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.scene.team_index import BaseIndex, TeamIndex
-from mocobot_sim.trial.assemble import assemble_at_home
+from mocobot_sim.scene.team_index import BaseIndex
 from mocobot_sim.trial.trajectories import (
     RATE_HZ,
     Leg,
@@ -30,7 +27,6 @@ from mocobot_sim.trial.trajectories import (
     Trajectory,
     carried,
     compose,
-    moved,
     plan,
     relative,
     yaw_of,
@@ -83,24 +79,6 @@ def test_a_base_goes_where_it_is_sent(model, way):
     assert textbook.true[-1, 0, k] / to[k] == pytest.approx(share, abs=1.5e-3)
     if way == "sideways":
         assert textbook.true[-1, 0, k] / to[k] < 0.991  # so the correction is needed
-
-
-def test_fewer_rollers_lose_more_sideways():
-    """Eight rollers: 2.6 %. The half length makes them as round as eight can be."""
-    design = dataclasses.replace(DESIGN, rollers=8, roller_mass_kg=0.045, roller_half_length_m=0.0422)
-    model = compile_solo(build_solo(design))
-    log = _go(model, (0.0, 0.5, 0.0), MecanumKinematics.textbook(design), design=design)
-    assert log.true[-1, 0, 1] / 0.5 == pytest.approx(axle_share(design), abs=4e-3)
-    assert axle_share(design) == pytest.approx(0.9745, abs=1e-4)
-
-
-def test_curves_are_driven_too(model):
-    """Forward, sideways and turning at once, and on to another pose."""
-    motion = plan((0.0, 0.0, 0.0), [Leg((0.4, 0.3, 0.8), 3.0), Leg((0.1, 0.5, 0.3), 3.0, 0.5)], rest_s=0.3)
-    log = drive_solo(model, BaseDrive(motion), motion.duration_s)
-    off = log.true[:, 0] - log.planned[:, 0]
-    assert np.linalg.norm(off[:, :2], axis=1).max() < 4e-3
-    assert np.abs(off[:, 2]).max() < np.deg2rad(0.4)
 
 
 def test_wheels_carry_the_weight_and_push_the_mass(model):
@@ -201,24 +179,6 @@ def test_beyond_the_grip_odometry_lies(model):
     assert lie(hasty) > 10e-3
 
 
-@pytest.mark.slow
-def test_time_steps_agree():
-    """The same drive at 0.25 ms ends within 0.3 mm of that at 1 ms."""
-    ends = []
-    for step in (0.001, 0.00025):
-        model = compile_solo(build_solo(timestep_s=step))
-        ends.append(_go(model, (0.2, 0.2, 0.3), seconds=1.5).true[-1, 0])
-    np.testing.assert_allclose(ends[0][:2], ends[1][:2], rtol=0, atol=3e-4)
-    np.testing.assert_allclose(ends[0][2], ends[1][2], rtol=0, atol=1e-3)
-
-
-def test_full_turns_are_counted(model):
-    motion = plan((0.0, 0.0, 0.0), [Leg((0.0, 0.0, 4.0), 3.0, 0.3)], rest_s=0.3)
-    log = drive_solo(model, BaseDrive(motion), motion.duration_s)
-    assert log.true[-1, 0, 2] == pytest.approx(4.0, abs=0.02)
-    assert np.abs(np.diff(log.true[:, 0, 2])).max() < 0.1
-
-
 class Tick:
     """One base in the drives' arithmetic alone: wheels that do what the test says."""
 
@@ -238,30 +198,6 @@ class Tick:
         )  # fmt: skip
 
 
-def test_odometry_follows_arcs_however_long():
-    """Large steps of the wheels, against the exponential of the twist."""
-    tick, pose = Tick(), np.zeros(3)
-    for step in np.random.default_rng(8).normal(size=(5, 3)):
-        tick.qpos = tick.qpos + tick.kinematics.wheel_speeds(step)
-        tick.go(np.zeros(3), np.zeros(3))
-        pose = moved(pose, step)
-        np.testing.assert_allclose(tick.odometry[0], pose, atol=1e-12)
-
-
-def test_commands_are_in_the_axes_of_the_base():
-    """A base that is turned against its plan, and beside it, drives where the plan goes, and toward it."""
-    tick = Tick(gain=1.5)
-    tick.odometry[0] = [0.1, -0.2, 0.4]
-    pose, twist = np.array([0.3, 0.1, 1.0]), np.array([0.2, 0.5, -0.3])
-    tick.go(pose, twist)
-    world = Rotation.from_euler("z", 1.0).apply([twist[1], twist[2], 0.0])
-    toward = 1.5 * np.array([0.2, 0.3, 0.0])
-    v = Rotation.from_euler("z", -0.4).apply(world + toward)
-    expected = tick.kinematics.wheel_speeds([0.2 + 1.5 * 0.6, v[0], v[1]])
-    np.testing.assert_allclose(tick.speed[0], expected, atol=1e-12)
-    np.testing.assert_allclose(tick.ctrl, np.clip(3.0 * expected, -12.0, 12.0), atol=1e-12)
-
-
 def test_a_drive_at_its_limit_does_not_wind_up():
     """A wheel that is stuck for ten seconds owes no more than its limit, and lets go at once."""
     tick = Tick(gain=0.0, limit=6.0)
@@ -271,13 +207,6 @@ def test_a_drive_at_its_limit_does_not_wind_up():
     for _ in range(400):
         tick.go(np.zeros(3), np.array([0.0, -0.05, 0.0]))
     assert (tick.ctrl < -5.0).all()
-
-
-def test_snapshots_are_of_their_times(model):
-    motion = plan((0.0, 0.0, 0.0), [Leg((0.2, 0.0, 0.0), 1.0)], rest_s=0.0)
-    snapshots = Snapshots([1.0, 0.0, 0.5])
-    drive_solo(model, BaseDrive(motion), 1.0, snapshots=snapshots)
-    assert [round(float(qpos[0]), 2) for qpos in snapshots.qpos] == [0.0, 0.1, 0.2]
 
 
 def test_what_does_not_fit_is_refused(model):
@@ -304,15 +233,6 @@ def _hold(scene: TeamScene, seconds: float) -> Trajectory:
 
 def _standing(scene: TeamScene) -> PlanarMotion:
     return PlanarMotion(1000.0, _places(scene)[None], np.zeros((1, scene.robots, 3)))
-
-
-def test_a_released_team_is_assembled_like_a_parked_one(scene):
-    torques = []
-    for team in (scene, build_team("a")):
-        model = team.compile()
-        data = mujoco.MjData(model)
-        torques.append(assemble_at_home(team, model, data, TeamIndex.of(model)))
-    np.testing.assert_allclose(torques[0], torques[1], rtol=0, atol=1e-12)
 
 
 def test_standing_on_wheels_is_like_being_parked(scene):
@@ -397,12 +317,6 @@ def test_bases_follow_what_somebody_moves(scene):
     np.testing.assert_allclose(np.ptp(ways), 0.0, atol=0.03)
 
 
-def test_snapshots_take_part_in_trials(scene):
-    snapshots = Snapshots([0.0, 0.1])
-    run_trial(build_team("a"), _hold(scene, 0.1), actors=[snapshots])
-    assert [len(qpos) for qpos in snapshots.qpos] == [54, 54]
-
-
 def test_plans_for_other_teams_and_parked_teams_are_refused(scene):
     hold = _hold(scene, 0.1)
     two = plan((0, 0, 0), [Leg((0, 0, 0), 1.0)], 0.0)
@@ -410,18 +324,3 @@ def test_plans_for_other_teams_and_parked_teams_are_refused(scene):
         run_trial(scene, hold, actors=[BaseDrive(two)])
     with pytest.raises(InputError, match="omnid1 is parked"):
         run_trial(build_team("a"), hold, actors=[BaseDrive(_standing(scene))])
-
-
-def test_turned_mounts_are_released_too():
-    """A free chassis begins where its mount is."""
-    mounts = build_team("b").mounts
-    scene = build_team("b", mounts=mounts, released=True)
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    assemble_at_home(scene, model, data, TeamIndex.of(model))
-    mujoco.mj_forward(model, data)
-    for i in range(3):
-        chassis = data.body(f"omnid{i + 1}/chassis")
-        np.testing.assert_allclose(chassis.xpos, mounts.translation[i], atol=1e-12)
-        R = Rotation.from_matrix(chassis.xmat.reshape(3, 3))
-        assert (R.inv() * mounts.rotation[i]).magnitude() < 1e-12

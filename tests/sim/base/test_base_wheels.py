@@ -6,8 +6,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import (
@@ -15,7 +13,6 @@ from mocobot_sim.base.design import (
     WHEELS,
     BaseDesign,
     MecanumKinematics,
-    axle_share,
     base_design,
     load_base_design,
 )
@@ -23,7 +20,6 @@ from mocobot_sim.base.drive import WheelContacts, build_solo, compile_solo
 from mocobot_sim.scene.omnid import wheel_reach
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.team_index import BaseIndex, TeamIndex
-from payload_mjcf import TEAMS
 
 DESIGN = base_design()
 
@@ -63,17 +59,6 @@ def test_contacts_do_not_move_along_the_axles(angle_deg):
             assert abs((chassis + spin) @ axle) < 1e-12
 
 
-@pytest.mark.parametrize("make", [MecanumKinematics.textbook, MecanumKinematics.with_rollers])
-def test_twists_come_back_from_wheel_speeds(make):
-    kinematics = make(DESIGN)
-    twists = np.random.default_rng(1).normal(size=(20, 3))
-    np.testing.assert_allclose(kinematics.twist(kinematics.wheel_speeds(twists)), twists, rtol=0, atol=1e-13)
-    # Wheels that fight each other (front against rear) move nothing.
-    np.testing.assert_allclose(
-        MecanumKinematics.textbook(DESIGN).twist([1.0, 1.0, -1.0, -1.0]), 0.0, atol=1e-15
-    )
-
-
 def test_least_squares_over_four_wheels():
     """The normal equations, solved by hand: every wheel counts a quarter."""
     r, arm = DESIGN.wheel_radius_m, DESIGN.half_wheelbase_m + DESIGN.half_track_m
@@ -84,13 +69,6 @@ def test_least_squares_over_four_wheels():
         r * (-u[0] + u[1] + u[2] - u[3]) / 4.0,
     ]
     np.testing.assert_allclose(MecanumKinematics.textbook(DESIGN).twist(u), by_hand, rtol=1e-13)
-
-
-@pytest.mark.parametrize("rollers", [6, 9, 12, 24])
-def test_share_of_the_axle_is_the_mean_of_the_cosine(rollers):
-    pitch = 2.0 * np.pi / rollers
-    mean = quad(np.cos, -0.5 * pitch, 0.5 * pitch)[0] / pitch
-    assert axle_share(dataclasses.replace(DESIGN, rollers=rollers)) == pytest.approx(mean, rel=1e-12)
 
 
 def _slip(model: mujoco.MjModel, twist: np.ndarray, speeds: np.ndarray, wheel_angle: float) -> np.ndarray:
@@ -122,14 +100,6 @@ def test_rollers_in_mujoco_do_not_slide_at_the_textbooks_speeds(model, twist):
     assert np.abs(_slip(model, np.array(twist), 1.01 * speeds, 0.0)).max() > 1e-3
 
 
-@pytest.mark.parametrize("wheel_angle", [-0.2, 0.1, 0.22])
-def test_a_turned_axle_asks_for_another_speed(model, wheel_angle):
-    """Sideways, a roller turned by t from straight down sticks at v / (height cot(a)^-1 cos t)."""
-    height = wheel_reach(DESIGN, wheel_angle) - 0.5e-6  # MuJoCo puts the contact amid the overlap
-    speeds = HAND * 0.3 / (np.tan(DESIGN.roller_angle_rad) * np.cos(wheel_angle) * height)
-    np.testing.assert_allclose(_slip(model, np.array([0.0, 0.0, 0.3]), speeds, wheel_angle), 0.0, atol=1e-6)
-
-
 def test_measured_slip_is_the_one_along_the_axle(model):
     """A base that is pushed along x with its wheels locked slides by v sin(a) along every axle."""
     data, index = mujoco.MjData(model), BaseIndex.of(model)
@@ -148,7 +118,6 @@ def test_measured_slip_is_the_one_along_the_axle(model):
 
 
 OMNID = Path(__file__).resolve().parents[3] / "models" / "omnid"
-HALF_PITCH = np.pi / DESIGN.rollers
 
 
 @pytest.fixture(scope="module")
@@ -159,17 +128,6 @@ def parked() -> mujoco.MjModel:
 @pytest.fixture(scope="module")
 def solo() -> mujoco.MjModel:
     return compile_solo(build_solo())
-
-
-def test_design_file_and_robot_have_the_same_wheels(parked):
-    assert load_base_design(OMNID / "base.toml") == DESIGN
-    for wheel, (x, y) in zip(WHEELS, DESIGN.wheel_positions, strict=True):
-        np.testing.assert_allclose(
-            parked.body(f"wheel_{wheel}").pos, [x, y, DESIGN.wheel_radius_m], atol=1e-15
-        )
-        assert parked.geom(f"wheel_{wheel}").size[0] == DESIGN.wheel_radius_m
-        # Positive speed drives forward.
-        np.testing.assert_array_equal(parked.joint(f"wheel_{wheel}").axis, [0.0, 1.0, 0.0])
 
 
 def test_wheels_keep_their_mass_and_inertia(parked, solo):
@@ -220,42 +178,6 @@ def test_every_roller_turns_about_its_long_axis_at_45_deg_to_the_wheels(solo):
         np.testing.assert_allclose(lowest[k], np.sqrt(0.5) * np.array([1.0, sign]), atol=1e-12)
 
 
-def test_wheels_are_round_as_far_as_mujoco_is_concerned(solo):
-    """Depth of MuJoCo's own contact against the closed form, over a whole pitch."""
-    data, index = mujoco.MjData(solo), BaseIndex.of(solo)
-    sunk = 0.5e-3
-    data.qpos[index.free_qpos[0] + 2] = -sunk
-    angles = np.linspace(-HALF_PITCH, HALF_PITCH, 31)
-    reach = []
-    for angle in angles:
-        data.qpos[index.wheel_qpos] = angle
-        mujoco.mj_forward(solo, data)
-        deepest = min(contact.dist for contact in data.contact if index.geom_wheel[contact.geom].max() == 0)
-        reach.append(DESIGN.wheel_radius_m - sunk - deepest)
-    np.testing.assert_allclose(reach, wheel_reach(DESIGN, angles), rtol=0, atol=1e-9)
-    assert np.ptp(wheel_reach(DESIGN, np.linspace(-HALF_PITCH, HALF_PITCH, 1001))) < 0.075e-3
-    assert np.abs(wheel_reach(DESIGN, angles) - DESIGN.wheel_radius_m).max() < 0.05e-3
-
-
-def test_poses_are_read_off_the_free_joints(solo):
-    """A chassis that is tilted, too; yaw as scipy has it."""
-    data, index = mujoco.MjData(solo), BaseIndex.of(solo)
-    for turn in Rotation.random(20, np.random.default_rng(9)):
-        at = index.free_qpos[0]
-        data.qpos[at : at + 7] = [0.4, -1.2, 0.1, *turn.as_quat(scalar_first=True)]
-        R = turn.as_matrix()
-        np.testing.assert_allclose(index.poses(data), [[0.4, -1.2, np.arctan2(R[1, 0], R[0, 0])]], atol=1e-12)
-
-
-def test_neighbouring_rollers_clear_each_other(solo):
-    data = mujoco.MjData(solo)
-    mujoco.mj_forward(solo, data)
-    first = solo.geom("omnid1/wheel_front_left_roller1").id
-    for other in ("roller2", f"roller{DESIGN.rollers}"):
-        geom = solo.geom(f"omnid1/wheel_front_left_{other}").id
-        assert 0 < mujoco.mj_geomDistance(solo, data, first, geom, 0.1, None) < 0.02
-
-
 def test_released_teams_stand_on_their_wheels_and_parked_ones_have_none():
     released, parked = build_team("a", released=True).compile(), build_team("a").compile()
     assert BaseIndex.of(released).robots == 3
@@ -268,23 +190,6 @@ def test_released_teams_stand_on_their_wheels_and_parked_ones_have_none():
         BaseIndex.of(parked)
     with pytest.raises(InputError, match="has no Omnid"):
         BaseIndex.of(mujoco.MjModel.from_xml_string("<mujoco/>"))
-
-
-def test_nothing_but_rollers_touches_the_floor(tmp_path):
-    """Even a payload whose geoms may collide, and reach down to the floor."""
-    text = (
-        TEAMS[5].xml().replace("</body>", '<geom name="skirt" type="sphere" size="0.9" mass="0"/></body>', 1)
-    )
-    path = tmp_path / "skirt.xml"
-    path.write_text(text, encoding="utf-8")
-    model = build_team(path, released=True).compile()
-    data, index = mujoco.MjData(model), BaseIndex.of(model)
-    data.qpos[index.free_qpos + 2] = -1e-4
-    mujoco.mj_forward(model, data)
-    assert data.ncon == 20
-    touching = {tuple(sorted(contact.geom)) for contact in data.contact}
-    floor = model.geom("floor").id
-    assert all(a == floor and index.geom_wheel[b] >= 0 for a, b in touching)
 
 
 NUMBERS = dataclasses.asdict(DESIGN)
@@ -308,11 +213,6 @@ def test_bad_designs_are_refused(case):
     change, sentence = BAD[case]
     with pytest.raises(InputError, match=sentence):
         BaseDesign(**(NUMBERS | change))
-
-
-def test_rollers_heavier_than_their_wheel_are_refused():
-    with pytest.raises(InputError, match=r"12 rollers of 0\.1 kg leave no hub in a wheel of 0\.8 kg"):
-        build_solo(dataclasses.replace(DESIGN, roller_mass_kg=0.1))
 
 
 @pytest.mark.parametrize(

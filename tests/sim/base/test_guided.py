@@ -19,8 +19,6 @@ from mocobot_sim.guided import (
     Move,
     Payload,
     PushingHand,
-    hand_path,
-    up_in_payload,
     weight_shares,
 )
 from mocobot_sim.scene.models import omnid_design
@@ -64,28 +62,11 @@ def test_shares_carry_the_weight_and_do_not_turn_it(robots):
         np.testing.assert_allclose(moment, 0.0, atol=1e-8 * np.abs(forces).max())
 
 
-def test_more_than_three_take_the_smallest_shares():
-    """Four at the corners of a square carry a quarter each; no other balanced set is smaller."""
-    corners = np.array([[1.0, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
-    square = Payload(4.0, np.array([0.0, 0.0, 0.3]), corners, np.tile(np.eye(3), (4, 1, 1)))
-    np.testing.assert_allclose(weight_shares(square, [0.0, 0.0, 1.0], G), G)
-
-
 def test_shares_of_payload_a_are_those_of_statics(truth):
     """Level, against 3 x 3 equations in the plane; Table I of the paper."""
     rows = np.vstack([np.ones(3), truth.p_1i[:, 0], truth.p_1i[:, 1]])
     expected = np.linalg.solve(rows, 11.672 * G * np.array([1.0, 0.537, 0.156]))
     np.testing.assert_allclose(weight_shares(truth, [0.0, 0.0, 1.0], G), expected, rtol=1e-9)
-
-
-def test_up_is_seen_through_any_gimbal():
-    """R_Wb R_bi R_i1 turns {1} into the world; up there is e_z, whatever the yaw of the base."""
-    rng = np.random.default_rng(4)
-    for _ in range(20):
-        theta, R_1i = rng.uniform(-1.0, 1.0, 3), Rotation.random(rng=rng)
-        R_bi = Rotation.from_euler("ZYX", theta)
-        R_b1 = R_bi * R_1i.inv()
-        np.testing.assert_allclose(R_b1.apply(up_in_payload(theta, R_1i.as_matrix())), [0, 0, 1], atol=1e-12)
 
 
 def _run(scene, hand, arms, gains=FLOAT_GAINS, seconds=3.0) -> HandLog:
@@ -229,27 +210,6 @@ def test_a_hands_spring_turns_the_payload_back(scene):
     np.testing.assert_allclose(hand.log().moment[0], 50.0 * turn.as_rotvec(), atol=1e-9)
     np.testing.assert_allclose(hand.log().tilt[0], -turn.as_rotvec(), atol=1e-10)
     assert data.xfrc_applied[body, 3:] @ turn.as_rotvec() > 0
-
-
-def test_forces_of_the_start_are_kept_whoever_leans_on_the_payload(scene, truth):
-    """A hand that moves it during the first second, when arms would take its load up, changes nothing."""
-    move = (Move((0.0, 0.0, 0.03), (0.0, 0.0, 0.0), 0.5, 0.5),)
-    hold = Trajectory("static", np.tile(scene.wrist_home_b, (121, 1, 1)))
-    log = run_trial(scene, hold, FLOAT_GAINS, actors=[GuidingHand(HANDLE, move, 0.1, FIRM), FloatArms(None)])
-    expected = np.zeros((3, 3))
-    expected[:, 2] = weight_shares(truth, [0.0, 0.0, 1.0], G)
-    np.testing.assert_allclose(log.feed_forward, expected, atol=0.02)
-
-
-def test_paths_of_hands():
-    moves = (Move((0.1, 0.0, 0.0), (0.0, 0.0, 0.2), 1.0, 0.5), Move((0.0, 0.2, 0.0), (0.0, 0.0, 0.0), 0.5))
-    by, turn = hand_path(moves, 0.5, 3001, 1000.0)
-    at = lambda t: np.r_[by[round(1000 * t)], turn[round(1000 * t)]]  # noqa: E731
-    np.testing.assert_allclose(at(0.5), 0.0)
-    np.testing.assert_allclose(at(1.0), [0.05, 0, 0, 0, 0, 0.1], atol=1e-12)
-    np.testing.assert_allclose(at(1.9), [0.1, 0, 0, 0, 0, 0.2], atol=1e-12)
-    np.testing.assert_allclose(at(2.25), [0.05, 0.1, 0, 0, 0, 0.1], atol=1e-12)
-    np.testing.assert_allclose(at(3.0), [0, 0.2, 0, 0, 0, 0], atol=1e-12)
 
 
 def test_an_estimate_that_lacks_something_is_refused(scene, truth):

@@ -89,24 +89,6 @@ def test_every_cause_at_once_in_a_team_of_five(teams, robot, tmp_path):
     assert np.isfinite(predicted(log).tau).all()
 
 
-def test_effects_add_to_units_as_built(team_a):
-    units = [dataclasses.replace(unit, phi_zero_rad=np.array([0.01, 0.02, 0.03])) for unit in team_a.units]
-    scene = apply_effects(build_team("a", units), [example("phi_zero", 2, 3), example("sea_scale", 2, 1)])
-    np.testing.assert_allclose(scene.units[1].phi_zero_rad, [0.01, 0.02, 0.031], rtol=1e-15)
-    np.testing.assert_array_equal(scene.units[0].phi_zero_rad, [0.01, 0.02, 0.03])
-    model = scene.compile()
-    assert model.joint("omnid2/spring1").stiffness[0] == pytest.approx(102.0, rel=1e-15)
-    assert model.joint("omnid2/spring2").stiffness[0] == 100.0
-
-
-def test_scale_and_hardening_of_one_spring_in_either_order():
-    pair = [example("sea_scale"), example("sea_hardening")]
-    for effects in (pair, pair[::-1]):
-        joint = team_with("a", *effects).compile().joint("omnid1/spring2")
-        assert joint.stiffness[0] == pytest.approx(102.0)
-        np.testing.assert_array_equal(np.ravel(joint.stiffnesspoly), [0.0, 200.0])
-
-
 BAD = {
     "cause": (("rust", {}), r"cause 'rust' does not exist; the causes are phi_zero, theta_zero, "),
     "no robot": (("phi_zero", {"zero_rad": 0.1}, None, 1), "phi_zero: robot is missing; the places are robot, joint"),
@@ -190,18 +172,6 @@ RATIOS = {"scale", "damping_ratio", "second_share", "amplitude", "number", "seco
 
 
 @pytest.mark.parametrize("cause", EFFECTS)
-@pytest.mark.parametrize("short", [True, False])
-def test_every_effect_can_be_written(cause: str, short: bool) -> None:
-    """With names that have their units and without them it is the effect that its name and numbers make."""
-    numbers = allowed(EFFECTS[cause])
-    place = {each.name: 2 for each in numbers if each.name in ("robot", "joint")}
-    made = make_effect(cause, SIZES[cause], **place)
-    values = {each: getattr(made, each.name) for each in numbers}
-    words = [f"{each.short if short else each.name}={value}" for each, value in values.items()]
-    assert parse_effect(f"{cause}:{','.join(words)}") == made
-
-
-@pytest.mark.parametrize("cause", EFFECTS)
 def test_what_is_listed_is_what_the_class_takes(cause: str) -> None:
     kind = EFFECTS[cause]
     numbers = allowed(kind)
@@ -218,12 +188,6 @@ def test_what_is_listed_is_what_the_class_takes(cause: str) -> None:
     assert {n.name: n.range for n in numbers if n.range not in words} == {
         name: f"{low:g} to {high:g}" for name, (low, high) in kind.ranges.items()
     }
-
-
-def test_what_is_left_out_is_zero() -> None:
-    assert parse_effect("joint_friction:robot=2,joint=1,coulomb=0.05") == make_effect(
-        "joint_friction", {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.0}, robot=2, joint=1
-    )
 
 
 @pytest.mark.parametrize(

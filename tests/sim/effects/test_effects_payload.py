@@ -10,12 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from closed_loop import ClosedLoop, base_poses
 from effect_cases import SIZES, example, one_robot, team_with
-from estimator.errors import InputError
 from mocobot_sim.effects import make_effect
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.trajectories import SETTLE_S, Trajectory, random_vias
 from mocobot_sim.trial.trial import between_commands, run_trial
-from mocobot_sim.trial.truth import GroundTruth
 
 
 def _still(scene, samples: int) -> Trajectory:
@@ -203,24 +201,6 @@ def test_a_pendulum_swings_with_its_own_period_and_damping(length, damping):
         joint.qpos[0] = joint.qvel[0] = 0.0
 
 
-def test_a_pendulum_hangs_at_the_start_and_weighs_what_it_does():
-    scene = team_with("a", example("base_tilt", 2), example("slosh", point_x_m=0.5, point_y_m=0.2))
-    loop = ClosedLoop(scene)
-    model, data = loop.model, loop.data
-    body = model.body("omnid1/payload/slosh").id
-    bob = data.xipos[body] - data.xpos[body]
-    np.testing.assert_allclose(bob, [0, 0, -0.1], rtol=0, atol=1e-9)
-    # forces_on_payload counts robot 1's share with the pendulum that hangs from the payload.
-    weight = 9.81 * (model.body_mass[loop.index.payload_body] + 0.3)
-    np.testing.assert_allclose(
-        loop.forces_on_payload().sum(axis=0), [0, 0, weight], rtol=0, atol=5e-4 * weight
-    )
-    truth, clean = GroundTruth.of(scene), GroundTruth.of(build_team("a"))
-    assert truth.mass_kg == clean.mass_kg
-    np.testing.assert_array_equal(truth.principal_kgm2, clean.principal_kgm2)
-    assert [effect.cause for effect in truth.effects] == ["base_tilt", "slosh"]
-
-
 PUSH = SIZES["push"] | {
     "trial": 2, "start_s": 1.2, "duration_s": 2.0, "force_x_N": 2.0, "force_y_N": -1.0, "force_z_N": 3.0,
     "point_x_m": 0.6, "point_y_m": 0.1, "point_z_m": 0.05,
@@ -243,27 +223,6 @@ def test_a_push_is_carried_by_the_wrists_springs():
     shift = 400.0 * (grasps - before).sum(axis=0)
     np.testing.assert_allclose(shift, base_poses(scene)[1][0] @ [2.0, -1.0, 3.0], rtol=0, atol=0.1)
     assert np.linalg.norm(log.p_W1[449] - clean.p_W1[449]) < 0.1e-3, "let go"
-
-
-def test_a_push_grows_and_fades():
-    """A trapezium by its corners, and a triangle that never grows to its height."""
-    loop = ClosedLoop(team_with("c"))
-    data, body = loop.data, loop.index.payload_body
-    for ramp, corners, heights in (
-        (0.5, [1.2, 1.7, 2.7, 3.2], [0.0, 1.0, 1.0, 0.0]),
-        (2.0, [1.2, 2.2, 3.2], [0.0, 0.5, 0.0]),
-    ):
-        effect = example("push", **PUSH | {"ramp_s": ramp})
-        for time in (1.1, 1.2, 1.45, 1.9, 2.2, 3.0, 3.3):
-            data.time = time
-            data.xfrc_applied[:] = 0.0
-            if effect.acts(time):
-                mujoco.mj_kinematics(loop.model, data)
-                effect.act(data, body, np.eye(3))
-            share = np.interp(time, corners, heights)
-            np.testing.assert_allclose(
-                data.xfrc_applied[body, :3], share * np.array([2.0, -1.0, 3.0]), atol=1e-9
-            )
 
 
 def test_a_push_is_force_and_moment_about_the_centre_of_mass():
@@ -338,17 +297,6 @@ def test_a_box_on_top_is_what_mujoco_makes_of_both():
     np.testing.assert_allclose(motion[0], motion[1], atol=1e-9)
 
 
-def test_what_leaks_out_in_a_trial_is_gone_by_then():
-    left, model = body(PAYLOAD, ON_TOP.format(0.4)), body(PAYLOAD, ON_TOP.format(0.7))
-    (actor,) = effect_of(0.7, rate_kgps=-0.1).actors(None)
-    actor.start(on(model, 4.0))
-    for tick in range(3001):
-        actor.act(tick)
-    assert model.body_mass[1] == pytest.approx(left.body_mass[1])
-    np.testing.assert_allclose(model.body_ipos[1], left.body_ipos[1], atol=1e-12)
-    np.testing.assert_allclose(inertia(model), inertia(left), atol=1e-10)
-
-
 def test_it_is_there_in_its_trials_only():
     effect = example("payload_mass", trial=2, last_trial=3)
     assert [len(effect.actors(number)) for number in (1, 2, 3, 4)] == [0, 1, 1, 0]
@@ -371,21 +319,3 @@ def test_a_robot_moves_as_with_a_box_that_is_welded_on(tmp_path):
     assert np.abs(phi[0] - phi[2]).max() > 3e-3
     assert np.abs(phi[1] - phi[2]).max() < 1e-5
     np.testing.assert_array_equal(run_trial(changed, motion, trial_number=1).phi[start:], phi[0])
-
-
-def test_no_more_is_taken_off_than_there_is():
-    sentence, stage = (
-        "payload_mass: the payload of 5 kg would weigh -[0-9.]+ kg; it must weigh something",
-        on(body(PAYLOAD)),
-    )
-    with pytest.raises(InputError, match=sentence):
-        make_effect("payload_mass", {"mass_kg": -5.5}).load(stage.model, stage.index, 1)
-    (leak,) = make_effect("payload_mass", {"rate_kgps": -0.6}).actors(1)
-    with pytest.raises(InputError, match=sentence):
-        leak.start(stage)
-
-
-def test_one_hanging_payload_takes_drag_and_tether(tmp_path):
-    scene = one_robot(tmp_path, example("drag"), example("tether"))
-    log = run_trial(scene, _still(scene, 150))
-    assert np.abs(log.phi - log.phi[0]).max() < 1e-4

@@ -14,7 +14,6 @@ from mocobot_sim.scene.soft import damper_parameters
 from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.trial_log import SensedLog
 
 FRICTION = (
     int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
@@ -165,40 +164,6 @@ def test_stiction_holds_below_the_limit(tmp_path, coulomb):
     assert abs(angles[-1] - angles[-1001]) < 1e-6
 
 
-@pytest.mark.parametrize("coulomb", [5e-3, 0.1])
-def test_it_slides_above_the_limit(tmp_path, coulomb):
-    """Uniform acceleration by what is left of the torque: I a = 0.2 F."""
-    seconds = 0.3
-    angles, inertia = _turn(tmp_path, 1.2 * coulomb, coulomb, seconds)
-    assert angles[-1] == pytest.approx(0.5 * 0.2 * coulomb / inertia * seconds**2, rel=0.01)
-
-
-@pytest.mark.parametrize("cause", ["joint_friction", "sea_hysteresis"])
-def test_stuck_joints_creep_little(cause):
-    """At rest under load for three seconds after a motion."""
-    loop = ClosedLoop(team_with("a", example(cause)))
-    home = loop.scene.wrist_home_b
-    loop.run(1.5, home + np.array([0.02, 0.01, 0.02]))
-    loop.run(3.0, home)
-    at = loop.index.spring_qpos if cause == "sea_hysteresis" else loop.index.motor_qpos
-    before = loop.data.qpos[at].copy()
-    loop.run(3.0, home)
-    assert np.abs(loop.data.qpos[at] - before)[0, 1] < 3e-5
-
-
-@pytest.mark.parametrize("robot", [1, 2])
-@pytest.mark.parametrize("size", [5e-3, 0.1])
-def test_gimbal_friction_leaves_the_welds_closed(robot, size):
-    effects = [
-        example("gimbal_friction", robot, joint, coulomb_Nm=size, viscous_Nms_per_rad=size)
-        for joint in (1, 2, 3)
-    ]
-    scene = team_with("a", *effects)
-    log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), 2))
-    assert log.weld_error_m < 3e-6
-    assert np.rad2deg(log.weld_error_rad) < 5e-4
-
-
 DESIGN_K = 100.0
 
 
@@ -228,10 +193,6 @@ def test_zeros_shift_one_reading(channel, robot):
         np.testing.assert_allclose(shift, np.tile(expected, (len(shift), 1, 1)), rtol=0, atol=1e-13)
 
 
-def test_a_theta_zero_is_not_seen_by_the_controller(clean):
-    np.testing.assert_array_equal(_run(example("theta_zero", 2)).phi, clean.phi)
-
-
 @pytest.mark.parametrize("cubic", [-100.0, 300.0, 3000.0])
 def test_hardening_is_read_as_a_linear_spring(cubic):
     """True torque k d + k3 d^3 and reading k d of the same deflection."""
@@ -241,18 +202,6 @@ def test_hardening_is_read_as_a_linear_spring(cubic):
     np.testing.assert_allclose(log.tau[:, 1, 0], -(DESIGN_K * deflection + cubic * deflection**3), rtol=1e-10)
     assert np.abs(log.tau[:, 1, 0] - reading).max() > 1e-5 * abs(cubic)
     np.testing.assert_allclose(predicted(log).tau[:, 0], log.tau[:, 0], rtol=0, atol=1e-12)
-
-
-def test_a_hardening_spring_starts_where_its_load_is(tmp_path):
-    """One robot at home: every leg carries the same torque; the deflection is a root of the cubic."""
-    linear = ClosedLoop(one_robot(tmp_path))
-    loop = ClosedLoop(one_robot(tmp_path, example("sea_hardening", cubic_Nm_per_rad3=5000.0)))
-    torque = linear.torque[0, 1]
-    np.testing.assert_allclose(loop.torque, linear.torque, rtol=1e-6)
-    roots = np.roots([5000.0, 0.0, DESIGN_K, torque])
-    root = roots[np.abs(roots.imag) < 1e-9].real[0]
-    assert loop.data.joint("omnid1/spring2").qpos[0] == pytest.approx(root, rel=1e-9)
-    assert abs(root) < 0.97 * abs(torque / DESIGN_K)
 
 
 def test_hysteresis_makes_the_reading_lag_the_link(clean):
@@ -310,21 +259,6 @@ def test_a_late_clock_shifts_everything_but_the_commands(clean):
     np.testing.assert_array_equal(log.phi, clean.phi)
 
 
-@pytest.mark.parametrize("delay_s", [-0.0033, 0.00025, 0.0017])
-def test_delays_between_ticks_are_interpolated(delay_s):
-    clock = np.arange(5000) / 1000.0
-    phase = np.arange(6).reshape(2, 3)
-
-    def signal(t):
-        return np.sin(2 * np.pi * 3.0 * t[:, None, None] + phase)
-
-    log = SensedLog(1000.0, 10, signal(clock), signal(clock), signal(clock))
-    rows = log.sampled("tau", np.array([0.0, delay_s]))
-    time = clock[::10]
-    np.testing.assert_array_equal(rows[:, 0], signal(time)[:, 0])
-    np.testing.assert_allclose(rows[2:-2, 1], signal(time - delay_s)[2:-2, 1], rtol=0, atol=1e-8)
-
-
 @pytest.mark.parametrize("time_constant_s", [1e-4, 1e-3, 0.02])
 def test_lag_of_a_ramp_and_of_a_sine_is_the_filters(time_constant_s):
     a, old, new = lag_filter(time_constant_s, 1e-3)
@@ -349,19 +283,4 @@ def test_a_lagging_torque_sensor_is_seen_by_log_and_controller(clean):
     np.testing.assert_allclose(x[20:-20:10], log.tau[2:-2, 1][: len(x[20:-20:10])], rtol=0, atol=5e-3)
     assert np.abs(log.tau[:, 1] - y[::10]).max() > 0.02
     np.testing.assert_allclose(log.sensed.tau[::10, 0], log.tau[:, 0], rtol=0, atol=1e-12)
-    assert np.abs(log.phi - clean.phi).max() > 1e-5
-
-
-def test_a_single_lagging_sensor_is_seen_by_log_and_controller(clean):
-    """y + T dy/dt = x of its own torque alone; exact for inputs that are straight between ticks."""
-    T, k = 0.004, 1
-    log = _run(example("sensor_lag", 2, joint=k + 1, time_constant_s=T))
-    y = log.sensed.tau[:, 1]
-    x = y[:, k] + T * np.gradient(y[:, k], 1e-3)
-    np.testing.assert_allclose(x[20:-20:10], log.tau[2:-2, 1, k][: len(x[20:-20:10])], rtol=0, atol=5e-3)
-    assert np.abs(log.tau[:, 1, k] - y[::10, k]).max() > 0.02
-    others = np.ones((3, 3), dtype=bool)
-    others[1, k] = False
-    np.testing.assert_allclose(log.sensed.tau[::10, others], log.tau[:, others], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(log.sensed.phi[::10], log.phi, rtol=0, atol=1e-12)
     assert np.abs(log.phi - clean.phi).max() > 1e-5

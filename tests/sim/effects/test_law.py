@@ -13,18 +13,14 @@ from effect_cases import one_robot, team_with
 from estimator.arm.delta import forward_kinematics, jacobian
 from estimator.errors import InputError
 from mocobot_sim.effects import apply_effects, effect_from_dict, effect_to_dict
-from mocobot_sim.effects.catalogue import parse_effect
 from mocobot_sim.effects.law import Law
 from mocobot_sim.extended.extended import load_extended, write_extended
-from mocobot_sim.functions import FUNCTIONS
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.serial.effects import ActingLaw, JointLaw, State
 from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import Trajectory, random_vias
 from mocobot_sim.trial.trial import run_trial
-
-STIFFNESS = 100.0
 
 
 def run(*effects, vias=2, payload="a"):
@@ -85,17 +81,6 @@ def test_play_stays_behind_by_its_half_width():
     assert np.abs(play).max() <= 1.0 + 1e-12
 
 
-def test_lag_of_a_ramp_is_its_rate():
-    x = 0.7 * np.arange(0.0, 5.0, 1e-3)
-    assert values_of(x, "lag", 0.3)[-1] == pytest.approx(-0.7, rel=2e-3)
-
-
-def test_second_order_resonates_with_one_over_twice_its_damping():
-    t = np.arange(0.0, 60.0, 1e-3)
-    out = values_of(np.sin(2.0 * np.pi * 2.0 * t), "second_order", 2.0, 0.1)
-    assert np.abs(out[-2000:]).max() == pytest.approx(5.0, rel=0.01)
-
-
 def test_a_torque_that_contains_its_neighbours():
     """Reading minus truth is the share of the other reading, in log and nowhere else."""
     log = run(Law("tau_2_1", "linear", "tau_2_3", 0.04))
@@ -104,14 +89,6 @@ def test_a_torque_that_contains_its_neighbours():
     expected[:, 1, 0] = 0.04 * log.tau[:, 1, 2]
     np.testing.assert_allclose(reading.tau - log.tau, expected, atol=2e-4 * np.abs(log.tau).max())
     np.testing.assert_allclose(reading.phi, log.phi, atol=1e-9)
-
-
-def test_a_sum_of_signals_is_one():
-    log = run(Law("tau_2_1", "square", "0.5*tau_2_2 + -2e-1*tau_2_3", 0.04))
-    expected = 0.04 * (0.5 * log.tau[:, 1, 1] - 0.2 * log.tau[:, 1, 2]) ** 2
-    assert np.abs(expected).max() > 0.01
-    read = (predicted(log).tau - log.tau)[:, 1, 0]
-    np.testing.assert_allclose(read, expected, atol=2e-4 * np.abs(log.tau).max())
 
 
 def test_an_eccentric_gimbal_encoder():
@@ -126,12 +103,6 @@ def test_a_driven_encoder_is_a_function_of_the_angle_as_recorded():
     expected = 0.01 * log.phi[:, 0, 2] ** 2
     assert np.ptp(expected) > 1e-4
     np.testing.assert_allclose((predicted(log).phi - log.phi)[:, 0, 2], expected, atol=1e-9)
-
-
-def test_a_product_with_another_signal():
-    log = run(Law("tau_1_2", "linear", "time", 0.01, times="tau_1_2"))
-    expected = 0.01 * log.time * log.tau[:, 0, 1]
-    np.testing.assert_allclose((predicted(log).tau - log.tau)[:, 0, 1], expected, atol=1e-3)
 
 
 def test_a_torque_beside_the_spring_takes_load_off_it():
@@ -209,11 +180,6 @@ def test_plain_data_and_back(tmp_path):
     assert "tau_2_1" in (tmp_path / "model" / "README.md").read_text()
 
 
-def test_from_the_command_line():
-    text = "law:target=tau_2_1,function=linear,of=tau_2_2,amplitude=0.04"
-    assert parse_effect(text) == Law("tau_2_1", "linear", "tau_2_2", 0.04)
-
-
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
@@ -247,22 +213,9 @@ def test_a_robot_that_is_not_there_is_refused(target):
         team_with("a", Law("tau_1_1", "linear", "time + 0.5*phi_4_2", 1.0))
 
 
-def test_every_function_that_is_named_runs():
-    for name in FUNCTIONS:
-        assert np.isfinite(values_of([0.1, 0.2, 0.3], name, 1.0, 1.0)).all()
-
-
 STATE = State(
     3.0, 1e-3, np.array([0.1, 0.2]), np.array([0.0, -0.5]), np.zeros(2), np.zeros(2), np.array([4.0, 0.0])
 )
-
-
-def test_laws_of_other_signals() -> None:
-    """Cross-talk, and friction that goes with the place, by hand."""
-    crossed = JointLaw("torque_2", "linear", "torque_1", 0.05)
-    assert ActingLaw(crossed).torque(STATE) == pytest.approx(0.2)
-    tight = JointLaw("torque_2", "sine", "q_2", 0.3, 2.0, 0.0, 0.1, "direction_2")
-    assert ActingLaw(tight).torque(STATE) == pytest.approx(-0.3 * np.sin(0.5), rel=1e-6)
 
 
 def test_a_law_remembers_within_a_run() -> None:

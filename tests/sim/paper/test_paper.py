@@ -6,9 +6,8 @@ import hashlib
 import io
 import json
 import pickle
-import time
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,10 +16,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joblib import Parallel, delayed
 
 from estimator.arm.unit import COUNT, ArmUnit
-from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedTrial, Calibration
 from estimator.calibrate.json import calibration_from_dict
 from estimator.calibrate.prior import Prior
@@ -32,7 +29,6 @@ from estimator.estimate.uncertainty import StepReport, WeakDirection
 from estimator.rigid_team import Bases
 from mocobot.cli import main
 from mocobot_sim.paper import experiment
-from mocobot_sim.paper import store as shares_module
 from mocobot_sim.paper.experiment import (
     ONE_FIT,
     SELF_CALIBRATED,
@@ -45,13 +41,10 @@ from mocobot_sim.paper.experiment import (
     three_trials,
 )
 from mocobot_sim.paper.scoring import payload_truth, published_errors, score_fit
-from mocobot_sim.paper.store import Store, shares
+from mocobot_sim.paper.store import Store
 from mocobot_sim.paper.tables import BY_ENCODERS, format_tables, summary_table
-from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.trial.sensors import SensorPreset, measure, sensor_preset
-from mocobot_sim.trial.simulate import Simulated, TrialRequest, draw_units
-from mocobot_sim.trial.trial_log import TrialLog
-from mocobot_sim.trial.truth import GroundTruth
+from mocobot_sim.trial.sensors import SensorPreset, sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, draw_units
 from recordings import metadata, small_recording
 
 PAYLOADS = ("a", "b", "c", "d")
@@ -303,13 +296,6 @@ def test_result_does_not_depend_on_jobs_or_on_what_else_runs(folder: Path, resul
     assert same_team == json.loads((folder / "trials.json").read_text())["trials"]
 
 
-def test_order_of_the_presets_does_not_matter() -> None:
-    """The grasps that construct the later trials come from the least ideal preset, whichever is named last."""
-    one, other = (PaperPlan(presets=order).teams() for order in (("nominal", "ideal"), ("ideal", "nominal")))
-    assert [[preset.name for preset in team] for team in one] == [["ideal", "nominal"]]
-    assert one == other
-
-
 def test_tables_show_the_published_figures() -> None:
     """Our column filled with the paper's own numbers must repeat them."""
     scores = {"copy": {payload: published_errors(payload) for payload in PAYLOADS}}
@@ -407,48 +393,6 @@ def test_fits_stand_beside_their_presets(monkeypatch: pytest.MonkeyPatch) -> Non
     assert told[-1][:2] == (plan.steps, plan.steps)
 
 
-def _work(share: Array, amount: float) -> None:
-    share[0] = amount
-
-
-@pytest.mark.slow
-def test_other_processes_fill_shares() -> None:
-    told: list[float] = []
-    with shares(3, told.append) as done, Parallel(n_jobs=2) as pool:
-        assert set(told) == {0.0}
-        pool(delayed(_work)(done[k : k + 1], amount) for k, amount in enumerate((0.25, 0.5, 1.0)))
-    assert told[-1] == 1.75
-
-
-def test_parts_of_trials_count(
-    monkeypatch: pytest.MonkeyPatch, random_a: TrialLog, team_a: TeamScene
-) -> None:
-    """Trials that take four looks each, one of which is the end."""
-    looks = 0.02
-    monkeypatch.setattr(shares_module, "EVERY_S", looks)
-    recording = measure(random_a, sensor_preset("ideal"), np.random.default_rng(0), name="rec")
-
-    def simulate(*_: object, progress: Callable[[int, int], object]) -> Simulated:
-        for quarter in range(5):
-            progress(100 * quarter, 400)
-            time.sleep(3.0 * looks)
-        return Simulated({"ideal": recording}, random_a, GroundTruth.of(team_a))
-
-    monkeypatch.setattr(experiment, "simulate", simulate)
-    monkeypatch.setattr(experiment, "estimate_both", lambda *_: (None, None))
-    monkeypatch.setattr(experiment, "score", lambda *_: {})
-    plan = PaperPlan(payloads=("a",), presets=("ideal",), trials=2)
-    told: list[tuple[float, float, str]] = []
-    run_paper(plan, progress=lambda *now: told.append(now))
-    done = [now for now, _, _ in told]
-    assert done == sorted(done)
-    assert (done[0], done[-1]) == (0.0, plan.steps)
-    assert {steps for _, steps, _ in told} == {plan.steps}
-    stages = list(dict.fromkeys(stage for _, _, stage in told))
-    assert stages == ["random trials", "grasps", "other trials", "estimates"]
-    assert {0.25, 0.5, 0.75, 1.25, 3.5} < set(done)
-
-
 def same(a: Any, b: Any) -> bool:
     """Whether two outcomes are alike, bit by bit."""
     if isinstance(a, np.ndarray):
@@ -485,14 +429,6 @@ def outcomes() -> list[Any]:
         ({"ideal": recording}, TrialSummary("a", 0.1, 0.2, 1e-17, 0.3, -0.0, None)), calibration,
         (estimate, None),
     ]  # fmt: skip
-
-
-def test_every_bit_comes_back(tmp_path: Path) -> None:
-    store = Store(tmp_path, "key", force=False)
-    for k, outcome in enumerate(outcomes()):
-        store.put("some stage", k, outcome)
-        assert store.has("some stage", k)
-        assert same(Store(tmp_path, "key", force=False).get("some stage", k), outcome), outcome
 
 
 class Evil:

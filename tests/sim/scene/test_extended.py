@@ -29,13 +29,12 @@ from mocobot_sim.extended.extended import (
     calibrated_team,
     extra_of,
     load_extended,
-    readme,
     write_calibrated,
     write_extended,
 )
-from mocobot_sim.scene.as_built import CalibrationSpread, units_as_built
+from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import base_height_m, omnid_design
-from mocobot_sim.scene.scene import build_free_team, build_team
+from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
@@ -244,22 +243,6 @@ def test_masses_of_the_arms_are_kept_and_may_be_missing(tmp_path):
     assert older.units[1].to_dict() == replace(units[1], **zero).to_dict()
 
 
-def test_robots_that_hold_nothing_are_no_extended_model(tmp_path):
-    with pytest.raises(InputError, match="the robots hold nothing; an extended model carries a payload"):
-        write_extended(build_free_team(2), [], tmp_path / "model", {})
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("named", [0, 1])
-def test_the_page_tells_what_was_named_from_what_is_as_far_off_as_others(named):
-    effects = [{"cause": f"cause_{k}", "parameters": {"size": 1.0}} for k in range(named + 2)]
-    first, rest = readme(effects, 3, healthy=2).split("Every other part")
-    assert ("No cause was named." in first) == (not named)
-    assert [f"cause_{k}`" in first for k in range(named + 2)] == [k < named for k in range(named + 2)]
-    assert [f"cause_{k}`" in rest for k in range(named + 2)] == [k >= named for k in range(named + 2)]
-    assert "Every other part" not in readme(effects, 3)
-
-
 TILTED = BaseTilt(2, 0.01, -0.02)
 
 
@@ -334,33 +317,6 @@ def test_it_reads_like_the_team_that_was_calibrated(recording: SimulatedRecordin
     for name, left in calibrated.items():
         assert left < 0.05 * designed[name], (name, calibrated, designed)
     assert extra_of(tmp_path / "model") == {"calibrated": True, "payload": "b"}
-
-
-def test_units_are_those_of_the_calibration() -> None:
-    units = invented_calibration(2).units
-    for unit, x in zip(units_as_built(units), units.x, strict=True):
-        one = ArmUnit(units.design, x)
-        np.testing.assert_array_equal(unit.base_radius_m - unit.platform_radius_m, one.of("radius"))
-        np.testing.assert_array_equal(unit.stiffness_ratio, one.of("stiffness_ratio"))
-        np.testing.assert_array_equal(unit.tau_zero_Nm, one.of("tau_zero"))
-        assert unit.wrist_mass_ratio == one.of("wrist_mass_ratio")[0]
-
-
-def test_a_flat_payload_stays_one_in_spite_of_noise() -> None:
-    """A plate's largest moment is the sum of the others; noise makes it more, which no body has."""
-    made = invented_calibration(2)
-    plate = np.array([2.0, 0.0, 0.0, 3.0, 0.0, 5.004])  # about the centre of mass, in {1}
-    held = replace(made.payloads[0], parameters=np.r_[10.0, 0.0, 0.0, 0.0, plate])
-    scene = calibrated_team(replace(made, payloads=(noisy(held, 2e-3),)))
-    moments = np.sort(mocobot.GroundTruth.of(scene).principal_kgm2)
-    np.testing.assert_allclose(moments, [2.0, 3.0, 5.0], atol=5e-3)
-    with pytest.raises(InputError, match="at most the sum of the others"):
-        calibrated_team(replace(made, payloads=(noisy(held, 1e-5),)))
-
-
-def noisy(payload: CalibratedPayload, sd: float) -> CalibratedPayload:
-    count = len(payload.covariance)
-    return replace(payload, covariance=sd**2 * np.eye(count), by_scale=np.zeros(count))
 
 
 def test_what_no_model_can_be_made_of() -> None:

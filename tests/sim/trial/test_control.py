@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import mocobot
 from closed_loop import ClosedLoop
 from command import run
 from estimator.errors import InputError
-from mocobot_sim.control.control import ControlGains, TeamController, home_phi
+from mocobot_sim.control.control import ControlGains, home_phi
 from mocobot_sim.effects import apply_effects, make_effect
 from mocobot_sim.kernels import wrist
 from mocobot_sim.scene.as_built import AsBuilt
@@ -22,7 +19,6 @@ from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_free_team, build_team
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
-from mocobot_view.payload import read_truth
 from payload_mjcf import ONE, Grasp, Payload
 
 REACH, PROXIMAL, ROD = 0.18 - 0.062, 0.200, 0.368
@@ -85,11 +81,6 @@ def test_kinematics_invert_the_closed_form_over_the_whole_workspace():
         np.testing.assert_allclose(wrist(phi, REACH, PROXIMAL, ROD)[0], point, rtol=0, atol=1e-12)
 
 
-def test_home_angle_is_where_the_model_stands(one):
-    assert abs(home_phi(omnid_design()) - 0.6230299772752583) < 1e-15
-    np.testing.assert_allclose(ClosedLoop(one).phi(), home_phi(omnid_design()), rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["a", "b", "c"])
 def test_feed_forward_takes_up_the_static_load(name):
     """Grasps at one height: three moment balances give the vertical loads, whatever the internal forces."""
@@ -109,19 +100,6 @@ def test_feed_forward_takes_up_the_static_load(name):
     for i in range(3):
         R_Wb = loop.data.body(f"omnid{i + 1}/base").xmat.reshape(3, 3)
         np.testing.assert_allclose(loop.controller.feed_forward[i], R_Wb.T @ force_W[i], rtol=0, atol=0.01)
-
-
-def test_feed_forward_freezes_after_the_take_up(teams):
-    loop = ClosedLoop(teams[2])
-    home = teams[2].wrist_home_b
-    loop.run(0.9, home)
-    before = loop.controller.feed_forward
-    loop.run(0.09, home + 0.02)
-    assert np.abs(loop.controller.feed_forward - before).max() > 0.1
-    loop.run(0.02, home + 0.02)
-    frozen = loop.controller.feed_forward
-    loop.run(0.5, home - 0.02)
-    np.testing.assert_array_equal(loop.controller.feed_forward, frozen)
 
 
 def test_gravity_compensation_floats_the_bare_arm_anywhere(feather):
@@ -169,13 +147,6 @@ def test_motor_torque_saturates(feather):
     np.testing.assert_array_equal(loop.data.ctrl[loop.index.actuator[0]], 1.5)
 
 
-def test_starts_without_a_jolt(teams):
-    """The first command is the static torque: what MuJoCo needs to stand still."""
-    loop = ClosedLoop(teams[5])
-    loop.controller.update(teams[5].wrist_home_b, np.zeros((5, 3)))
-    np.testing.assert_allclose(loop.data.ctrl[loop.index.actuator], loop.torque, rtol=0, atol=1e-9)
-
-
 def test_encoder_zeros_displace_the_true_wrist_not_the_believed_one(one):
     zero = np.array([0.02, -0.01, 0.015])
     loop = ClosedLoop(one, as_built=[AsBuilt(phi_zero_rad=zero)])
@@ -200,24 +171,6 @@ def test_torque_zeros_are_taken_up_as_load(one):
     np.testing.assert_allclose(forces[1] - forces[0], np.linalg.solve(J.T, zero), rtol=1e-9)
 
 
-def test_each_robot_hears_only_its_own_sensors(teams):
-    units = [AsBuilt(), AsBuilt(phi_zero_rad=np.full(3, 0.01), tau_zero_Nm=np.full(3, 0.1))]
-    plain, zeroed = ClosedLoop(teams[2]), ClosedLoop(teams[2], as_built=units)
-    for loop in (plain, zeroed):
-        loop.controller.update(teams[2].wrist_home_b, np.zeros((2, 3)))
-    first, second = plain.index.actuator
-    np.testing.assert_array_equal(plain.data.ctrl[first], zeroed.data.ctrl[first])
-    assert np.all(plain.data.ctrl[second] != zeroed.data.ctrl[second])
-
-
-def test_gains_survive_a_round_trip():
-    gains = ControlGains(stiffness_N_per_m=321.0, rate_hz=500.0)
-    values = gains.to_dict()
-    assert ControlGains.from_dict(values | {"feed_forward_N": [[0, 0, 1]]}) == gains
-    assert ControlGains.from_dict({k: int(v) if v >= 1 else v for k, v in values.items()}) == gains
-    assert list(values) == [entry.name for entry in dataclasses.fields(ControlGains)]
-
-
 @pytest.mark.parametrize("bad", [-1.0, float("nan"), float("inf"), True, "400", None, 10**400])
 def test_bad_gain_is_named(bad):
     values = ControlGains().to_dict() | {"damping_Ns_per_m": bad}
@@ -227,13 +180,6 @@ def test_bad_gain_is_named(bad):
         ControlGains.from_dict(values)
     with pytest.raises(InputError, match=r"control\.rate_hz is None"):
         ControlGains.from_dict({k: v for k, v in values.items() if k != "rate_hz"})
-
-
-def test_wrong_number_of_units_is_refused(teams):
-    """Also one unit for several robots: it must not be read past its end, nor be everybody's."""
-    loop = ClosedLoop(teams[2])
-    with pytest.raises(InputError, match="as_built has 1 units; the payload has 2 grasps"):
-        TeamController(loop.index, omnid_design(), ControlGains(), loop.data, [AsBuilt()])
 
 
 def held(scene: TeamScene, samples: int = 2) -> Trajectory:
@@ -288,17 +234,6 @@ def test_robots_that_hold_nothing_are_stable() -> None:
     assert found.warning is None
 
 
-def test_the_truth_beside_a_recording_says_it(tmp_path: Path) -> None:
-    for damping, stable in ((50.0, True), (5.0, False)):
-        done = mocobot.simulate("a", vias=1, gains=ControlGains(damping_Ns_per_m=damping))
-        done.write(tmp_path / f"{damping}.parquet")
-        control = json.loads((tmp_path / f"{damping}.truth.json").read_text(encoding="utf-8"))["control"]
-        assert control["stable"] is stable
-        assert set(control) == {"stable", "damping_ratio", "frequency_Hz", "growth_per_s"}
-        assert read_truth(tmp_path / f"{damping}.parquet", robots=3).mass_kg == done.truth.mass_kg
-        assert "stable" not in (done.metadata.control or {})  # nothing that diagnoses is told
-
-
 def test_the_command_warns_of_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "rec.parquet"
     lag = "torque_lag:robot=2,time_constant=0.006"
@@ -322,15 +257,3 @@ def test_a_gain_out_of_its_range_is_refused(name: str, bad: float, allowed: str)
     with pytest.raises(InputError) as refusal:
         replace(ControlGains(), **{name: bad})
     assert str(refusal.value) == f"control.{name} is {bad!r}; it must be a number from {allowed}"
-
-
-def test_missing_gain_is_named():
-    with pytest.raises(InputError, match=r"control\.rate_hz is None"):
-        ControlGains.from_dict({k: v for k, v in ControlGains().to_dict().items() if k != "rate_hz"})
-
-
-def test_theta_zeros_do_not_reach_the_controller(one):
-    loops = [ClosedLoop(one, as_built=u) for u in ([], [AsBuilt(theta_zero_rad=np.full(3, 0.1))])]
-    for loop in loops:
-        loop.run(0.1, one.wrist_home_b + np.array([0.01, 0.02, 0.03]))
-    np.testing.assert_array_equal(loops[0].data.qpos, loops[1].data.qpos)

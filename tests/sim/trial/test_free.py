@@ -16,7 +16,6 @@ from estimator.arm.unit import Arms as Arm
 from estimator.errors import InputError
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.effects import EFFECTS, apply_effects
-from mocobot_sim.guided import PushingHand
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_free_team
@@ -157,21 +156,6 @@ def test_gimbals_stay_as_they_were_left(trials: dict[str, TrialLog]) -> None:
     np.testing.assert_allclose(log.R_W1 - log.R_W1[0], 0.0, atol=1e-9)
 
 
-def test_the_motion_has_holds_all_over_the_workspace_and_haste() -> None:
-    ref = free_motion(np.tile(HOME, (2, 1)), np.random.default_rng(0)).ref_b
-    reach = np.linalg.norm(ref - HOME, axis=-1)
-    assert 0.1 < reach.max() < DESIGN.workspace_radius_m
-    speed = np.linalg.norm(np.diff(ref, axis=0), axis=-1) * RATE_HZ
-    still = np.diff(np.concatenate([[0.0], (speed[:, 0] == 0.0).astype(float), [0.0]]))
-    lengths = (np.flatnonzero(still < 0) - np.flatnonzero(still > 0)) / RATE_HZ
-    places = ref[:-1, 0][np.flatnonzero(still[:-1] > 0)[lengths > 1.3]]
-    assert len(places) == 22  # and home at both ends
-    assert np.ptp(places, axis=0).min() > 0.1
-    assert speed.max() > 0.5
-    assert not np.allclose(ref[:, 0], ref[:, 1])
-    np.testing.assert_allclose(ref[[0, -1]], np.tile(HOME, (2, 2, 1)), atol=1e-12)
-
-
 def test_the_units_are_those_of_the_seeds_carrying_trials() -> None:
     preset = PRESETS["uncalibrated"]
     done = simulate(TrialRequest("c", "free", seed=5, vias=1, robots=2), [preset])
@@ -188,28 +172,6 @@ def test_the_units_are_those_of_the_seeds_carrying_trials() -> None:
     again = resimulate(recording, build_free_team(2, done.truth.units))
     late = slice(round(SETTLE_S * RATE_HZ), None)
     np.testing.assert_allclose(again.tau[late], done.log.tau[late], atol=1e-6)
-
-
-def test_as_many_robots_as_the_payload_has_grasps() -> None:
-    done = simulate(TrialRequest("d", "free", vias=1), [PRESETS["ideal"]])
-    assert done.log.robots == 3
-    assert not np.allclose(done.log.theta[0], 0.0, atol=0.05)
-
-
-def test_masses_are_drawn_after_all_else() -> None:
-    plain = CalibrationSpread(0.1, 0.2, 0.3, 0.4)
-    spread = replace(plain, arm_mass_ratio=0.5)
-    units = spread.draw(1000, np.random.default_rng(11))
-    for one, other in zip(units[:50], plain.draw(50, np.random.default_rng(11)), strict=True):
-        masses = {"proximal_mass_ratio": np.zeros(3), "rod_mass_ratio": np.zeros(3), "wrist_mass_ratio": 0.0}
-        assert replace(one, **masses).to_dict() == other.to_dict()
-    few = spread.draw(2, np.random.default_rng(11))
-    assert [u.to_dict() for u in few] == [u.to_dict() for u in units[:2]]
-    drawn = np.array([[*u.proximal_mass_ratio, *u.rod_mass_ratio, u.wrist_mass_ratio] for u in units])
-    # 1000 draws each: the standard deviation is good to 2.2 %, the correlations to 0.032 (five sigma below).
-    np.testing.assert_allclose(drawn.std(axis=0), 0.5, rtol=0.11)
-    assert np.abs(np.corrcoef(drawn.T) - np.eye(7)).max() < 0.16
-    assert spread != CalibrationSpread()
 
 
 def test_masses_change_mass_and_inertia_together_and_nothing_else() -> None:
@@ -236,13 +198,6 @@ def test_effects_on_a_payload_are_refused(cause: str) -> None:
             apply_effects(team, [example(cause)])
     else:
         assert apply_effects(team, [example(cause)]).compile().nv >= 18
-
-
-def test_a_hand_has_nothing_to_hold() -> None:
-    scene, still = build_free_team(1), free_motion(HOME, np.random.default_rng(0), vias=1)
-    hand = PushingHand(np.zeros(3), np.ones(3), 1.0, 1.0)
-    with pytest.raises(InputError, match="the robots hold nothing; a hand needs a payload"):
-        run_trial(scene, still, actors=[hand])
 
 
 @pytest.mark.parametrize(

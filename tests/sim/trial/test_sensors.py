@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains
-from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
+from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure, sensor_preset
@@ -75,31 +75,6 @@ def test_readings_lie_on_the_grid(random_a):
         assert abs(error.mean()) < 0.1 * step
 
 
-def test_every_channel_has_its_own_grid(random_a):
-    """Robots that stand alike must not round alike: where the grids lie is uniform within a step."""
-    phases = []
-    for seed in range(60):
-        recording = measure(random_a, sensor_preset("nominal"), _rng(seed))
-        for channel, step in (("phi", 2 * np.pi / 65536), ("theta", 2 * np.pi / 65536), ("tau", 0.01)):
-            phases.append(np.ravel(getattr(recording, channel)[0] / step % 1.0))
-    phases = np.ravel(phases)
-    assert len(phases) == 60 * 27
-    counts = np.histogram(phases, bins=10, range=(0, 1))[0]
-    assert chi2.sf(np.sum((counts - 162) ** 2 / 162), 9) > 1e-4
-    one = np.array(phases).reshape(60, 27)
-    assert np.abs(np.corrcoef(np.exp(2j * np.pi * one).T) - np.eye(27)).max() < 0.6
-
-
-@pytest.mark.parametrize("bits", [8, 14, 17])
-def test_resolution_follows_the_bits(random_a, bits):
-    recording = measure(random_a, SensorPreset("test", encoder_bits=bits), _rng())
-    step = 360.0 / 2**bits
-    counts = np.rad2deg(recording.phi - recording.phi[0]) / step
-    np.testing.assert_allclose(counts, np.round(counts), rtol=0, atol=1e-6)
-    assert abs(np.diff(np.unique(np.round(counts))).min() - 1) < 1e-9
-    np.testing.assert_array_equal(recording.tau, random_a.tau)
-
-
 def _check_sigma(values: np.ndarray, sigma: float) -> None:
     n = values.size
     low, high = chi2.ppf([1e-6, 1 - 1e-6], n)
@@ -117,13 +92,6 @@ def test_torque_noise_has_the_stated_deviation_and_is_white(random_a):
     assert np.abs(np.corrcoef(flat.T) - np.eye(9)).max() < bound
     assert np.abs(np.mean(flat[1:] * flat[:-1], axis=0)).max() / 0.03**2 < bound
     np.testing.assert_array_equal(recording.phi, random_a.phi)
-
-
-def test_noise_comes_before_rounding(random_a):
-    """Rounded to 0.01 N m, the error of nominal sensors is noise plus a uniform step: variances add."""
-    recording = measure(random_a, sensor_preset("nominal"), _rng(2))
-    error = recording.tau - random_a.tau
-    np.testing.assert_allclose(error.std(), np.sqrt(0.01**2 + 0.01**2 / 12), rtol=0.03)
 
 
 def test_zeros_shift_the_readings_of_their_own_channel(random_a):
@@ -165,15 +133,3 @@ def test_metadata_says_what_was_simulated(random_a):
     assert meta.design == omnid_design(), "the design, not the unit as built"
     assert ControlGains.from_dict(meta.control) == random_a.gains
     np.testing.assert_array_equal(meta.control["feed_forward_N"], random_a.feed_forward)
-
-
-def test_calibrated_means_no_spread_at_all():
-    for entry in dataclasses.fields(CalibrationSpread):
-        assert not SensorPreset("test", spread=CalibrationSpread(**{entry.name: 1e-9})).calibrated
-
-
-def test_geometry_does_not_reach_the_sensors(random_a):
-    units = _units(base_radius_m=[1e-3] * 3, rod_length_m=[1e-3] * 3, proximal_length_m=[1e-3] * 3)
-    recording = measure(dataclasses.replace(random_a, units=units), sensor_preset("ideal"), _rng())
-    np.testing.assert_array_equal(recording.phi, random_a.phi)
-    np.testing.assert_array_equal(recording.tau, random_a.tau)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import Rotation
 
 from closed_loop import in_world
 from estimator.errors import InputError
@@ -14,18 +14,13 @@ from mocobot_sim.trial.trajectories import (
     PlanarMotion,
     Trajectory,
     carried,
-    compose,
-    minimum_jerk,
     moved,
     plan,
     random_vias,
     relative,
     sphere_motion,
     static_orientations,
-    wrapped,
-    yaw_of,
 )
-from payload_mjcf import TEAMS
 
 SHIPPED = ["a", "b", "c", "d"]
 HOME = np.array([0.0, 0.0, 0.355])
@@ -46,16 +41,6 @@ def _moves(path: np.ndarray) -> list[tuple[int, int]]:
     moving = np.concatenate([[False], np.any(np.diff(path, axis=0) != 0, axis=1), [False]])
     edges = np.flatnonzero(np.diff(moving.astype(int)))
     return list(zip(edges[::2], edges[1::2], strict=True))
-
-
-def test_minimum_jerk_starts_and_stops_smoothly():
-    s = np.linspace(0, 1, 2001)
-    values = minimum_jerk(s)
-    assert (values[0], values[-1]) == (0.0, 1.0)
-    np.testing.assert_allclose(values + values[::-1], 1.0, atol=1e-14)
-    rate = np.gradient(values, s)
-    np.testing.assert_allclose(rate[1:-1], 30 * (s * (1 - s))[1:-1] ** 2, rtol=0, atol=3e-6)
-    np.testing.assert_array_equal(minimum_jerk(np.array([-3.0, 4.0])), [0.0, 1.0])
 
 
 def test_eighty_straight_transits_with_dwells(vias):
@@ -92,14 +77,6 @@ def test_eighty_straight_transits_with_dwells(vias):
     assert np.abs(np.corrcoef(flat.T) - np.eye(9)).max() < 0.4, "robots and axes move independently"
     assert vias.duration_s == (len(vias.ref_b) - 1) / 100
     assert not np.any(np.diff(vias.ref_b[-round(SETTLE_S * 100) :], axis=0)), "at rest at the end"
-
-
-@pytest.mark.parametrize("robots", [1, 2, 5])
-def test_vias_for_any_number_of_robots(teams, robots):
-    ref = random_vias(teams[robots].wrist_home_b, np.random.default_rng(2), vias=3).ref_b
-    assert ref.shape[1:] == (robots, 3)
-    assert [len(_moves(ref[:, i])) for i in range(robots)] == [4] * robots
-    np.testing.assert_array_equal(ref[0], teams[robots].wrist_home_b)
 
 
 def test_same_seed_same_bits(shipped):
@@ -186,27 +163,6 @@ def test_periodic_rotation_has_the_amplitude_and_frequencies_asked_for(shipped):
     assert motion.duration_s == 60.0 + 2 * SETTLE_S
 
 
-@pytest.mark.parametrize("robots", [2, 5])
-def test_periodic_and_static_fit_payloads_of_other_sizes(teams, robots):
-    scene = teams[robots]
-    for motion in (
-        sphere_motion(scene.wrist_home_b, scene.X_1i, 8.0, np.random.default_rng(0)),
-        static_orientations(scene.wrist_home_b, scene.X_1i),
-    ):
-        world = in_world(scene, motion.ref_b)
-        np.testing.assert_allclose(world[0] - world[0, 0], scene.X_1i.translation, rtol=0, atol=1e-12)
-        assert len(TEAMS[robots].grasps) == world.shape[1]
-        _worn_by_a_rigid_body(world)
-        assert np.ptp(motion.ref_b, axis=0).max() > 0.05
-
-
-def test_collinear_grasps_turn_about_their_centroid(teams):
-    scene = teams[2]
-    motion = sphere_motion(scene.wrist_home_b, scene.X_1i, 8.0, np.random.default_rng(0))
-    middle = in_world(scene, motion.ref_b).mean(axis=1)
-    np.testing.assert_allclose(middle, np.tile(middle[0], (len(middle), 1)), rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("name", SHIPPED)
 def test_six_distinct_still_orientations(shipped, name):
     scene = shipped[name]
@@ -257,10 +213,6 @@ def test_one_robot_cannot_turn_a_payload_about_a_point(motion, teams):
         motion(teams[1].wrist_home_b, teams[1].X_1i)
 
 
-def _transform(pose: np.ndarray) -> RigidTransform:
-    return RigidTransform.from_components([*pose[:2], 0.0], Rotation.from_euler("z", pose[2]))
-
-
 def _matrix(pose: np.ndarray) -> np.ndarray:
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     return np.array([[cos, -sin, pose[0]], [sin, cos, pose[1]], [0.0, 0.0, 1.0]])
@@ -271,20 +223,6 @@ def poses() -> np.ndarray:
     return np.random.default_rng(2).uniform(-3.0, 3.0, (30, 2, 3))
 
 
-def test_composing_and_seen_from(poses):
-    for a, b in poses:
-        joined = _transform(a) * _transform(b)
-        ours = compose(a, b)
-        np.testing.assert_allclose(ours[:2], joined.translation[:2], atol=1e-13)
-        np.testing.assert_allclose(wrapped(ours[2] - joined.rotation.as_euler("zyx")[0]), 0.0, atol=1e-13)
-        seen = relative(a, b)
-        np.testing.assert_allclose(
-            seen[:2], (_transform(a).inv() * _transform(b)).translation[:2], atol=1e-13
-        )
-        np.testing.assert_allclose(compose(a, seen)[:2], b[:2], atol=1e-13)
-    np.testing.assert_allclose(compose(poses[:, 0], poses[:, 1])[7], compose(*poses[7]), atol=1e-14)
-
-
 def test_odometry_is_the_exponential_of_the_twist(poses):
     for pose, step in poses:
         twist = np.array([[0.0, -step[0], step[1]], [step[0], 0.0, step[2]], [0.0, 0.0, 0.0]])
@@ -293,14 +231,6 @@ def test_odometry_is_the_exponential_of_the_twist(poses):
     np.testing.assert_allclose(
         moved([1.0, 2.0, np.pi / 2], [0.0, 0.3, 0.1]), [0.9, 2.3, np.pi / 2], atol=1e-15
     )
-
-
-def test_angles_are_wrapped_and_read_off_rotations():
-    angles = np.array([-7.0, -np.pi, 0.0, 3.0, 4.0, 100.0])
-    np.testing.assert_allclose(np.exp(1j * wrapped(angles)), np.exp(1j * angles), atol=1e-13)
-    assert (np.abs(wrapped(angles)) <= np.pi).all()
-    tilted = Rotation.from_euler("ZYX", [[0.7, 0.1, -0.2], [-2.0, 0.0, 0.3]])
-    np.testing.assert_allclose(yaw_of(tilted.as_matrix()), [0.7, -2.0], atol=1e-14)
 
 
 @pytest.fixture(scope="module")
