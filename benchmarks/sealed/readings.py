@@ -123,32 +123,6 @@ class EncoderBacklash(Misread):
 
 
 @dataclass(frozen=True)
-class SoftEncoderMount(Misread):
-    """A driven joint's encoder gives way to the joint's torque."""
-
-    channel, size, either_sign = "phi", "rad_per_Nm", True
-    ranges: ClassVar = {"rad_per_Nm": (-0.1, 0.1)}
-    formula: ClassVar = (["own tau"], "a tau", "rad/(N m)")
-    rad_per_Nm: float
-
-    def error(self, now: Instant) -> float:
-        return self.rad_per_Nm * now.tau(self.joint)
-
-
-@dataclass(frozen=True)
-class SlippingZero(Misread):
-    """A gimbal encoder's zero slips steadily, in every trial anew."""
-
-    channel, size, either_sign = "theta", "rate_radps", True
-    ranges: ClassVar = {"rate_radps": (-0.1, 0.1)}
-    formula: ClassVar = (["t"], "a t", "rad/s")
-    rate_radps: float
-
-    def error(self, now: Instant) -> float:
-        return self.rate_radps * now.time
-
-
-@dataclass(frozen=True)
 class CrossTalk(Misread):
     """A torque sensor that also feels its neighbour's load."""
 

@@ -95,9 +95,6 @@ PLACES: dict[str, tuple[str, ...]] = {
     "torque in gimbal axis": ("torque in gimbal axis {joint} of robot {robot}",),
     "force on the payload, in the world": ("force and moment on the payload",),
     "moment on the payload": ("angular momentum inside the payload", "force and moment on the payload"),
-    "force and moment on the payload": (
-        "first moment of the payload's mass", "force and moment on the payload"
-    ),
     "displacement of the base, down": (
         "displacement of base of robot {robot}", "displacement of grasp of robot {robot}"
     ),
@@ -107,10 +104,10 @@ FORMULAS: dict[str, tuple[str, ...]] = {
     "cross_talk": ("linear",), "warming_scale": ("warming",), "warming_zero": ("warming",),
     "saturation": ("above", "beyond"), "quadratic_reading": ("square",), "angle_in_torque": ("sine",),
     "torque_hum": ("hum",), "eccentric_phi": ("sine",), "eccentric_theta": ("sine",),
-    "cyclic_phi": ("sine",), "encoder_backlash": ("play",), "soft_encoder_mount": ("linear",),
-    "slipping_zero": ("linear",), "cogging": ("sine",), "cubic_spring": ("cube",), "cable_spring": ("linear",),
-    "door_closer": ("above",), "growing_push": ("linear",), "shaker": ("hum",), "gyroscope": ("constant",),
-    "shifting_load": ("second_order",), "sinking_base": ("warming",),
+    "cyclic_phi": ("sine",), "encoder_backlash": ("play",),
+    "cogging": ("sine",), "cubic_spring": ("cube",), "cable_spring": ("linear",),
+    "growing_push": ("linear",), "gyroscope": ("constant",),
+    "sinking_base": ("warming",),
 }  # fmt: skip
 """Functions of the dictionary that are the hidden formula."""
 PERIODS: dict[str, float] = {"eccentric_phi": 1.0, "eccentric_theta": 1.0, "cyclic_phi": 16.0}
@@ -118,9 +115,9 @@ VARIABLES: dict[str, tuple[set[str], ...]] = {
     "warming_scale": ({"time", "tau"},), "warming_zero": ({"time"},), "saturation": ({"tau"},),
     "quadratic_reading": ({"tau"},), "angle_in_torque": ({"phi"},),
     "torque_hum": ({"time"},), "eccentric_phi": ({"phi"},), "eccentric_theta": ({"theta"},), "cyclic_phi": ({"phi"},),
-    "encoder_backlash": ({"phi"},), "soft_encoder_mount": ({"tau"},), "slipping_zero": ({"time"},),
-    "cogging": ({"phi"},), "cubic_spring": ({"theta"},), "cable_spring": ({"theta"},), "door_closer": ({"phi_rate"},),
-    "growing_push": ({"time"},), "shaker": ({"time"},), "gyroscope": ({"time"},), "sinking_base": ({"time"},),
+    "encoder_backlash": ({"phi"},),
+    "cogging": ({"phi"},), "cubic_spring": ({"theta"},), "cable_spring": ({"theta"},),
+    "growing_push": ({"time"},), "gyroscope": ({"time"},), "sinking_base": ({"time"},),
 }  # fmt: skip
 """Signals of the hidden formula, of its own joint."""
 
@@ -135,7 +132,7 @@ def _inside(numbers: Item, effect: Item) -> bool:
     }
     near = {
         "times": 0.1,
-        "frequency_hz": 0.25 if effect["cause"] == "shifting_load" else 0.01,
+        "frequency_hz": 0.01,
         "time_s": 0.25,
     }
     return all(
@@ -165,8 +162,6 @@ def _variable(cause: Item, effect: Item) -> bool:
     own = {name.removesuffix(f"_{joint[2]}_{joint[1]}") if joint else name for name in found}
     if effect["cause"] == "cross_talk":
         return found == {f"tau_{effect['law']['place']['robot']}_{int(effect['parameters']['neighbour'])}"}
-    if effect["cause"] == "shifting_load":
-        return all(name.startswith(("payload_felt", "payload_up", "payload_acceleration")) for name in found)
     return own in VARIABLES.get(effect["cause"], (own,))  # of an event any
 
 
