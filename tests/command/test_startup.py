@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -52,50 +53,38 @@ NUMBERS = {
 """Mistakes in the numbers of an effect."""
 
 
-@pytest.mark.parametrize("name", REFUSED | NAMES_AND_FILES)
-def test_a_refusal_loads_nothing_that_takes_time(name, tmp_path):
+def refusals(commands: list[list[str]], slow: set[str], folder: Path) -> list[str]:
+    """What each command says, one after the other in one new process that must not import what is slow."""
+    code = (
+        "import sys, mocobot.cli\n"
+        f"for words in {commands!r}:\n"
+        "    try: mocobot.cli.main(words)\n"
+        "    except SystemExit as stop: assert stop.code == 2, (words, stop.code)\n"
+        "    else: raise AssertionError(f'not refused: {words}')\n"
+        f"    assert not {slow!r} & set(sys.modules), (words, {slow!r} & set(sys.modules))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    said = re.split(r"^mocobot: ", done.stderr, flags=re.MULTILINE)[1:]
+    assert len(said) == len(commands), done.stderr
+    return said
+
+
+def test_a_refusal_loads_nothing_that_takes_time(tmp_path):
     for file in ("whole.csv", "whole.h5", "whole.xml", "empty.parquet"):
         (tmp_path / file).touch()
     (tmp_path / "cut.parquet").write_bytes(b"PAR1" + bytes(100))
-    code = (
-        "import sys, mocobot.cli\n"
-        f"try: mocobot.cli.main({(REFUSED | NAMES_AND_FILES)[name].split()!r})\n"
-        "except SystemExit as stop: assert stop.code == 2, stop.code\n"
-        "else: raise AssertionError('not refused')\n"
-        f"assert not {SLOW!r} & set(sys.modules), {SLOW!r} & set(sys.modules)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.startswith("mocobot: ")
-    assert any(
-        why in done.stderr
-        for why in (
-            "there is no such",
-            "does not exist",
-            "or a damaged one",
-            "no known format",
-            "is a file",
-        )
-    )
+    why = ("there is no such", "does not exist", "or a damaged one", "no known format", "is a file")
+    for said in refusals([text.split() for text in (REFUSED | NAMES_AND_FILES).values()], SLOW, tmp_path):
+        assert any(reason in said for reason in why), said
 
 
-@pytest.mark.parametrize("text", NUMBERS)
-def test_an_effects_numbers_are_refused_without_the_simulator(text, tmp_path):
-    code = (
-        "import sys, mocobot.cli\n"
-        f"try: mocobot.cli.main(['simulate', '--effect', {text!r}, '--out', 'new.parquet'])\n"
-        "except SystemExit as stop: assert stop.code == 2, stop.code\n"
-        "else: raise AssertionError('not refused')\n"
-        f"slow = {SLOW - {'numpy'}!r} & set(sys.modules)\n"
-        "assert not slow, slow\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert NUMBERS[text] in done.stderr
+def test_an_effects_numbers_are_refused_without_the_simulator(tmp_path):
+    commands = [["simulate", "--effect", text, "--out", "new.parquet"] for text in NUMBERS]
+    for wanted, said in zip(NUMBERS.values(), refusals(commands, SLOW - {"numpy"}, tmp_path), strict=True):
+        assert wanted in said
 
 
 def test_effects_are_known_without_the_simulator():

@@ -82,8 +82,8 @@ def test_a_base_creeps_from_its_start_on():
 
 
 @pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
-@pytest.mark.parametrize("compliance", [1e-7, 1e-6, 1e-5, 1e-4])
-@pytest.mark.parametrize("mass", [0.03, 3.0, 40.0])
+@pytest.mark.parametrize("compliance", [1e-7, 1e-4])
+@pytest.mark.parametrize("mass", [0.03, 40.0])
 def test_a_spring_row_hangs_a_weight_by_its_compliance(timestep_s, compliance, mass):
     solref, solimp = spring_parameters(compliance, 1.0 / mass)
     model = mujoco.MjModel.from_xml_string(
@@ -153,16 +153,14 @@ def test_a_yielding_base_gives_way_by_compliance_times_horizontal_force(robot):
 
 
 @ROBOT
-@pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
 @pytest.mark.parametrize(
-    ("cause", "size", "relaxation_s"),
+    ("timestep_s", "cause", "size", "relaxation_s"),
     [
-        ("grasp_flex", 1e-7, 0.0),
-        ("grasp_flex", 1e-5, 0.0),
-        ("grasp_flex", 1e-7, 0.005),
-        ("grasp_flex", 1e-5, 0.03),
-        ("base_compliance", 1e-5, 0.0),
-        ("base_compliance", 1e-7, 0.005),
+        (1e-3, "grasp_flex", 1e-7, 0.0),
+        (0.25e-3, "grasp_flex", 1e-5, 0.0),
+        (1e-3, "grasp_flex", 1e-5, 0.03),
+        (1e-3, "base_compliance", 1e-5, 0.0),
+        (0.25e-3, "base_compliance", 1e-7, 0.005),
     ],
 )
 def test_what_yields_is_stable_and_leaves_the_rods_closed(robot, timestep_s, cause, size, relaxation_s):
