@@ -111,6 +111,21 @@ def test_modules_that_are_mentioned_exist(page: Path) -> None:
     assert sorted(name for name in named if not is_there(name)) == []
 
 
+@pytest.mark.parametrize("top", ["benchmarks", "scenarios"])
+def test_what_programs_import_from_the_source_is_there(top: str) -> None:
+    """No test runs them whole, and what they measure stands in the pages."""
+    files = sorted((ROOT / top).rglob("*.py"))
+    assert files
+    named = [
+        (file.name, f"{node.module}.{alias.name}")
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in PACKAGES
+        for alias in node.names
+    ]
+    assert [f"{name}: {dotted}" for name, dotted in named if not is_there(dotted)] == []
+
+
 def test_pages_that_the_code_mentions_exist() -> None:
     wrong = []
     for top in set(TOP) - {"docs"}:
