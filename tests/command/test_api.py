@@ -112,7 +112,7 @@ class Tags(HTMLParser):
 def test_every_example_of_the_page_runs(tmp_path, monkeypatch):
     """In order and in one place, as a reader would run them; what they leave is looked at here."""
     monkeypatch.chdir(tmp_path)
-    assert len(EXAMPLES) == 9
+    assert len(EXAMPLES) == 8
     space: dict[str, object] = {"__name__": "page"}
     for example in EXAMPLES:
         exec(compile(example, f"docs/api.md: {example[:40]!r}", "exec"), space)
