@@ -23,7 +23,9 @@ import numpy as np
 import tyro
 from scipy.spatial.transform import Rotation
 
-from discrepancy.joints.calibration import CENTRAL, ArmCalibration, Fit, calibrate_arm
+from discrepancy.joints.calibration import ArmCalibration, calibrate_arm
+from discrepancy.joints.fit import Fit
+from discrepancy.joints.link_prior import CENTRAL
 from discrepancy.joints.mechanics import horizontal, inertial_parameters
 from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.trials import trials_of

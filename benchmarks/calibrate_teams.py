@@ -61,8 +61,6 @@ def tables(results: Iterable[Mapping[str, Any]]) -> str:
             ["", "trial", "after: loops", "balance", "held out: loops", "balance", "steps", "CPU [s]"],
             [row for name, group in groups.items() if "trials" in group[0] for row in _fit_rows(name, group)],
         ),
-        "Robots: rms error and claimed standard error of each kind of deviation",
-        _table(*_units_table({name: group for name, group in groups.items() if group[0].get("units")})),
     ]
     if failed:
         parts += ["Not done", "\n".join(failed)]
@@ -138,20 +136,6 @@ def _fit_rows(name: str, group: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     return out
 
 
-def _units_table(groups: Mapping[str, Sequence[Mapping[str, Any]]]) -> tuple[list[str], list[list[str]]]:
-    names = [name for group in groups.values() for name in group[0]["units"]["groups"]]
-    names = list(dict.fromkeys(names))
-    rows = []
-    for name, group in groups.items():
-        cells = [name]
-        for kind in names:
-            pairs = np.array([result["units"]["groups"][kind] for result in group])
-            error, claimed = np.sqrt(np.mean(pairs**2, axis=0))
-            cells.append(f"{error:.2g} ({claimed:.2g})")
-        rows.append(cells)
-    return ["", *names], rows
-
-
 def _rms(values: np.ndarray) -> str:
     return f"{np.sqrt(np.mean(values**2)):.2g}"
 
@@ -160,7 +144,7 @@ def _spread(values: np.ndarray) -> str:
     return f"{np.median(values):.2f} ({values.max():.2f})"
 
 
-Part = Literal["main", "prior", "weighed", "transfer", "masses", "tilt", "robots", "nominal"]
+Part = Literal["main", "weighed", "transfer", "masses", "tilt", "robots", "nominal"]
 
 
 @dataclass(frozen=True)
@@ -168,9 +152,8 @@ class Options:
     """Command line.
 
     Attributes:
-        part: what to run: estimates and calibrations of uncalibrated teams; priors three times too narrow and too wide;
-            one known weight; robots calibrated on payload (a); arm masses off by 5 %; bases that do not stand level;
-            teams of other sizes; robots as designed.
+        part: what to run: estimates and calibrations of uncalibrated teams; one known weight; robots calibrated on
+            payload (a); arm masses off by 5 %; bases that do not stand level; teams of other sizes; robots as designed.
         seeds: one team of robots each.
         payloads: what each carries.
         robots: sizes of the teams of part "robots".

@@ -331,12 +331,7 @@ def score_units(calibration: Calibration, truth: Truth) -> dict[str, Any]:
     if not factor.size:
         return {}
     back = np.linalg.pinv(factor)
-    variance = np.diag(calibration.covariance).reshape(error.shape)
-    groups = {
-        name: [float(np.sqrt(np.mean(part[:, at] ** 2))) for part in (error, np.sqrt(variance))]
-        for name, at in AT.items()
-    }
-    return claim(back @ error.ravel(), back @ calibration.covariance @ back.T) | {"groups": groups}
+    return claim(back @ error.ravel(), back @ calibration.covariance @ back.T)
 
 
 def found_of(one: CalibratedPayload, covariance: Array) -> Found:
@@ -368,8 +363,6 @@ WEIGHED = 1e-4
 
 PRIORS = {
     "calibrated": Prior(),
-    "narrow": Prior().scaled(1.0 / 3.0),
-    "wide": Prior().scaled(3.0),
     "masses": Prior(arm_mass_ratio=ARM_MASS_RATIO),
     "tilted": Prior(tilt_rad=TILT_RAD),
     "held": HELD,
@@ -382,8 +375,7 @@ class Task:
 
     Attributes:
         method: "staged", "joint", a key of ``PRIORS``, "weighed" (this payload's weight is known, another's is asked
-            for), "weighed masses" (and the arms' masses are not known), "free" (a recording of unloaded arms decides
-            these) or "transfer" (robots from payload (a)).
+            for), "free" (a recording of unloaded arms decides these masses) or "transfer" (robots from payload (a)).
         team: the team.
     """
 
@@ -395,7 +387,7 @@ def tasks(part: str, seeds: Sequence[int], payloads: Sequence[str], robots: Sequ
     """What one part of the campaign consists of.
 
     Args:
-        part: "main", "prior", "weighed", "transfer", "masses", "tilt", "robots" or "nominal".
+        part: "main", "weighed", "transfer", "masses", "tilt", "robots" or "nominal".
         seeds: of the teams.
         payloads: what they carry.
         robots: sizes of teams in part "robots".
@@ -410,10 +402,9 @@ def tasks(part: str, seeds: Sequence[int], payloads: Sequence[str], robots: Sequ
     }.get(part, {})
     methods = {
         "main": ("staged", "joint", "calibrated"),
-        "prior": ("narrow", "wide"),
         "weighed": ("weighed",),
         "transfer": ("transfer",),
-        "masses": ("masses", "free", "weighed masses"),
+        "masses": ("masses", "free"),
         "tilt": ("tilted",),
         "robots": ("staged", "calibrated"),
         "nominal": ("staged", "joint", "held", "calibrated"),
@@ -471,7 +462,7 @@ def _outcome(task: Task, folder: Path) -> dict[str, Any]:
         }
     if task.method == "transfer":
         return _transfer(task, folder, recordings, truth)
-    if task.method.startswith("weighed"):
+    if task.method == "weighed":
         return _weighed(task, folder, recordings, truth)
     free, prior = [], PRIORS.get(task.method)
     if task.method == "free":
@@ -495,9 +486,8 @@ def _weighed(task: Task, folder: Path, recordings: list[Recording], truth: Truth
     other = replace(task.team, payload="bcda"["abcd".index(task.team.payload)])
     more, told = other.recordings(folder)
     known = {task.team.payload: (truth.mass, WEIGHED * truth.mass)}
-    prior = PRIORS["masses"] if task.team.arm_mass_ratio else None
     start = time.process_time()
-    calibration = calibrate([*recordings, *more], prior=prior, known_mass=known)
+    calibration = calibrate([*recordings, *more], known_mass=known)
     took = time.process_time() - start
     second = score_calibration(calibration, 1, Truth.of(told))
     return score_calibration(calibration, 0, truth) | _fit(calibration) | {"cpu_s": took, "second": second}

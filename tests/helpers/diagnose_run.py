@@ -58,11 +58,6 @@ def changed(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Edit:
     return edit
 
 
-def with_nan(values: np.ndarray) -> np.ndarray:
-    values[500] = np.nan
-    return values
-
-
 def unlabelled_and_heavier(table: pa.Table) -> pa.Table:
     return with_metadata(payload=None)(changed(".tau", lambda v: 1.2 * v)(table))
 

@@ -62,17 +62,6 @@ def spec(text: str = ARM) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(text)
 
 
-def a_little_off(changed: mujoco.MjSpec, rng: np.random.Generator, share: float = 0.1) -> mujoco.MjSpec:
-    """Masses, centres of mass and inertias off by a share of themselves."""
-    for body in changed.bodies[1:]:
-        if body.mass > 0:
-            body.mass *= 1.0 + share * rng.standard_normal()
-            size = np.sqrt(np.mean(np.asarray(body.fullinertia)[:3]) * 1.5 / body.mass)
-            body.ipos = np.asarray(body.ipos) + share * max(size, 0.02) * rng.standard_normal(3)
-            body.fullinertia = np.asarray(body.fullinertia) * (1.0 + 0.5 * share * rng.standard_normal())
-    return changed
-
-
 def simulated(
     model: mujoco.MjModel,
     seed: int,

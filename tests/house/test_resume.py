@@ -47,13 +47,6 @@ def test_other_code_or_models_make_another_key(tree: Path, name: str) -> None:
     assert key() != before
 
 
-def test_a_file_of_another_name_makes_another_key(tree: Path) -> None:
-    before = key()
-    path = tree / FILES["estimator"]
-    path.rename(path.with_name("so4.py"))
-    assert key() != before
-
-
 def test_what_only_shows_results_does_not_matter(tree: Path) -> None:
     before = key()
     (tree / "src/mocobot_view/scene.py").write_text("otherwise")
@@ -63,12 +56,6 @@ def test_what_only_shows_results_does_not_matter(tree: Path) -> None:
 def test_other_options_make_another_key(tree: Path) -> None:
     assert len({key(), key(seed=1), key(seed=2), key(trials=1)}) == 4
     assert key(seed=1, trials=2) == key(trials=2, seed=1)
-
-
-def test_other_versions_make_another_key(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = key()
-    monkeypatch.setattr(resume, "version_of", lambda name: "0.0.1" if name == "numpy" else None)
-    assert key() != before
 
 
 def test_whatever_estimates_and_simulates_is_looked_at() -> None:

@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfilt
 
 from array_log import ArrayLog, stream
 from estimator.quantisation import quantisation_step
 from mocobot_inspect import survey as survey_module
-from mocobot_inspect.channels import Channel, Oscillation, clipped, joined, noise_level, oscillation, stuck
+from mocobot_inspect.channels import Channel, clipped, noise_level, oscillation, stuck
 from mocobot_inspect.findings import findings
 from mocobot_inspect.report import format_inspection, inspection_dict
 from mocobot_inspect.survey import Survey, survey
@@ -84,13 +83,6 @@ def test_time_that_runs_backwards_and_a_recorder_that_hangs() -> None:
     assert t.recorder_s == pytest.approx((0.002, 5.002))
 
 
-def test_no_samples_at_all() -> None:
-    empty = Samples(np.empty(0, np.int64), np.empty((0, 9)))
-    found = survey(ArrayLog([regular(motion(5.0)), empty]))
-    assert (found.timing[1].samples, found.timing[1].rate_hz, found.timing[1].first_ns) == (0, None, None)
-    assert channel(found, 1, "phi1").lowest is None
-
-
 # Channels
 
 
@@ -124,15 +116,6 @@ def test_the_noise_is_recovered_on_top_of_motion(sigma: float) -> None:
     assert noise_level(motion(60.0, noise=sigma)[:, 2]) == pytest.approx(sigma, rel=0.06)
 
 
-def test_rounding_and_noise_together_as_a_torque_sensor_has_them() -> None:
-    rng = np.random.default_rng(5)
-    step = sigma = 0.01
-    smooth = 5 * motion(100.0, noise=0.0)[:, 0]
-    values = np.round((smooth + sigma * rng.standard_normal(len(smooth))) / step) * step
-    assert quantisation_step(values) == pytest.approx(step, rel=1e-9)
-    assert noise_level(values) == pytest.approx(np.hypot(sigma, step / np.sqrt(12)), rel=0.1)
-
-
 # Stuck and clipped
 
 
@@ -162,25 +145,6 @@ def test_a_stuck_second_is_found(step: float, start: int) -> None:
     assert found[0].stop - found[0].start == pytest.approx(100, abs=20)
 
 
-def test_a_stuck_second_of_a_noisy_channel_is_found_where_it_hardly_moves() -> None:
-    """No jump gives it away, but noise as large as the steps never repeats itself for a second."""
-    rng = np.random.default_rng(4)
-    values = motion(30.0)
-    values[:, 8] = np.round((2 * values[:, 8] + 0.01 * rng.standard_normal(3000)) / 0.01) * 0.01
-    values[1000:1100, 8] = values[1000, 8]
-    values[1100:, 8] += values[1099, 8] - values[1100, 8]
-    (found,) = frozen(values, RATE)
-    assert (found.kind, found.channel) == ("stuck", 8)
-    assert (found.start, found.stop) == (pytest.approx(1000, abs=3), pytest.approx(1100, abs=3))
-
-
-def test_a_dead_channel_is_stuck_all_the_time() -> None:
-    values = motion(30.0)
-    values[:, 7] = 0.25
-    (found,) = frozen(values, RATE)
-    assert (found.kind, found.channel, found.start, found.stop, found.value) == ("stuck", 7, 0, 3000, 0.25)
-
-
 def comes_to_rest() -> np.ndarray:
     """A minute of motion that slows down and rests from its 40th second on."""
     values = motion(60.0, noise=0.0)
@@ -197,24 +161,6 @@ def test_rest_is_not_stuck() -> None:
     exact = motion(60.0, noise=0.0)  # sensors without noise and steps
     exact[5000:] = exact[5000]
     assert frozen(exact, RATE) == []
-
-
-def test_rest_after_interpolation_is_not_stuck() -> None:
-    """Rounded encoders of a hold, on another grid: no step tells rest, and only noise moves the torques."""
-    values = comes_to_rest()
-    values[:, :6] = np.round(values[:, :6] / 1e-4) * 1e-4
-    values[:, 6:] += 0.005 * np.random.default_rng(2).standard_normal((6000, 3))
-    time = np.arange(6000) / RATE
-    grid = np.arange(0.0, time[-1], 0.008)
-    resampled = np.column_stack([np.interp(grid, time, channel) for channel in values.T])
-    assert frozen(resampled, 125.0) == []
-
-
-@pytest.mark.parametrize("length", [25, 50, 200])
-def test_a_short_stuck_stretch_is_found(length: int) -> None:
-    values = motion(30.0, noise=1e-5)
-    values[1237 : 1237 + length, 4] = values[1237, 4]
-    assert [(f.kind, f.channel, f.start) for f in frozen(values, RATE)] == [("stuck", 4, 1237)]
 
 
 def test_a_channel_that_is_not_moved_is_not_stuck() -> None:
@@ -237,18 +183,6 @@ def test_a_clipped_channel() -> None:
 def test_round_peaks_are_not_clipped() -> None:
     values = np.round(motion(60.0, noise=0.0) / 2e-3) * 2e-3
     assert [f for f in frozen(values, RATE) if f.kind == "clipped"] == []
-
-
-def test_a_stuck_stretch_across_blocks_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(survey_module, "BLOCK_ROWS", 1000)
-    values = motion(60.0)
-    values[1900:2100, 2] = values[1900, 2]
-    found = survey(ArrayLog([regular(values)], rows=100))
-    c = channel(found, 0, "phi3")
-    assert c.stuck_count == 1
-    assert c.stuck[0].start_s == pytest.approx(19.0)
-    assert c.stuck[0].duration_s == pytest.approx(2.0, abs=0.02)
-    assert all(other.stuck_count == 0 for other in found.channels[0] if other is not c)
 
 
 # Excerpts
@@ -285,16 +219,6 @@ def test_stretches_are_what_all_robots_have() -> None:
     assert found[0][1][1000, 1] == pytest.approx((b[999] + b[1001]) / 2, abs=2e-3)
 
 
-def test_faster_streams_are_averaged_to_the_same_motion() -> None:
-    fast = motion(20.0, rate_hz=1000.0, noise=0.0)
-    slow = motion(20.0, rate_hz=100.0, noise=0.0)
-    (start, part), *_ = stretches([clean_stream(stream(np.arange(len(fast)) / 1000.0, fast), 0)])
-    first = round(start * 1000)
-    assert start == pytest.approx(0.0045)
-    assert part[:, 0] == pytest.approx(fast[first : first + 10 * len(part) : 10], abs=2e-3)
-    assert np.ptp(slow) > 0.5
-
-
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -321,14 +245,6 @@ def test_absurd_logs_are_reported(spoil, rate_hz: float, level: Level) -> None:
     json.dumps(inspection_dict(found), allow_nan=False)
 
 
-def test_streams_without_common_time() -> None:
-    values = motion(10.0)
-    time = np.arange(1000) / RATE
-    assert (
-        stretches([clean_stream(stream(time, values), 0), clean_stream(stream(time + 60, values), 0)]) == []
-    )
-
-
 def test_a_slow_joint_with_a_coarse_encoder_is_neither_stuck_nor_clipped() -> None:
     """It stays on a step for a second, and on the highest and lowest one for longer, while others move."""
     values = motion(60.0, noise=0.0)
@@ -336,22 +252,6 @@ def test_a_slow_joint_with_a_coarse_encoder_is_neither_stuck_nor_clipped() -> No
     values[:, 3] = np.round(0.3 * np.sin(2 * np.pi * 0.05 * time) / 0.05) * 0.05
     assert np.mean(np.diff(values[:, 3]) == 0) > 0.98
     assert frozen(values, RATE) == []
-
-
-@pytest.mark.parametrize("cut", [False, True])
-def test_a_rare_movement_to_a_round_peak_is_not_clipped(cut: bool) -> None:
-    """It goes there in steps of 1 and slows down before it, or does not and is cut off."""
-    values = motion(60.0, noise=0.0)
-    x, way = (
-        np.zeros(6000),
-        np.array([1.0, 2.0, 3.0, 4.0, 5.0, 5.5] if cut else [1.0, 2.0, 3.0, 4.0, 4.1, 4.2]),
-    )
-    peak = np.r_[way, np.full(20, way[-1]), way[::-1]]
-    for k, start in enumerate((500, 1500, 2500, 3500, 4500, 5500)):
-        x[start : start + len(peak)] = (-1) ** k * peak
-    values[:, 8] = x
-    found = [one for one in frozen(values, RATE) if one.kind == "clipped" and one.channel == 8]
-    assert [one.value for one in found] == ([-5.5] * 3 + [5.5] * 3) * cut
 
 
 # Oscillations
@@ -383,18 +283,6 @@ def test_frequency_and_amplitude(hz: float, amplitude: float) -> None:
     assert found.duration_s == pytest.approx(30.0)
 
 
-def test_what_is_faster_than_half_the_rate_is_folded() -> None:
-    found = oscillation(read(sine(70.3, 2.0)), RATE)
-    assert found is not None
-    assert found.frequency_hz == pytest.approx(29.7, abs=0.25)
-
-
-def test_a_part_of_the_trial() -> None:
-    found = oscillation(read(sine(30.0, 1.0) * (TIME > 20.0)), RATE)
-    assert found is not None
-    assert found.duration_s == pytest.approx(10.0)
-
-
 @pytest.mark.parametrize(
     "extra",
     [
@@ -408,40 +296,6 @@ def test_a_part_of_the_trial() -> None:
 )
 def test_no_line(extra: np.ndarray | float) -> None:
     assert oscillation(read(extra), RATE) is None
-
-
-def test_a_hum_of_five_times_the_noise_of_a_fine_sensor() -> None:
-    assert oscillation(read(sine(30.0, 0.05), step=1e-6), RATE) is None
-    assert oscillation(read(sine(30.0, 0.2), step=1e-6), RATE) is not None
-
-
-def test_shaking_over_many_frequencies_is_no_line() -> None:
-    band = butter(12, (13.0, 24.0), btype="band", fs=RATE, output="sos")
-    shaking = sosfilt(band, np.random.default_rng(8).standard_normal(len(TIME)))
-    assert oscillation(read(3.0 * shaking), RATE) is None
-
-
-@pytest.mark.parametrize("rate", [0.02, 0.03, 0.07])
-def test_stairs_of_a_slow_encoder_are_no_line(rate: float) -> None:
-    """A joint that creeps evenly: its steps come at 10 Hz and more."""
-    step = 1.5e-3
-    assert oscillation(np.round(rate * TIME / step) * step, RATE) is None
-
-
-@pytest.mark.parametrize(("size", "rate_hz"), [(0, RATE), (249, RATE), (3000, 39.0)])
-def test_too_short_and_too_slow(size: int, rate_hz: float) -> None:
-    assert oscillation(read(sine(12.0, 5.0))[:size], rate_hz) is None
-
-
-def test_a_fast_log_is_looked_at_in_shorter_windows() -> None:
-    """Rows come 20,000 at a time: two seconds of 10 kHz."""
-    time = np.arange(20_000) / 10_000.0
-    hum = 0.5 * np.sin(2 * np.pi * 50.0 * time) + 0.01 * np.random.default_rng(2).standard_normal(len(time))
-    found = oscillation(hum, 10_000.0)
-    assert found is not None
-    assert found.frequency_hz == pytest.approx(50.0, abs=0.5)
-    assert found.amplitude == pytest.approx(0.5, rel=0.02)
-    assert found.duration_s == pytest.approx(2.0)
 
 
 def log(lines: dict[tuple[int, int], np.ndarray]) -> ArrayLog:
@@ -469,17 +323,3 @@ def test_the_torque_that_oscillates_most_is_said_with_what_shakes_along() -> Non
     told = inspection_dict(found)["channels"]
     assert told[1]["tau2"]["oscillation"]["amplitude"] == pytest.approx(0.5, rel=0.02)
     assert told[0]["tau2"]["oscillation"] is None
-
-
-def test_what_has_no_step() -> None:
-    rng = np.random.default_rng(3)
-    assert quantisation_step(rng.standard_normal(5000)) is None
-    assert quantisation_step(motion(60.0, noise=0.0)[:, 0]) is None
-    assert quantisation_step(np.full(100, 0.3)) is None
-    assert quantisation_step(np.array([0.0, 1.0, 2.0])) is None
-
-
-def test_parts_are_joined() -> None:
-    assert joined([]) is None
-    parts = [Oscillation(30.0, 1.0, 2.5), Oscillation(29.0, 4.0, 5.0)]
-    assert joined(parts) == Oscillation(29.0, 4.0, 7.5)

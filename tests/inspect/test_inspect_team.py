@@ -271,36 +271,6 @@ def test_clocks_that_differ(
     assert out.splitlines()[-1].endswith("inertia yes; clocks to be corrected")
 
 
-@pytest.mark.parametrize(
-    ("factor", "words"), [(1e3, "in milliseconds, taken for seconds"), (1e-3, "taken for mill")]
-)
-def test_time_in_another_unit(
-    look: Callable[..., tuple[str, dict]], recording: Recording, tmp_path: Path, factor: float, words: str
-) -> None:
-    write_text(tmp_path / "log.csv", recording.columns() | {"time": factor * recording.time})
-    out, report = look(tmp_path / "log.csv")
-    (sentence,) = sentences(report)
-    assert words in sentence
-    assert report["excerpt"]["unchecked"].startswith("robot 1 is sampled at")
-    assert report["wiring"] is None
-    assert out.splitlines()[-1].startswith("ready for: nothing (robot 1 is sampled at")
-
-
-def test_noise_instead_of_a_team(look: Callable[..., tuple[str, dict]], tmp_path: Path) -> None:
-    """White noise in every channel: no wiring mistake is made up, and nothing can be estimated."""
-    write_recording(small_recording(rows=1500), tmp_path / "noise.parquet")
-    out, report = look(tmp_path / "noise.parquet")
-    assert report["wiring"]["found"] == []
-    assert out.splitlines()[-1].startswith("ready for: nothing")
-
-
-def test_a_handful_of_rows(look: Callable[..., tuple[str, dict]], tmp_path: Path) -> None:
-    write_recording(small_recording(rows=150), tmp_path / "short.parquet")
-    out, report = look(tmp_path / "short.parquet")
-    assert "share no 4 s of samples" in report["excerpt"]["unchecked"]
-    assert out.splitlines()[-1].startswith("ready for: nothing (the robots share no 4 s")
-
-
 # Logs that are refused as they are, and robots that do not move
 
 RECORDING = small_recording(rows=1000, ref=False)
@@ -370,18 +340,3 @@ def test_what_is_refused_as_it_is_is_said_in_the_last_line(
     found = inspect_log(open_log(write_table(tmp_path / "log.parquet", columns)), DESIGN)
     line = ready_line(replace(found, wiring=HEALTHY, ready=READY))
     assert line == (f"ready for: {what}{GOOD}" if what == ABSURD else f"ready for: {GOOD}{what}")
-
-
-def test_too_many_missing_values_are_ready_for_nothing(tmp_path: Path) -> None:
-    columns = RECORDING.columns()
-    columns["omnid2.tau1"] = np.where(np.arange(1000) % 5 == 2, np.nan, columns["omnid2.tau1"])
-    found = inspect_log(open_log(write_text(tmp_path / "log.csv", columns)), DESIGN)
-    line = ready_line(replace(found, wiring=HEALTHY, ready=READY))
-    assert line == "ready for: nothing (robot 2 lacks 200 samples, too many to be filled in)"
-
-
-def test_where_time_runs_back_is_said(tmp_path: Path) -> None:
-    columns = RECORDING.columns()
-    columns["time"] = np.where(columns["time"] >= 5.0, columns["time"] - 0.5, columns["time"])
-    found = inspect_log(open_log(write_text(tmp_path / "log.csv", columns)), DESIGN)
-    assert "robots 1, 2 and 3: time runs backwards 1 time by 0.49 s after 4.99 s" in said(found)

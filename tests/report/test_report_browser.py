@@ -146,47 +146,6 @@ def test_theme_legend_and_tabs_by_keyboard(browser: object, pages: dict[str, Pat
         assert seen.said == []
 
 
-def test_a_plot_is_saved_and_a_browser_that_cannot_unpack_says_so(
-    browser: object, pages: dict[str, Path]
-) -> None:
-    with opened(browser, pages["robot"]) as seen:
-        seen.draw_all()
-        figure = seen.page.locator("figure.chart").first
-        figure.hover()
-        with seen.page.expect_download() as download:
-            figure.locator(".save").click()
-        assert download.value.suggested_filename.endswith(".svg")
-        assert not seen.page.locator("#no-plots").is_visible()
-        seen.page.add_init_script("delete window.DecompressionStream")
-        seen.page.reload()
-        assert seen.page.locator("#no-plots").is_visible()
-        assert "cannot unpack the plots" in seen.page.locator("#no-plots").inner_text()
-        assert seen.page.locator("table").first.is_visible()
-        assert seen.said == []
-
-
-def test_motion_is_reduced_and_print_shows_all(browser: object, pages: dict[str, Path]) -> None:
-    with opened(browser, pages["diagnosis"], reduced_motion="reduce", color_scheme="dark") as seen:
-        style = "getComputedStyle(document.documentElement).scrollBehavior"
-        assert seen.page.evaluate(style) == "auto"
-        seen.page.emulate_media(reduced_motion="no-preference")
-        assert seen.page.evaluate(style) == "smooth"
-        hidden = "[...document.querySelectorAll('[data-panel]')].filter((p) => !p.checkVisibility()).length"
-        assert seen.page.evaluate(hidden) > 0
-        # Browsers say that they will print before they look at print styles; the paper is white in the dark theme, too.
-        seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
-        seen.page.wait_for_function("[...document.querySelectorAll('.plot')].every((p) => p.dataset.drawn)")
-        tick = "getComputedStyle(document.querySelector('.ytick text')).fill"
-        seen.page.wait_for_function(f"{tick} === 'rgb(79, 91, 107)'", timeout=5000)
-        seen.page.emulate_media(media="print")
-        assert seen.page.evaluate(hidden) == 0
-        assert not seen.page.locator("nav").is_visible()
-        assert seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(24, 32, 43)"
-        seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
-        seen.page.emulate_media(media="screen")
-        assert seen.page.evaluate(hidden) > 0
-
-
 def test_phones_show_what_tables_hold(browser: object, pages: dict[str, Path]) -> None:
     """Rows with long names stack and fit; other tables fade where they go on, say so, and stop at the end."""
     with opened(browser, pages["diagnosis"], PHONE) as seen:

@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from chromium import DESKTOP, PHONE, browser_running, opened
 from command import refused, run
 from discrepancy.joints.calibrated import from_dict, gain, to_dict, to_text
 from made_arm import JOINTS, made, write_log
-from test_report_page import MOST_BYTES, Reader
+from test_report_page import Reader
 
 SIDES = {
     "given model": "model",
@@ -149,12 +148,6 @@ def test_a_damaged_file_is_refused(
     assert not (tmp_path / "report.html").exists()
 
 
-def test_a_cut_file_is_refused(arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = (arm / "cal" / "calibration.json").read_text(encoding="utf-8")
-    (tmp_path / "calibration.json").write_text(text[: len(text) // 2], encoding="utf-8")
-    assert "not valid JSON" in refused(capsys, "report", tmp_path)
-
-
 def test_a_diagnosis_beside_it_is_on_the_same_page(
     arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -183,15 +176,3 @@ def test_pictures_are_drawn_if_asked_for(arm: Path, tmp_path: Path) -> None:
     assert colours is not None
     assert len(colours) > 20  # marks and text, not a blank page
     assert not (arm / "cal" / "torques.png").exists()
-
-
-@pytest.mark.slow
-def test_it_fits_a_phone(arm: Path, page: Reader) -> None:
-    assert page.blocks
-    assert (arm / "page.html").stat().st_size < MOST_BYTES
-    with browser_running() as browser:
-        for size in (DESKTOP, PHONE):
-            with opened(browser, arm / "page.html", size) as seen:
-                seen.draw_all()
-                assert seen.page.evaluate("document.documentElement.scrollWidth") <= size[0]
-                assert seen.said == []

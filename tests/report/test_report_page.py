@@ -18,7 +18,6 @@ import plotly.graph_objects as go
 import pytest
 
 from estimator.estimate.leftover import Leftover
-from mocobot_report.charts import around_zero
 from mocobot_report.folder import read_folder, sources
 from mocobot_report.numbers import measured, plain
 from mocobot_report.page import write_report
@@ -36,15 +35,6 @@ from report_folders import (
 
 VOID = {"meta", "link", "input", "img", "br", "path", "circle", "rect"}
 MOST_BYTES = 2.5e6
-TEXTS = (
-    ("text", "page"), ("text", "card"), ("text", "sunk"), ("soft", "page"), ("soft", "card"), ("soft", "sunk"),
-    ("link", "page"), ("link", "card"), ("good", "good-card"), ("warn", "warn-card"), ("bad", "bad-card"),
-    ("text", "good-card"), ("text", "warn-card"), ("text", "bad-card"), ("good", "card"), ("bad", "card"),
-)  # fmt: skip
-"""Text and background that meet on the page; WCAG AA asks for a contrast of 4.5."""
-MARKS = ("paper", "ideal", "nominal", "uncalibrated", "before", "after", "truth", "c1", "c2", "c3", "r1", "r2", "r3",
-         "r4", "r5", "r6", "focus")  # fmt: skip
-"""Colours of lines and points on a card; WCAG AA asks for 3."""
 
 
 class Reader(HTMLParser):
@@ -231,41 +221,6 @@ def test_labels_and_names_stay_text(pages: dict[str, Reader]) -> None:
     assert not any("</scr" in text or "<scr" in text for text in texts)
 
 
-def test_characters_that_html_forbids_are_shown_escaped(tmp_path: Path) -> None:
-    label = "a\x00b\x1b\x85c\ufffe"
-    (tmp_path / "est.json").write_text(json.dumps(replace(payload_estimate(), payload=label).to_dict()))
-    page = write_report(tmp_path).read_text(encoding="utf-8")
-    assert "<h1>Payload (" + r"a\x00b\x1b\u0085c\ufffe" + "), estimated from 1 recording</h1>" in page
-
-
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_contrast_of_the_palette(theme: dict[str, str]) -> None:
-    for text, back in TEXTS:
-        assert _contrast(theme[text], theme[back]) >= 4.5, (text, back)
-    for mark in MARKS:
-        for back in ("card", "sunk"):
-            assert _contrast(theme[mark], theme[back]) >= 3.0, (mark, back)
-
-
-def test_contrast_is_that_of_wcag() -> None:
-    """Values from WebAIM's contrast checker."""
-    assert _contrast("#000000", "#ffffff") == pytest.approx(21.0)
-    assert _contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)
-    assert _contrast("#ff0000", "#ffffff") == pytest.approx(4.0, abs=0.005)
-
-
-def _contrast(one: str, other: str) -> float:
-    """Contrast ratio of two colours ``#rrggbb`` as WCAG 2.2 defines it."""
-    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
-    return (light + 0.05) / (dark + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    parts = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-
 def test_moved_and_changed_recordings_are_named(tmp_path: Path) -> None:
     moved = tmp_path / "elsewhere"
     shutil.move(estimate_folder(tmp_path / "a", "b"), moved)  # together with its recording
@@ -281,26 +236,6 @@ def test_moved_and_changed_recordings_are_named(tmp_path: Path) -> None:
     assert "a b.parquet is no longer where it was" in text
     assert "Flanges and grasps apart" not in text
     assert "Grasp frames from each other" in text
-
-
-@pytest.mark.parametrize("simulated", [0, 1])
-def test_not_every_trial_was_simulated_again(simulated: int, tmp_path: Path) -> None:
-    """Only the first part of a long recording is; a dot has the name of its own trial."""
-    folder = diagnosis_folder(tmp_path / "long")
-    page = written(edit(folder, lambda v: v["gain"].update(trials=[v["gain"]["trials"][simulated]])))
-    names = {match for match in re.findall(r'"([^"]*), with the causes: ', json.dumps(page.blocks))}
-    assert len(names) == 1
-    assert ("one" in names.pop()) == (simulated == 0)
-
-
-def test_errors_against_the_truth(pages: dict[str, Reader], folders: dict[str, Path]) -> None:
-    (result,) = read_folder(folders["estimate"])
-    text = pages["estimate"].rows()
-    match = re.search(r"mass kg 11\.672 (\S+(?: × 10\S+)?) ", text.replace("\u00a0", " "))
-    assert match
-    shown = match[1].replace("\u2212", "-").split(" × 10")
-    power = int(shown[1].translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))) if len(shown) > 1 else 0
-    assert float(shown[0]) * 10.0**power == pytest.approx(result.found.mass.mass - 11.672, rel=0.05)
 
 
 LEFTOVER = (Leftover("force", "N", 3.1, 0.05),)
@@ -390,114 +325,10 @@ def test_causes_are_read_in_words(pages: dict[str, Reader]) -> None:
     assert "sea_" not in plots
 
 
-def test_shares_of_causes_add_up_and_no_probability_is_one(tmp_path: Path) -> None:
-    def two_causes(values: dict) -> None:
-        first = values["causes"][0] | {"explained": {"in_sample": 0.7, "held_out": 0.65}}
-        second = {"explained": {"in_sample": 0.2, "held_out": 0.25}, "probability": 0.99999}
-        values["causes"] = [first, first | second]
-
-    folder = edit(diagnosis_folder(tmp_path / "two"), two_causes)
-    text = written(folder).rows().replace("\u00a0", " ")
-    assert "All together 90 90" in text
-    assert "beyond those above it, so that shares add up" in text
-    assert "> 99.9 20 25" in text
-    edit(folder, lambda values: values["causes"].pop(0))
-    text = written(folder).rows().replace("\u00a0", " ")
-    assert "probability > 99.9 % that it is this cause" in text
-
-
-def presliding(value: float) -> Callable[[dict], None]:
-    return lambda values: values["causes"][0]["parameters"].update(
-        presliding_rad={"value": value, "se": None}
-    )
-
-
 def as_found(folder: Path) -> Path:
     (folder / "as_found").mkdir()
     (folder / "as_found" / "team.xml").write_text("<mujoco/>")
     return folder
-
-
-SLIPPED = "The encoder of phi2 of robot 3 slipped by 1.2 deg."
-FAR = "Zero of a gimbal axis: farthest off are robot 2, joint 3 (−9.1 mrad), robot 1, joint 1 (7.2 mrad)"
-KNOWN = ("What it is worth to know the robots", "The payload's estimate before and after")
-EXTENDED = ("mocobot simulate --model extended", "extended/team.xml")
-SAYS = {
-    "a form that a cause has not": (lambda f: edit(diagnosis_folder(f), presliding(0.0)), (), "presliding"),
-    "a form that it has": (lambda f: edit(diagnosis_folder(f), presliding(0.002)), ("presliding",), ""),
-    "models to take away": (diagnosis_folder, EXTENDED, "--model as_found"),
-    "as found": (lambda f: as_found(diagnosis_folder(f)), (*EXTENDED, "--model as_found", "as_found/team.xml"), ""),
-    "places that scatter": (lambda f: diagnosis_folder(f, "miscalibrated"), (FAR, *KNOWN), ""),
-    "findings": (lambda f: calibration_folder(f, (SLIPPED,)), (SLIPPED, "What speaks"), "Nothing speaks"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("make", "said", "unsaid"), SAYS.values(), ids=SAYS)
-def test_page_says(make: Callable[[Path], Path], said: tuple[str, ...], unsaid: str, tmp_path: Path) -> None:
-    text = written(make(tmp_path / "result")).rows()
-    assert [words for words in said if words not in text] == []
-    assert not unsaid or unsaid not in text
-
-
-def test_what_fits_much_worse_is_folded_away_and_parts_as_found_are_told(tmp_path: Path) -> None:
-    def many_rivals(values: dict) -> None:
-        cause = values["causes"][0]
-        rival = cause["alternatives"][0]
-        worse = {**rival, "ambiguous": False, "probability": 1e-5}
-        others = [{**worse, "name": f"rival {k}", "evidence_gap": 9.0 + k} for k in range(7)]
-        likely = {**worse, "name": "a rare rival", "evidence_gap": 7.0, "probability": 0.002}
-        cause["alternatives"] = [rival, *others, likely]
-        cause["sentence"] = "The grasp is loose by +-(196.6 +- 3.9 um) along each axis."
-        held = values["gain"]["held_out"]
-        held["as_found"] = held["after"] | {"chi2_per_n": 4.321}
-
-    page = write_report(edit(diagnosis_folder(tmp_path / "one"), many_rivals)).read_text(encoding="utf-8")
-    assert "loose by ±(196.6\u00a0±\u00a03.9 µm) along" in page
-    assert "is 4.32 with every part as far off as it is found" in page
-    shown, folded = page.split("What fits worse still")
-    table = shown.split("What else it might be")[-1]
-    for name in ("Rival 0", "Rival 3", "A rare rival", "Spring stiffness of joint 1 of robot 2"):
-        assert name in table
-    assert "Rival 4" not in table
-    for k in range(7):
-        assert (f"Rival {k}" in folded) == (k >= 4)
-
-
-def test_terms_are_explained_where_they_stand(pages: dict[str, Reader]) -> None:
-    for page in pages.values():
-        entries = {a["id"] for tag, a in page.tags if tag == "dt" and "id" in a}
-        links = [a for tag, a in page.tags if tag == "a" and a.get("class") == "term"]
-        assert {a["href"] for a in links} == {f"#{name}" for name in entries}
-        assert all(a["title"] for a in links)
-    terms = {a["id"] for tag, a in pages["diagnosis"].tags if tag == "dt" and "id" in a}
-    assert {"term-nat", "term-chi-n-misfit", "term-whitened", "term-held-out", "term-in-sample"} <= terms
-    assert "5 nats are a factor of 150" in pages["diagnosis"].rows()
-    assert "term-frame-grasp-frame" in {a.get("id") for _, a in pages["estimate"].tags}
-
-
-def test_evidence_is_dots_on_one_scale(pages: dict[str, Reader]) -> None:
-    """A bar would need a zero, which a logarithmic axis has not; what has less than 1 nat is not drawn."""
-    shown = [b for b in pages["diagnosis"].blocks.values() if "evidence [nats]" in json.dumps(b)]
-    (before,) = shown  # with the cause in the model nothing is left that has 1
-    assert {trace["type"] for trace in before["data"]} == {"scatter"}
-    rings, *dots = before["data"]
-    assert rings["x"] == [7.0, 7.0, 7.0]
-    assert sorted(x for trace in dots for x in trace["x"]) == [1.4, 150.0, 180.0]
-    assert before["layout"]["xaxis"]["range"][0] == pytest.approx(np.log10(1.4) - 0.15)
-
-
-def test_one_plot_per_robot(pages: dict[str, Reader]) -> None:
-    block = pages["estimate"].block("robot 3: gap")
-    assert [trace["yaxis"] for trace in block["data"]] == ["y", "y2", "y3", "y4", "y5", "y6"]
-    ranges = [block["layout"][f"yaxis{k}"]["range"] for k in ("", 2, 3)]
-    assert ranges[0] == ranges[1] == ranges[2]
-    assert "robot 2: gap angle" in block["layout"]["yaxis5"]["title"]["text"]
-
-
-def test_band_follows_the_noise_of_every_row() -> None:
-    time = np.array([0.0, 1.0, 2.0, 3.0, np.nan, 6.0, 7.0])
-    half = np.array([4.0, 1.0, 1.0, 1.0, np.nan, 2.0, 2.0])
-    assert around_zero(time, half) == "M0,4L1,1L3,1L3,-1L1,-1L0,-4ZM6,2L7,2L7,-2L6,-2Z"
 
 
 def test_numbers_of_a_calibration_are_in_its_page(pages: dict[str, Reader], folders: dict[str, Path]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from command import run
 from discrepancy.result.traces import load_traces
 from joint_logs import write_csv
-from made_arm import JOINTS, MAP, made, write_log, write_map
+from made_arm import JOINTS, made, write_log
 from mocobot_report.folder import read_folder
 from mocobot_report.page import write_report
 from mocobot_report.residuals import torques
@@ -72,35 +72,6 @@ def test_shares_add_up_and_the_page_has_them(arm):
     page = write_report(folder / "v", folder / "page.html").read_text(encoding="utf-8")
     assert page.count(TITLE) >= 1
     assert "model with causes and tolerances" in page
-
-
-def test_a_joint_without_torque_is_left_out_of_the_page(tmp_path, capsys, arm):
-    folder, values = arm
-    write_map(tmp_path, MAP.replace("[channels]", "[joint.elbow.channels]\ntorque = false\n[channels]"))
-    log = write_csv(tmp_path / "log.csv", values)
-    out = tmp_path / "v"
-    code, _, _ = run(capsys, "diagnose", log, "--model", folder / "arm.xml", "--out", out, "--no-closed-loop")
-    assert code == 0
-    assert run(capsys, "report", out)[0] == 0
-    (result,) = read_folder(out)
-    assert [channel.name for channel in result.found.channels] == ["turret torque", "shoulder torque"]
-    assert TITLE in (out / "report.html").read_text(encoding="utf-8")
-
-
-def test_residuals_of_earlier_versions_make_a_page_without_torques(arm, tmp_path):
-    from dataclasses import replace
-
-    from discrepancy.result.traces import save_traces
-
-    folder, _ = arm
-    traces, channels = load_traces(folder / "v" / "residuals.npz")
-    old = tmp_path / "old"
-    old.mkdir()
-    (old / "diagnosis.json").write_bytes((folder / "v" / "diagnosis.json").read_bytes())
-    save_traces([replace(t, measured=None, causes=()) for t in traces], channels, old / "residuals.npz")
-    page = write_report(old, old / "report.html").read_text(encoding="utf-8")
-    assert TITLE not in page
-    assert "Residuals over time" in page
 
 
 def test_a_diagnosis_against_a_reference_makes_a_page_and_claims_no_test_of_one_trial(arm, tmp_path, capsys):

@@ -17,7 +17,6 @@ from diagnosed import small_diagnosis
 from discrepancy.result.read import NamedCause, WrittenDiagnosis, read_diagnosis
 from estimator.arm.delta import inverse_kinematics
 from estimator.arm.unit import AT
-from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
@@ -29,19 +28,14 @@ from mocobot_sim.scene.models import models_dir, omnid_design, payload_path
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial_log import TrialLog
-from mocobot_view import colours
-from mocobot_view.blueprint import ALL_PLOTS, FOVY_DEG, SCENE_ASPECT, blueprint
-from mocobot_view.colours import FORCE_M_PER_N
 from mocobot_view.joint_replay import joint_replay
-from mocobot_view.payload import BAR_M, Grasps, cad_shape, held_elsewhere, payload_motion, place_bases
+from mocobot_view.payload import BAR_M
 from mocobot_view.pictures import measured_team
-from mocobot_view.replay_trial import ReplayTrial, distinct_names, replay_trial
+from mocobot_view.replay_trial import ReplayTrial, replay_trial
 from mocobot_view.robot import PATHS, body_motion, body_of, robot_shapes
 from mocobot_view.shapes import Triangles, body_shape, box, capsule, cylinder, ellipsoid, join
 from mocobot_view.stream import save_replay, summary
 from omnid_design import DESIGN
-from payload_mjcf import FIVE
-from recordings import metadata
 from replay_case import BODIES, Placed, Replayed, payload_body, placed_trial, robot_body, true_estimate
 from uncalibrated_team import knowing, uncalibrated
 
@@ -89,22 +83,6 @@ def test_without_grasps_robots_stand_in_a_row(recording: Recording, tmp_path: Pa
     assert not any("payload" in name or "grasp" in name for name in entities)
 
 
-def test_an_estimate_of_other_recordings_places_them(recording: Recording) -> None:
-    whole = replay_trial(recording, "whole")
-    trial = replay_trial(standing(recording), "still", whole.estimate)
-    assert trial.bases.p_Wb == pytest.approx(whole.bases.p_Wb, abs=1e-3)
-    assert trial.motion is not None
-    assert not any("row" in note for note in trial.notes)
-
-
-def test_one_robot_needs_no_estimate(recording: Recording) -> None:
-    """Its grasp is the payload's frame, whatever is known of the payload."""
-    trial = replay_trial(standing(recording, robots=1), "one")
-    assert trial.motion is not None
-    assert trial.motion.p_W1 == pytest.approx(trial.bases.p_Wb[0] + trial.bodies.wrist[:, 0])
-    assert trial.shape is None
-
-
 def test_unknown_payloads_are_bars_to_the_grasps(recording: Recording) -> None:
     trial = replay_trial(labelled(recording, None), "rec")
     assert trial.facts is not None
@@ -115,41 +93,6 @@ def test_unknown_payloads_are_bars_to_the_grasps(recording: Recording) -> None:
         assert np.linalg.norm(points - end, axis=1).min() == pytest.approx(BAR_M, rel=1e-3)
     assert points.min(axis=0) == pytest.approx(trial.facts.grasps.p_1i.min(axis=0), abs=2 * BAR_M)
     assert not trial.notes
-
-
-def test_a_label_whose_cad_does_not_fit_is_not_believed(recording: Recording) -> None:
-    trial = replay_trial(labelled(recording, "d"), "rec")
-    (note,) = trial.notes
-    assert note.startswith("The geometry of payload 'd' is not drawn: grasp ")
-    asked = replay_trial(recording, "rec", payload="d")
-    (note,) = asked.notes
-    assert note.startswith("The geometry of payload 'd' is drawn as asked, but grasp ")
-    assert asked.shape is not None
-    assert trial.shape is not None
-    assert len(asked.shape.rgba) != len(trial.shape.rgba)
-
-
-@pytest.mark.parametrize(("turn_deg", "shift_m", "fits"), [
-    (10.0, 0.0, True), (20.0, 0.0, False), (0.0, 0.08, True), (0.0, 0.12, False),
-])  # fmt: skip
-def test_cad_fits_grasps_nearby(turn_deg: float, shift_m: float, fits: bool) -> None:
-    _, cad = cad_shape("a", 3)
-    R, p = cad.R_1i.copy(), cad.p_1i.copy()
-    R[2] = R[2] @ Rotation.from_rotvec([0.0, turn_deg, 0.0], degrees=True).as_matrix()
-    p[1] += [0.0, 0.0, shift_m]
-    said = held_elsewhere(cad, Grasps(R, p))
-    if fits:
-        assert said is None
-    else:
-        assert said is not None
-        assert said.startswith("grasp 3 is 0.00 m and 20" if turn_deg else "grasp 2 is 0.12 m")
-
-
-def test_payload_for_other_robots(recording: Recording, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="has 5 grasps; the recording is of 3 robots"):
-        replay_trial(recording, "rec", payload=FIVE.write(tmp_path))
-    trial = replay_trial(labelled(part(recording, slice(None), robots=2), "a"), "rec")
-    assert any("payload 'a' is not drawn" in note for note in trial.notes)
 
 
 def test_estimates_that_do_not_belong(recording: Recording, teams) -> None:
@@ -227,30 +170,6 @@ def test_causes_are_marked_where_they_sit(recording: Recording, tmp_path: Path) 
     assert "- **sea\\_bias**: sea\\_bias \\[is\\] \\*here\\*." in summary(trial)
 
 
-def test_names_in_the_summary_are_no_markup(recording: Recording) -> None:
-    trial = replay_trial(labelled(recording, "a*b|c\n# d"), "rec")
-    assert "payload a\\*b\\|c \\# d" in summary(trial)
-
-
-def test_side_by_side_layouts(recording: Recording) -> None:
-    trial = replay_trial(recording, "rec")
-    for count in (1, 2, 5):
-        trials = [replace(trial, name=name) for name in distinct_names([Path("x.parquet")] * count)]
-        assert blueprint(trials).root_container is not None
-
-
-def test_names_are_distinct_and_safe_in_entity_paths() -> None:
-    files = [Path("a/x.p"), Path("x.q"), Path("x-2.p"), Path("b/x.p")]
-    assert distinct_names(files) == ["x", "x-2", "x-2-2", "x-3"]
-    odd = [Path("trial 1 (ü).parquet"), Path("trial_1_(é).parquet"), Path("__init__.py"), Path("a#b.parquet")]
-    assert distinct_names(odd) == ["trial_1____", "trial_1____-2", "_init__", "a_b"]
-
-
-def test_metadata_helper_is_of_the_shipped_design(recording: Recording) -> None:
-    """The tests' other recordings and these are of the same robots."""
-    assert metadata().design == recording.metadata.design
-
-
 ENCODER_RAD = np.pi / 2**16
 """Largest error of a 16-bit encoder."""
 
@@ -300,78 +219,6 @@ def test_bodies_agree_to_encoder_accuracy(placed_a: Placed, tmp_path: Path) -> N
     check_all(placed_a, file, 2.0 * ENCODER_RAD, 5.0 * ENCODER_RAD)
     assert trial.motion is not None
     assert 1e-6 < trial.motion.gap_position_m.max() < 2.0 * ENCODER_RAD
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("robots", [1, 2, 5])
-def test_any_number_of_robots(teams: dict[int, TeamScene], tmp_path: Path, robots: int) -> None:
-    placed = placed_trial(teams[robots], vias=1)
-    check_all(placed, replayed(placed, tmp_path)[1], 2e-5, 2e-5)
-
-
-def test_bases_stand_where_the_robots_were_parked(placed_a: Placed, tmp_path: Path) -> None:
-    trial, _ = replayed(placed_a, tmp_path)
-    scene = placed_a.scene
-    assert trial.bases.p_Wb == pytest.approx(scene.X_Wb.translation, abs=1e-6)
-    assert trial.bases.R_Wb == pytest.approx(scene.X_Wb.rotation.as_matrix(), abs=1e-6)
-    assert trial.motion is not None
-    assert trial.motion.gap_position_m.max() < 2e-6
-    assert trial.motion.gap_rotation_rad.max() < 1e-6
-
-
-def held(rng: np.random.Generator, bases: int, samples: int = 40) -> tuple[RigidTransform, ...]:
-    """X_1i, X_Wb and X_bi (as Q x N transforms) of a payload that moves at random in random, level bases."""
-    X_1i = RigidTransform.from_components(
-        rng.normal(size=(bases, 3)), Rotation.from_rotvec(rng.normal(0, 0.1, (bases, 3)))
-    )
-    X_1i = X_1i[0].inv() * X_1i
-    X_W1 = RigidTransform.from_components(
-        rng.normal(0, 0.05, (samples, 3)), Rotation.from_rotvec(rng.normal(0, 0.1, (samples, 3)))
-    )
-    yaw = Rotation.from_rotvec(np.outer([0.0, *rng.uniform(-3, 3, bases - 1)], [0.0, 0.0, 1.0]))
-    place = np.concatenate([[[0.0, 0.0, 0.4]], rng.normal(size=(bases - 1, 3))])  # {b1} is the world's
-    X_Wb = RigidTransform.from_components(place, yaw)
-    return X_1i, X_Wb, X_W1
-
-
-def in_bases(
-    X_1i: RigidTransform, X_Wb: RigidTransform, X_W1: RigidTransform
-) -> tuple[np.ndarray, np.ndarray]:
-    X_bi = [X_Wb[i].inv() * X_W1 * X_1i[i] for i in range(len(X_1i))]
-    return (
-        np.stack([X.rotation.as_matrix() for X in X_bi], axis=1),
-        np.stack([X.translation for X in X_bi], axis=1),
-    )
-
-
-def test_placement_of_made_up_motion() -> None:
-    X_1i, X_Wb, X_W1 = held(np.random.default_rng(2), 4)
-    R_bi, p_bi = in_bases(X_1i, X_Wb, X_W1)
-    grasps = Grasps(X_1i.rotation.as_matrix(), X_1i.translation)
-    bases = place_bases(R_bi, p_bi, grasps, 0.4)
-    assert bases.p_Wb == pytest.approx(X_Wb.translation, abs=1e-12)
-    assert bases.R_Wb == pytest.approx(X_Wb.rotation.as_matrix(), abs=1e-12)
-    motion = payload_motion(R_bi, p_bi, grasps, bases)
-    np.testing.assert_allclose(motion.R_W1, X_W1.rotation.as_matrix(), atol=1e-12)
-    assert motion.p_W1 == pytest.approx(X_W1.translation, abs=1e-12)
-    assert motion.gap_position_m.max() < 1e-12
-
-
-def test_gaps_show_which_robot_let_go() -> None:
-    """One of four shifts by 4 mm at one instant: the payload goes a quarter with it, the others stay."""
-    X_1i, X_Wb, X_W1 = held(np.random.default_rng(3), 4)
-    R_bi, p_bi = in_bases(X_1i, X_Wb, X_W1)
-    grasps = Grasps(X_1i.rotation.as_matrix(), X_1i.translation)
-    bases = place_bases(R_bi, p_bi, grasps, 0.4)
-    p_bi[7, 2] += [4e-3, 0.0, 0.0]
-    motion = payload_motion(R_bi, p_bi, grasps, bases)
-    assert motion.gap_position_m[7] == pytest.approx([1e-3, 1e-3, 3e-3, 1e-3], rel=1e-9)
-    turned = Rotation.from_rotvec([0.0, 0.02, 0.0]).as_matrix()
-    R_bi[9, 0] = turned @ R_bi[9, 0]
-    motion = payload_motion(R_bi, p_bi, grasps, bases)
-    assert motion.gap_rotation_rad[9, 0] == pytest.approx(0.015, rel=1e-3)
-    assert motion.gap_rotation_rad[9, 1:] == pytest.approx(0.005, rel=1e-3)
-    assert np.delete(motion.gap_rotation_rad, 9, axis=0).max() < 1e-9
 
 
 SOLIDS = {
@@ -454,33 +301,6 @@ def test_payload_has_mujocos_surfaces() -> None:
     check_on_surfaces(model, [model.body("payload").id], every=23)
 
 
-TETRAHEDRON = """
-<mujoco><asset><mesh name="t" vertex="0 0 0  0.3 0 0  0 0.2 0  0 0 0.1"/>
-<material name="m" rgba="0.2 0.4 0.6 1"/></asset><worldbody><body name="b" pos="1 2 3" euler="10 20 30">
-<geom type="mesh" mesh="t" material="m"/><geom type="sphere" size="0.05" pos="1 0 0" rgba="0 1 0 1" material="m"/>
-<geom type="ellipsoid" size="0.1 0.2 0.3" pos="2 0 0" euler="0 90 0"/>
-<geom type="box" size="1 1 1" group="3"/><geom type="box" size="1 1 1" rgba="1 0 0 0"/></body></worldbody></mujoco>
-"""
-
-
-def test_meshes_materials_and_hidden_geoms() -> None:
-    model = mujoco.MjModel.from_xml_string(TETRAHEDRON)
-    check_on_surfaces(model, [1], every=1)
-    shape = body_shape(model, [1])
-    assert shape is not None
-    assert np.abs(shape.triangles.vertices[:, 0]).max() < 2.4, "group 3 and the invisible are left out"
-    colours = {tuple(rgba) for rgba in shape.rgba.tolist()}
-    assert colours == {(51, 102, 153, 255), (0, 255, 0, 255), (128, 128, 128, 255)}
-    mesh = [k for k, rgba in enumerate(shape.rgba.tolist()) if rgba[0] == 51]
-    part = Triangles(shape.triangles.vertices[mesh], shape.triangles.normals[mesh], shape.triangles.faces[:4])
-    assert volume(part) == pytest.approx(0.3 * 0.2 * 0.1 / 6, rel=1e-5)
-
-
-def test_body_without_geoms_has_no_shape() -> None:
-    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='b'/></worldbody></mujoco>")
-    assert body_shape(model, [1]) is None
-
-
 def test_every_moving_body_of_the_robot_is_drawn() -> None:
     assert set(robot_shapes(omnid_design()).moving) == set(PATHS)
 
@@ -512,98 +332,6 @@ def views(content: rrb.Container | rrb.View) -> list[rrb.View]:
     if isinstance(content, rrb.View):
         return [content]
     return [view for part in content.contents for view in views(part)]
-
-
-def seen(view: rrb.View, points: Array, aspect: float) -> Array:
-    """Where points lie in a 3D view, -1 to 1 from left to right and from bottom to top: the pinhole's formula."""
-    eye = view.properties["EyeControls3D"]
-    position, target = (
-        np.array(part.as_arrow_array().to_pylist(), dtype=float).ravel()
-        for part in (eye.position, eye.look_target)
-    )
-    forward = (target - position) / np.linalg.norm(target - position)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    depth = (points - position) @ forward
-    assert (depth > 0).all()
-    at = np.stack(
-        [(points - position) @ right / aspect, (points - position) @ np.cross(right, forward)], axis=-1
-    )
-    return at / (depth[..., None] * np.tan(np.deg2rad(0.5 * FOVY_DEG)))
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_all_robots_and_the_payload_are_in_sight_for_the_whole_trial(trial: ReplayTrial, count: int) -> None:
-    """Also in the narrowest view that a window of 800 leaves them, and none of them behind another."""
-    trials = [replace(trial, name=f"rec{k}") for k in range(count)]
-    aspect = SCENE_ASPECT.get(count, 1.0)
-    scenes = [view for view in views(blueprint(trials).root_container) if view.name.startswith("rec")]
-    assert len(scenes) == count
-    assert trial.motion is not None
-    assert trial.shape is not None
-    wrists = np.einsum("nij,qnj->qni", trial.bases.R_Wb, trial.bodies.wrist) + trial.bases.p_Wb
-    wheels = trial.bases.p_Wb[:, None] + [
-        [x, y, -trial.bases.p_Wb[0, 2]] for x in (-0.2, 0.2) for y in (-0.2, 0.2)
-    ]
-    corners = trial.shape.triangles.vertices
-    held = np.einsum("qij,vj->qvi", trial.motion.R_W1[::20], corners) + trial.motion.p_W1[::20, None]
-    assert trial.data is not None
-    forces = FORCE_M_PER_N * np.einsum("qnij,qnj->qni", trial.data.R_bi, trial.data.wrench[..., 3:])
-    tips = np.einsum("nij,qnj->qni", trial.bases.R_Wb, trial.data.p_bi + forces) + trial.bases.p_Wb
-    for points in (wrists, wheels, held, tips):
-        assert np.abs(seen(scenes[0], points, aspect)).max() < 1.0
-    feet = seen(scenes[0], trial.bases.p_Wb, aspect)
-    apart = [np.linalg.norm(feet[i] - feet[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
-    assert min(apart) > 0.3
-
-
-def test_paths_fill_their_views(trial: ReplayTrial) -> None:
-    """Measured and commanded path whole, and as near as that allows."""
-    paths = [view for view in views(blueprint([trial]).root_container) if "white: command" in view.name]
-    assert len(paths) == 3
-    assert trial.recording.ref is not None
-    for i, view in enumerate(paths):
-        at = seen(view, np.concatenate([trial.bodies.wrist[:, i], trial.recording.ref[:, i]]), aspect=0.75)
-        assert np.abs(at).max() < 1.0
-        assert np.ptp(at, axis=0).max() > 1.7
-
-
-def test_plots_open_with_all_of_the_trial_and_nothing_on_top(trial: ReplayTrial) -> None:
-    """One range for all plots, from 0 to the end of the longest trial; no legend; a key over them instead."""
-    longer = replace(trial, name="longer", time=np.linspace(0.0, 95.0, len(trial.time)))
-    shown = views(blueprint([trial, longer]).root_container)
-    plots = [view for view in shown if isinstance(view, rrb.TimeSeriesView)]
-    assert len(plots) == 28
-    assert len({view.id for view in shown}) == len(shown)
-    for plot in plots:
-        assert plot.properties["PlotLegend"].visible.as_arrow_array().to_pylist() == [False]
-        assert plot.properties["TimeAxis"].link.as_arrow_array().to_pylist() == [2], "linked"
-    (holder,) = [plot for plot in plots if plot.id == ALL_PLOTS]
-    (span,) = holder.properties["TimeAxis"].view_range.as_arrow_array().to_pylist()
-    assert [span[end] for end in ("start", "end")] == [0, 95_000_000_000]
-
-
-def test_key_names_every_line_in_its_colour(trial: ReplayTrial, tmp_path: Path) -> None:
-    save_replay([trial], tmp_path / "out.rrd")
-    file = Replayed(tmp_path / "out.rrd")
-    for key, parts in (("joints", ["1", "2", "3"]), ("axes", ["x", "y", "z"]), ("robots", [""])):
-        labels = file.texts(f"rec/series/key/{key}", "Points2D:labels")
-        assert labels == [label for i in (1, 2, 3) for label in (f"omnid{i}", *parts)]
-    packed = file.texts("rec/series/key/joints", "Points2D:colors")
-    dots = [colour >> 8 for k, colour in enumerate(packed) if k % 4]  # 0xRRGGBBAA
-    lines = [colour >> 8 for colour in file.texts("rec/series/phi", "SeriesLines:colors")]
-    shades = [shade for i in (1, 2, 3) for shade in colours.shades(i)]
-    assert dots == lines == [(red << 16) + (green << 8) + blue for red, green, blue in shades]
-
-
-def test_no_line_of_the_summarys_table_is_wider_than_its_panel(trial: ReplayTrial) -> None:
-    """350 points in a window of 800, at some 7 points a letter."""
-    rows = [line for line in summary(trial).splitlines() if line.startswith("|")]
-    assert len(rows) == 2 + 1 + 3 + 3 + 2 * 6
-    columns = zip(
-        *([cell.strip() for cell in row.strip("|").split("|")] for row in rows[:1] + rows[2:]), strict=True
-    )
-    assert 7 * sum(max(map(len, column)) for column in columns) < 350
 
 
 @pytest.fixture(scope="module")

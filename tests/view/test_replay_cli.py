@@ -110,23 +110,6 @@ def test_existing_targets_are_replaced_whole(
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_a_file_that_arrived_in_part_is_not_kept(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from mocobot_view import stream as outputs
-
-    check = outputs._check_complete
-
-    def cut(path: Path) -> None:
-        path.write_bytes(path.read_bytes()[:100_000])
-        check(path)
-
-    monkeypatch.setattr(outputs, "_check_complete", cut)
-    message = refused(capsys, folder / "rec.parquet", "--save", tmp_path / "out.rrd")
-    assert "only a part of it arrived" in message
-    assert not list(tmp_path.iterdir())
-
-
 def test_without_rerun(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,15 +120,6 @@ def test_without_rerun(
     message = refused(capsys, *command)
     assert "is not installed" in message
     assert "pip install 'mocobot[replay]'" in message
-
-
-def test_rerun_switched_off(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("RERUN", "off")
-    message = refused(capsys, folder / "rec.parquet", "--save", tmp_path / "out.rrd")
-    assert "RERUN is 'off' in the environment" in message
-    assert not list(tmp_path.iterdir())
 
 
 def drop(*keys: str) -> Change:
@@ -261,8 +235,3 @@ def test_bad_diagnoses(
     told = diagnosis(tmp_path / "verdict", change)
     command = folder / "rec.parquet", "--diagnosis", told, "--save", tmp_path / "out.rrd"
     assert words in refused(capsys, *command)
-
-
-def test_folder_without_a_diagnosis(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = folder / "rec.parquet", "--diagnosis", tmp_path, "--save", tmp_path / "out.rrd"
-    assert "diagnosis.json: there is no such file; it would be a diagnosis" in refused(capsys, *command)

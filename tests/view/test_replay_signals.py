@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
 from estimator.estimate.consistency import wrench_balance
@@ -62,20 +61,6 @@ def test_measured_series_are_the_recordings_samples(
     np.testing.assert_array_equal(values, getattr(recording, quantity).reshape(len(recording.time), 9))
 
 
-def test_times_are_whole_samples(file: Replayed) -> None:
-    """Not a nanosecond less, as they would be if seconds were cut off to nanoseconds."""
-    table = file.store.reader(index="time", contents="/trial/series/phi").to_arrow_table()
-    nanoseconds = table["time"].cast("int64").to_numpy()
-    assert len(nanoseconds) > 1000
-    assert not np.any(nanoseconds % 10_000_000)
-
-
-def test_series_say_which_line_is_which(file: Replayed) -> None:
-    names = file.texts("trial/series/theta", "SeriesLines:names")
-    assert names == [f"omnid{i} {axis}" for i in (1, 2, 3) for axis in "zyx"]
-    assert file.texts("trial/series/tau", "SeriesLines:names")[3:6] == ["omnid2 1", "omnid2 2", "omnid2 3"]
-
-
 @pytest.mark.parametrize(("quantity", "field", "part"), [
     ("omega", "twist", slice(0, 3)), ("velocity", "twist", slice(3, 6)),
     ("moment", "wrench", slice(0, 3)), ("force", "wrench", slice(3, 6)),
@@ -87,22 +72,6 @@ def test_twists_and_wrenches_are_the_estimators(
     time, values = file.column(f"trial/series/{quantity}", "Scalars:scalars")
     assert time == pytest.approx(data.time[::2] - 12.5, abs=1e-9)
     np.testing.assert_array_equal(values, getattr(data, field)[::2, :, part].reshape(len(time), 9))
-
-
-def test_wrists_and_commands(file: Replayed, trial: ReplayTrial, recording: Recording) -> None:
-    assert recording.ref is not None
-    for i in range(3):
-        series = f"trial/series/wrist/omnid{i + 1}"
-        _, measured = file.column(f"{series}/measured", "Scalars:scalars")
-        _, commanded = file.column(f"{series}/commanded", "Scalars:scalars")
-        np.testing.assert_array_equal(commanded, recording.ref[:, i])
-        np.testing.assert_array_equal(measured, trial.bodies.wrist[:, i])
-        time, pieces = file.column(f"trial/omnid{i + 1}/base/wrist", "LineStrips3D:strips")
-        pieces = pieces.reshape(-1, 2, 2, 3)  # measured and commanded, from and to
-        at = np.round(100 * time).astype(int)
-        assert pieces[:, 0, 1] == pytest.approx(measured[at], abs=1e-6)
-        assert pieces[:, 1, 1] == pytest.approx(commanded[at], abs=1e-6)
-        np.testing.assert_array_equal(pieces[1:, :, 0], pieces[:-1, :, 1])
 
 
 def test_forces_are_arrows_in_the_flange_and_end_with_the_data(file: Replayed, recording: Recording) -> None:
@@ -172,31 +141,6 @@ def test_payload_overlay(file: Replayed, recording: Recording, truth: BodyFacts,
     assert drawn == pytest.approx(facts.R_1c @ np.diag(facts.principal_kgm2) @ facts.R_1c.T, abs=1e-5)
     _, axes = file.column(f"{root}/axes", "Arrows3D:vectors")
     assert np.linalg.norm(axes.reshape(3, 3), axis=1) == pytest.approx(half[0], rel=1e-5)
-
-
-def test_no_real_body_has_a_flat_ellipsoid() -> None:
-    none = BodyFacts(None, None, None, None, None)
-    assert none.semi_axes_m() is None
-    impossible = BodyFacts(None, 2.0, np.zeros(3), np.eye(3), np.array([0.1, 0.2, 0.5]))
-    axes = impossible.semi_axes_m()
-    assert axes is not None
-    assert axes == pytest.approx([np.sqrt(1.25 * 0.6), np.sqrt(1.25 * 0.4), 0.02 * np.sqrt(1.25 * 0.6)])
-    assert BodyFacts(None, 2.0, np.zeros(3), np.eye(3), np.zeros(3)).semi_axes_m() is None
-    assert BodyFacts(None, -1.0, np.zeros(3), np.eye(3), np.ones(3)).semi_axes_m() is None
-
-
-def test_file_has_a_blueprint_and_nothing_at_other_times(path: Path, file: Replayed) -> None:
-    reader = RrdReader(path)
-    assert [entry.application_id for entry in reader.blueprints()] == ["mocobot"]
-    assert {column.name for column in file.store.schema().index_columns()} == {"time"}
-
-
-def test_file_is_small_and_in_whole_columns(path: Path, trial: ReplayTrial) -> None:
-    """110 s of three robots must stay below 20 MB, meshes included; every signal is one chunk, however long."""
-    fixed, per_second = 0.8e6, 0.17e6
-    assert fixed + 110.0 * per_second < 20e6
-    assert path.stat().st_size < fixed + per_second * trial.time[-1]
-    assert 100 < len(RrdReader(path).store()) < 200
 
 
 def test_summary_has_the_numbers(file: Replayed, trial: ReplayTrial) -> None:

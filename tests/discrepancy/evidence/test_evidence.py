@@ -7,8 +7,8 @@ import pytest
 from scipy.fft import dct
 from scipy.stats import multivariate_normal
 
-from discrepancy.evidence.cells import Bands, Cells, Columns
-from discrepancy.evidence.posterior import Group, Posterior, prior_root
+from discrepancy.evidence.cells import Bands, Cells
+from discrepancy.evidence.posterior import Group, Posterior
 
 RATE_HZ, LENGTHS, EDGES_HZ = 20.0, (60, 41), np.array([0.0, 1.0, 2.5, 6.0])
 BANDS = Bands([RATE_HZ, RATE_HZ], LENGTHS, EDGES_HZ)
@@ -79,14 +79,6 @@ def test_gain_is_the_difference_of_evidences(rng: np.random.Generator, columns: 
     assert scale == 1.0
 
 
-def test_members_of_a_kind_share_half_of_their_variance() -> None:
-    group = Group("c", "all", (5, 6, 7, 8), (1.0, 2.0, 3.0, 4.0), members=((5, 6), (7, 8)))
-    root = prior_root(group)
-    S = np.diag([1.0, 2.0, 3.0, 4.0])
-    alike = np.array([[1, 0, 0.5, 0], [0, 1, 0, 0.5], [0.5, 0, 1, 0], [0, 0.5, 0, 1]])
-    assert root @ root.T == pytest.approx(S @ alike @ S)
-
-
 def test_what_cannot_be_negative_gains_where_it_is_positive(rng: np.random.Generator) -> None:
     """Evidence of a half-normal prior is the integral over the positive half."""
     cells, y, X = problem(rng, 2)
@@ -99,48 +91,6 @@ def test_what_cannot_be_negative_gains_where_it_is_positive(rng: np.random.Gener
     density = 2.0 * np.exp(-0.5 * (grid / 0.5) ** 2) / np.sqrt(2 * np.pi) / 0.5
     expected = np.log(np.trapezoid(np.exp(log) * density, grid))
     assert gain == pytest.approx(expected, abs=2e-3)
-
-
-def test_weighted_residual_gives_the_scores_of_columns(rng: np.random.Generator) -> None:
-    cells, _, _ = problem(rng)
-    p = Posterior(cells, np.array([0.5, 0.0, 2.0, 0.0]), rng.uniform(0.3, 2.0, (2, 3)))
-    series = [rng.standard_normal(n) for n in LENGTHS]
-    score = cells.weighted_residual(p.mean, p.variance)
-    expected = sum(float(x @ z[:, 1]) for x, z in zip(series, score, strict=True))
-    (k,) = cells.add([{1: series}])
-    wider = Posterior(cells, np.append(p.prior, 0.0), p.variance)
-    assert wider._conditional[1][k] == pytest.approx(expected, rel=1e-9)
-
-
-def test_columns_that_are_taken_away_leave_the_problem_as_it_was(rng: np.random.Generator) -> None:
-    cells, _, _ = problem(rng)
-    prior, variance = np.ones(4), np.ones((2, 3))
-    before = Posterior(cells, prior, variance).log_evidence
-    cells.add([{0: [rng.standard_normal(n) for n in LENGTHS]}])
-    assert Posterior(cells, np.ones(5), variance).log_evidence != before
-    cells.truncate(4)
-    assert Posterior(cells, prior, variance).log_evidence == before
-
-
-def test_columns_without_their_zeros_are_the_columns(rng: np.random.Generator) -> None:
-    """Joined, taken apart, and in the problem; a column without rows keeps its prior variance."""
-    cells, _, X = problem(rng)
-    wide = np.stack([np.column_stack([x, np.zeros(len(x))]) for x in X]).astype(np.float32)
-    narrow = Columns.joined([Columns.of(wide[..., :2]), Columns.of(wide[..., 2:])])
-    assert [len(at) for at in narrow.at] == [4, 3]  # the first column is in one channel
-    np.testing.assert_array_equal(narrow.dense, wide)
-    np.testing.assert_array_equal(narrow.part(slice(1, 4)).dense, wide[..., 1:4])
-    cells.truncate(0)
-    assert cells.add_rows(narrow) == list(range(5))
-    prior, variance = np.full(5, 0.7), rng.uniform(0.3, 2.0, (2, 3))
-    weights = [
-        np.repeat(1.0 / v, np.diff(c.starts))[:, None] for v, c in zip(variance, cells.channels, strict=True)
-    ]
-    G = sum(x.T @ (w * x) for x, w in zip(wide.astype(float), weights, strict=True))
-    expected = np.diag(np.linalg.inv(G + np.eye(5) / 0.7))
-    found = Posterior(cells, prior, variance)
-    np.testing.assert_allclose(found.variances, expected, rtol=1e-9)
-    assert found.variances[4] == pytest.approx(0.7)
 
 
 def test_covariance_is_the_scatter_of_the_values() -> None:
@@ -163,19 +113,6 @@ def test_covariance_is_the_scatter_of_the_values() -> None:
         errors.append(np.linalg.solve(np.linalg.cholesky(p.covariance), p.mean - x))
     assert np.mean(np.square(errors), axis=0) == pytest.approx([1.0, 1.0], abs=0.25)
     assert abs(np.mean(np.prod(errors, axis=1))) < 0.15
-
-
-def test_squares_explained_are_those_of_the_covariance_also_where_columns_came_later(
-    rng: np.random.Generator,
-) -> None:
-    cells, _, _ = problem(rng)
-    p = Posterior(cells, np.array([0.5, 0.0, 2.0, 0.1]), rng.uniform(0.3, 2.0, (2, 3)))
-    expected = p.covariance
-    cells.add([{1: [rng.standard_normal(n) for n in LENGTHS]}])
-    assert p.variances == pytest.approx(np.diag(expected), rel=1e-10)
-    mean, wide = np.append(p.mean, 0.0), np.pad(expected, ((0, 1), (0, 1)))
-    for found, full in zip(p.left, cells.left(mean, wide), strict=True):
-        assert found == pytest.approx(full, rel=1e-10)
 
 
 def test_what_a_group_is_worth_is_the_difference_of_evidences(rng: np.random.Generator) -> None:

@@ -61,30 +61,6 @@ def test_the_floor_is_the_noise_however_much_the_dictionary_explains() -> None:
     assert np.sqrt(floor[0]) == pytest.approx(noise, rel=0.2)
 
 
-def test_noise_above_the_bands_stays_out_of_them() -> None:
-    """The second derivative of noise has hardly any power at low frequencies, unless a cut leaks it."""
-    power = []
-    for fade_s in (0.0, 0.5):
-        rng, own = np.random.default_rng(2), []
-        bands = Bands([RATE_HZ], [LENGTH], EDGES_HZ, fade_s)
-        for _ in range(20):
-            noise = np.diff(rng.standard_normal(LENGTH + 2), 2)
-            own.append(Cells.of(bands, [noise[:, None]]).channels[0].squares[0])
-        power.append(np.mean(own))
-    assert power[1] < 0.05 * power[0]
-
-
-def test_scores_of_columns_that_fade() -> None:
-    rng = np.random.default_rng(3)
-    y, x = rng.standard_normal((2, LENGTH))
-    cells = Cells.of(Bands([RATE_HZ], [LENGTH], EDGES_HZ, 0.5), [y[:, None]])
-    cells.add([{0: [x]}])
-    p = Posterior(cells, np.zeros(1), np.array([[0.5, 1.0, 2.0]]))
-    (score,) = cells.weighted_residual(p.mean, p.variance)
-    _, b, _ = cells.weighted(p.variance)
-    assert x @ score[:, 0] == pytest.approx(b[0], rel=1e-9)
-
-
 @pytest.mark.parametrize("other", [0.0, 0.1])
 def test_the_error_of_a_law_costs_little_where_the_law_is_exact(other: float) -> None:
     """Its share is learnt: small where the law is exact, as large as it is where the law has another form."""

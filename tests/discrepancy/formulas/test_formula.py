@@ -103,24 +103,6 @@ def test_pieces_are_the_simulators(name: str) -> None:
     assert np.allclose(total, formula.at(x))
 
 
-def test_other_data_keep_the_terms() -> None:
-    """Only amplitudes are new; a constant that is not the law's own does not count."""
-    curve = fitted(spring)
-    basis = np.column_stack([np.ones(SAMPLES), spring(curve.x)])
-    formula = formula_of(curve).through(curve.x, basis, np.array([5.0, 2.0]))
-    assert formula.function == "cube"
-    assert formula.parameters["amplitude"][0] == pytest.approx(-1.6)
-
-
-def test_what_a_basis_does_not_hold_of_a_formula_is_no_loss_to_its_amplitude() -> None:
-    curve = fitted(spring)
-    few, f = curve.basis[:, :4], spring(curve.x)
-    mean = np.linalg.lstsq(few - few.mean(axis=0), 2.0 * (f - f.mean()), rcond=None)[0]
-    assert np.std(few @ mean - 2.0 * f) > 0.05 * np.std(f)
-    formula = formula_of(curve).through(curve.x, few, mean)
-    assert formula.parameters["amplitude"][0] == pytest.approx(-1.6)
-
-
 def law_of(formula: Formula, unit: str, of_unit: str) -> Law:
     """A law of a torque reading."""
     of = Of("phi_rate_1_2", "rate of driven joint 2 of robot 1", "v", of_unit)
@@ -139,9 +121,3 @@ def test_a_sentence_has_place_formula_and_signal() -> None:
     assert told["formula"] == "a v |v|"
     assert told["targets"] == ["tau_1_2"]
     assert told["units"] == {"amplitude": "N m/(rad/s)^2"}
-
-
-def test_an_amplitude_in_the_signals_own_unit_is_a_pure_number() -> None:
-    """A sensor that reads some of another."""
-    formula = formula_of(fitted(lambda x: 0.3 * x))
-    assert law_of(formula, "N m", "N m").to_dict()["units"] == {"amplitude": ""}

@@ -76,20 +76,6 @@ def test_a_load_at_the_last_link(folder: Path) -> None:
     assert value == pytest.approx(1.5 * 0.25, abs=4.0 * se)
 
 
-def test_the_verdict_does_not_depend_on_the_rate(folder: Path) -> None:
-    log = arm_log(rubs(0.5, 0.3), 6)
-    found = []
-    for step in (1, 5):
-        thinned = replace(
-            log, time=log.time[::step], q=log.q[::step], torque=log.torque[::step], usable=log.usable[::step],
-            rate_hz=log.rate_hz / step, native_hz=log.rate_hz / step,
-        )  # fmt: skip
-        found.append(diagnose(arm_model(folder), [thinned]))
-    assert [names(f) for f in found] == [{("friction", "all joints")}] * 2
-    fast, slow = (labels_of(f)["elbow coulomb_Nm"] for f in found)
-    assert abs(fast[0] - slow[0]) < 4.0 * slow[1]
-
-
 def test_friction_at_rest_is_that_of_all_terms_together(folder: Path) -> None:
     """Coulomb friction of 2 N m, less 1.5 N m of Stribeck friction: what is left at rest is 0.5 N m."""
     model = arm_model(folder)

@@ -15,7 +15,7 @@ import pytest
 from command import refused, run
 from diagnosed import check_finite, small_diagnosis
 from discrepancy.cause_names import JOINTS as EXCLUDABLE
-from discrepancy.evidence.findings import Finding, Limit, Offer, Rival
+from discrepancy.evidence.findings import Finding, Limit, Rival
 from discrepancy.joints import diagnosed
 from discrepancy.joints.causes import CAUSES, OTHERS, WORDS, Said, parameter_name
 from discrepancy.joints.diagnosed import verdict_to_dict
@@ -120,17 +120,6 @@ def test_sentences(cause: str, slide: bool, numbers: dict[str, float], said: str
     assert sentence(Said(numbers, errors, "joint 4", slide)) == said
 
 
-def test_a_cause_without_a_sentence_lists_its_numbers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bare = replace(
-        CAUSES[0], name="magnet", title="magnet at {joint}", parameters=("pull_Nm",), sentence=None
-    )
-    monkeypatch.setitem(WORDS, "magnet", bare)
-    (cause,) = values(tmp_path, [finding("magnet", member("turn", 1, pull_Nm=0.25))])["causes"]
-    assert cause["sentence"] == "Magnet at joint 1 (turn): pull_Nm 0.25."
-
-
 # --- JSON
 
 
@@ -172,44 +161,13 @@ def test_the_values_are_strict_json_with_all_that_readers_ask_for(tmp_path: Path
     assert told["gain"]["units"] == {"turn torque": "N m", "joint2 torque": "N m", "lift torque": "N"}
 
 
-def test_numbers_of_what_is_foretold(tmp_path: Path) -> None:
+def test_numbers_of_trials_left_out(tmp_path: Path) -> None:
     better = replace(prediction(TRIALS[0], True), chi2_before=5.0, chi2_after=2.0)
     gain = values(tmp_path, [friction_everywhere()], predictions=(better,), validated=False)["gain"]
     assert gain["removed"]["share"] == pytest.approx(0.5)  # of an error of 2 beyond noise 1 is left
     assert gain["held_out"]["before"]["lift torque_nrmse"] == pytest.approx(9.0 / 40.0)
     assert gain["held_out"]["after"]["chi2_per_n"] == 2.0
     assert gain["noise"]["turn torque_rms"] == pytest.approx(0.02)
-
-
-def test_a_joint_without_torques_is_left_out(tmp_path: Path) -> None:
-    one = prediction(TRIALS[0], True)
-    one.before[1] = one.torque[1] = float("nan")
-    told = values(tmp_path, [friction_everywhere()], predictions=(one,))
-    assert list(told["gain"]["units"]) == ["turn torque", "lift torque"]
-    check_finite(told)
-
-
-def test_a_candidate_is_listed_once_in_its_likeliest_shape(tmp_path: Path) -> None:
-    offers = [Offer("stribeck", "turn", 1, nats) for nats in (20.0, 31.0, 5.0)]
-    offers.append(Offer("spring", "turn", 1, -2.0))
-    listed = values(tmp_path, before=tuple(offers))["evidence"]["before"]
-    assert [(entry["name"], entry["nats"]) for entry in listed] == [
-        ("Stribeck friction in joint 1 (turn)", 31.0)
-    ]
-
-
-def test_coupled_joints_and_places_of_links(tmp_path: Path) -> None:
-    pair = finding("coupled_drive", member("joint2", 2, coulomb_Nm=1.0, viscous_Nms_per_rad=0.1, armature_kgm2=0.0),
-                   partner=1, shape={"ratio": -1.0})  # fmt: skip
-    link = finding("link_mass", member("base_link", None, excess_kg=0.3))
-    first, second = values(tmp_path, [pair, link])["causes"]
-    assert first["place"] == "joints 1 and 2"
-    assert "difference of joints 1 and 2" in first["sentence"]
-    offers = (Offer("coupled_drive", "joint2", 2, 20.0),)
-    assert (
-        values(tmp_path, before=offers)["evidence"]["before"][0]["name"] == "coupled drive of joints 1 and 2"
-    )
-    assert (second["name"], second["joint"]) == ("mass of link base_link", None)
 
 
 def test_what_logs_say_nothing_of_is_undecidable(tmp_path: Path) -> None:
@@ -288,15 +246,6 @@ def test_what_is_likelier_than_what_was_fitted_comes_first(tmp_path: Path) -> No
     assert "or payload at link carriage (98 %)" in " ".join(line[15:50].strip() for line in table(text)[3:])
 
 
-def test_one_place_that_was_judged_as_one_of_all_joints_is_no_rival_of_itself(tmp_path: Path) -> None:
-    one = finding("friction", member("turn", 1, coulomb_Nm=0.5, viscous_Nms_per_rad=0.3))
-    one = replace(one, told=(("friction", "all joints"),))
-    text = format_verdict(values(tmp_path, [one]))
-    assert " or " not in text.replace("or repair", "")
-    both = replace(one, rivals=(Rival("friction", "all joints", None, 0.4, 0.5),))
-    assert "or friction in all joints" in format_verdict(values(tmp_path, [both]))
-
-
 def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
     some = finding("unlisted", place="turn", joint=1, of="position and direction")
     text = format_verdict(values(tmp_path, [some]))
@@ -305,26 +254,6 @@ def test_what_signal_something_unlisted_goes_with(tmp_path: Path) -> None:
     (cause,) = values(tmp_path, [some])["causes"]
     assert cause["sentence"].endswith("acts at joint 1 (turn) and goes with its position and direction.")
     assert " or " not in text.replace("or repair", "")
-
-
-def test_units_of_a_kind_stand_once(tmp_path: Path) -> None:
-    kind = finding("torque_delay", *(member(name, j, delay_s=0.008) for j, name in enumerate(JOINTS, 1)))
-    rows = table(format_verdict(values(tmp_path, [kind])))
-    assert "delay [ms]" in rows[2]
-    assert rows[3].split("  ")[-1].strip() == "8.00 +- 0.16"
-
-
-def test_two_kinds_of_fading_friction_are_told_apart(tmp_path: Path) -> None:
-    fading = finding("warming", member("lift", 3, more_N=2.0, more_Ns_per_m=0.5))
-    rows = table(format_verdict(values(tmp_path, [fading])))
-    assert "Coulomb 2.000 +- 0.040 N" in rows[2]
-    assert "viscous 0.500 +- 0.010 N s/m" in rows[3]
-
-
-def test_moments_of_inertia_are_told_on_request(tmp_path: Path) -> None:
-    told = values(tmp_path, [a_payload()])
-    assert "inertia xx" not in format_verdict(told)
-    assert "inertia xx" in format_verdict(told, verbose=True)
 
 
 @pytest.mark.parametrize(
@@ -364,12 +293,6 @@ def test_first_sentences(tmp_path: Path, case: str, begins: str, says: str) -> N
     assert says in said
 
 
-def test_what_helps_nothing_is_not_praised(tmp_path: Path) -> None:
-    same = tuple(replace(prediction(trial, False), chi2_after=901.0) for trial in TRIALS)
-    said = first_part(format_verdict(values(tmp_path, [offset_or_spring()], predictions=same)))
-    assert "In trials left out of the fit the torques' error is no smaller with that." in said
-
-
 # --- folder, page, comparison, Python
 
 
@@ -396,16 +319,6 @@ def test_the_folder_is_whole_and_read_by_all(
     assert code == 0
     assert "alone" not in said
     assert "<table>" in diagnosis._repr_html_()
-
-
-def test_why_there_is_no_extended_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(verdict: object, folder: Path) -> None:
-        raise InputError("the friction would be negative")
-
-    monkeypatch.setattr(diagnosed, "write_extended", refuse)
-    made(tmp_path, [friction_everywhere()]).write(tmp_path / "out")
-    said = (tmp_path / "out" / "report.txt").read_text()
-    assert "There is no extended model: the friction would be negative." in said
 
 
 def test_causes_in_python(tmp_path: Path) -> None:

@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import math
 import string
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from diagnosed import scattered, small_diagnosis
 from discrepancy.candidate import Candidate
-from discrepancy.numbers import number
-from discrepancy.result.json import plain
-from discrepancy.result.pictures import closed_loop_figure, file_names
 from discrepancy.result.remains import of_response
 from discrepancy.result.report import format_verdict
-from discrepancy.result.tables import ERRORS, response_units
-from discrepancy.result.traces import Channel, Trace, group_units, groups
+from discrepancy.result.tables import ERRORS
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors
-from discrepancy.team.linear.rows import Whitening
 from discrepancy.team.told import describe
-from discrepancy.team.verdict import unwhitened
 from mocobot_sim.effects.catalogue import EFFECTS
 
 WIDTH = 100
@@ -87,25 +79,6 @@ def test_why_nothing_was_simulated_is_told() -> None:
         small_diagnosis() | {"not_simulated": why}
     )
     assert "not simulated" not in report(small_diagnosis())
-
-
-def test_a_suspicion_is_told_with_its_probability() -> None:
-    values = small_diagnosis("consistent")
-    values["suspected"] = [small_diagnosis()["causes"][0] | {"probability": 0.41, "over_nothing": 4.0}]
-    told = "torque zero of joint 1 of robot 2 (sea_bias), probability 41 %: Robot 2, joint 1: the torque"
-    assert told in report(values)
-    assert "suspected, too improbable to be named" in format_verdict(values)
-
-
-@pytest.mark.parametrize(
-    ("share", "words"),
-    [(0.0004, "below 0.1 %"), (0.0312, "3.1 %"), (0.094, "9.4 %"), (0.096, "10 %"), (0.5, "50 %"), (0.9951, "99.5 %"),
-     (0.99995, "above 99.9 %")],
-)  # fmt: skip
-def test_a_probability_in_words(share: float, words: str) -> None:
-    values = small_diagnosis()
-    values["causes"][0]["probability"] = share
-    assert f"Probability {words}, 180 nats over nothing" in report(values)
 
 
 @pytest.mark.parametrize(("share", "told"), [(0.79, True), (0.81, False)])
@@ -214,76 +187,3 @@ def test_a_cause_of_ones_own_gets_its_docstring(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setitem(CAUSES, "ghost", Mine())
     text = describe(Candidate("ghost", "f", None, None, ()), {"c_N": 2.0}, {"c_N": 0.1})
     assert text == "Payload: A ghost holds the payload back (c_N = 2.00 +- 0.10)."
-
-
-def test_numbers_have_as_many_digits_as_they_deserve() -> None:
-    assert number(0.05, 0.00123, "N m") == "0.0500 +- 0.0012 N m"
-    assert number(-0.05, 1.0, "m", 1e3) == "-50 +- 1000 m"
-    assert number(0.05, math.nan, "s") == "0.05 s"
-
-
-def test_plain_values_have_no_nan() -> None:
-    mixed = {"a": np.float64("nan"), "b": [np.int64(2), np.array([1.0, np.inf])], "c": np.bool_(True)}
-    assert plain(mixed) == {"a": None, "b": [2, [1.0, None]], "c": True}
-
-
-def test_file_names_are_distinct_and_safe() -> None:
-    names = file_names(["/x/rec.parquet", "y/rec.parquet", "a b/c:d", "against", ""])
-    assert names == ["rec", "rec_2", "c_d", "against_2", "trial"]
-
-
-def test_channels_are_grouped_by_name() -> None:
-    channels = [Channel(f"force {a}", "balance", None, "N") for a in "xyz"] + [Channel("gap", "k", 1, "m")]
-    found = groups(channels)
-    assert [(g.name, g.columns, g.components) for g in found] == [
-        ("force", (0, 1, 2), ("x", "y", "z")),
-        ("gap", (3,), ("gap",)),
-    ]
-
-
-def test_one_unit_for_all_channels_of_a_kind() -> None:
-    """That of the largest rms, over groups and trials."""
-    names = {"grasp 2 rotation": "rad", "grasp 3 rotation": "rad", "force": "N", "moment": "N m"}
-    channels = [Channel(f"{name} {a}", "k", None, unit) for name, unit in names.items() for a in "xy"]
-    sizes = np.array([2e-5, 1e-5, 3e-4, 1e-5, 2.0, 1.0, 0.03, 0.2])
-    wave = np.sqrt(2.0) * np.cos(np.linspace(0.0, 20.0 * np.pi, 1000, endpoint=False))[:, None]
-    one = np.ones((1000, 8))
-    traces = [
-        Trace(name, np.arange(1000.0), 1000, 1.0, scale * sizes * wave, one, one, one, one, {})
-        for name, scale in (("small", 0.1), ("large", 1.0))
-    ]
-    assert group_units(traces, groups(channels)) == {
-        "rad": ("mrad", 1e3),
-        "N": ("N", 1.0),
-        "N m": ("N m", 1.0),
-    }
-    gain = small_diagnosis()["gain"]
-    gain["held_out"]["before"] = gain["held_out"]["before"] | {
-        "phi_rms": 3e-5,
-        "theta_rms": 2e-3,
-        "tau_rms": 0.3,
-    }
-    gain["trials"] = []
-    shown = response_units(gain)
-    assert shown == {"phi": ("mrad", 1e3), "theta": ("mrad", 1e3), "tau": ("N m", 1.0)}
-
-
-@pytest.mark.parametrize("uneven", [False, True])
-def test_whitening_can_be_undone(uneven: bool) -> None:
-    rng = np.random.default_rng(1)
-    draws = np.cumsum(rng.standard_normal((20, 60, 4)), axis=1) * 0.1 + rng.standard_normal((20, 60, 4))
-    draws[:, :3] *= 5.0
-    white = Whitening.of(draws, 50, uneven=uneven)
-    assert np.any(white.loudness > 1.0) == uneven
-    assert unwhitened(white, white(draws[0])) == pytest.approx(draws[0], abs=1e-10)
-
-
-@pytest.mark.pictures
-def test_no_closed_loop_no_picture(tmp_path: Path) -> None:
-    values = small_diagnosis()
-    figure = closed_loop_figure(values)
-    assert figure is not None
-    figure.savefig(tmp_path / "loop.png")
-    assert len(figure.axes) == 4
-    values["gain"]["trials"] = []
-    assert closed_loop_figure(values) is None

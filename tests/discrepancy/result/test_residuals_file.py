@@ -52,23 +52,6 @@ def test_what_is_saved_is_loaded(written: Path) -> None:
             np.testing.assert_allclose(values, original.quantities[name], rtol=2.0**-24)
 
 
-def test_the_same_residuals_are_the_same_bytes(written: Path, tmp_path: Path) -> None:
-    save_traces(*load_traces(written), tmp_path / "again.npz")
-    assert (tmp_path / "again.npz").read_bytes() == written.read_bytes()
-
-
-def test_four_long_trials_stay_small(tmp_path: Path) -> None:
-    """110 s at 12.5 Hz and 18 channels, the size of three robots' trials; the noise itself does not compress."""
-    rng, rows, channels = np.random.default_rng(1), 1375, [CHANNELS[0]] * 18
-    tables = {table: rng.standard_normal((rows, 18)) for table in TABLES}
-    tables["sigma"] = np.tile(tables["sigma"][:1], (rows, 1))
-    trace = Trace(
-        "t", np.arange(rows) / 12.5, rows, 12.5, quantities={"speed": rng.uniform(size=rows)}, **tables
-    )
-    save_traces([trace] * 4, channels, tmp_path / "residuals.npz")
-    assert (tmp_path / "residuals.npz").stat().st_size < 0.85 * 4 * 5 * rows * 18 * 4 < 5e6
-
-
 def edited(
     path: Path, change: Callable[[dict[str, Any]], None], facts: Callable[[Any], Any] | None = None
 ) -> None:
@@ -145,15 +128,6 @@ def test_damaged_files_are_refused(written: Path, tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(InputError, match="not the residuals of a diagnosis"):
             load_traces(path)
-
-
-def test_missing_file_and_folder(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no such file; it would be the residuals"):
-        load_traces(tmp_path / "residuals.npz")
-    with pytest.raises(InputError, match="not the residuals of a diagnosis, or damaged"):
-        load_traces(tmp_path)
-    with pytest.raises(InputError, match="cannot be written"):
-        save_traces([], CHANNELS, tmp_path / "none" / "residuals.npz")
 
 
 def test_a_file_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

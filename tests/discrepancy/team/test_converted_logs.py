@@ -8,14 +8,12 @@ from scipy.interpolate import CubicSpline
 
 from discrepancy.team.linear.noise import Fast
 from discrepancy.team.linear.rows import Whitening
-from discrepancy.team.linear.start import held_inertia, linearised_trials, start_shared
+from discrepancy.team.linear.start import linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import statements
-from estimator.arrays import inertia_parameters
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.metadata import Sampling
-from estimator.rigid_team import Shared
 from hidden import Logger
 from team_case import exact, residual_of
 
@@ -67,33 +65,6 @@ def left_over(trial: TrialLinear, white: Whitening) -> float:
     left = white(trial.residual).ravel()
     left -= unknowns @ np.linalg.lstsq(unknowns, left, rcond=1e-12)[0]
     return float(left @ left / (left.size - unknowns.shape[1]))
-
-
-@pytest.mark.slow
-def test_an_inertia_that_the_estimate_does_not_tell_is_not_none(random_a):
-    """Coarse encoders leave it open, and it turns their noise into moments: without one this log left 2.6."""
-    recording = Logger(encoder_bits=12, tau_noise_Nm=0.003, tau_step_Nm=0.0).recorded(
-        random_a, np.random.default_rng(7)
-    )
-    estimate = replace(estimate_payload([recording], "joint"), inertia=None)
-    start = start_shared(estimate)
-    for shared in (start, _without_inertia(start)):
-        (trial,), sensed = linearised_trials([recording], shared, {})
-        assert left_over(trial, sensed.whitening[0]) == pytest.approx(1.0, abs=0.15)
-
-
-def _without_inertia(shared: Shared) -> Shared:
-    mass, c = shared.pi[0], shared.pi[1:4] / shared.pi[0]
-    of_point = mass * (c @ c * np.eye(3) - np.outer(c, c))
-    return replace(shared, pi=np.concatenate([shared.pi[:4], inertia_parameters(of_point)]))
-
-
-def test_held_inertia_is_that_of_point_masses():
-    """Against the parallel-axis theorem, mass by mass."""
-    p = np.random.default_rng(3).normal(size=(3, 3))
-    centre = p.mean(axis=0)
-    expected = sum(2.0 * (np.dot(r, r) * np.eye(3) - np.outer(r, r)) for r in p - centre)
-    np.testing.assert_allclose(held_inertia(p, 6.0, centre), expected)
 
 
 def test_a_clock_set_by_the_motion_is_left_open():

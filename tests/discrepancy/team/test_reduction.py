@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt, welch
+from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.team.linear.rows import TEAM_ROWS_HZ, Reduction
 from discrepancy.team.linear.signals import TEAM_TRIM_S, Signals
-from estimator.errors import InputError
-from patchwork import dense
 
 QUANTUM = 2 * np.pi / 2**16
 
@@ -44,10 +42,6 @@ def test_map_is_linear_and_the_same_for_every_column(trial, reduction):
     assert reduction(x).shape == (len(reduction.time), 2, 3)
     np.testing.assert_allclose(reduction(x)[:, 1, 2], reduction(x[:, 1, 2]), atol=1e-15)
     np.testing.assert_allclose(reduction.operator.toarray() @ x[:, 0, 0], reduction(x[:, 0, 0]), atol=1e-12)
-
-
-def test_constant_stays_constant(trial, reduction):
-    np.testing.assert_allclose(reduction(np.full(len(trial.time), 7.0)), 7.0, rtol=1e-12)
 
 
 def test_hold_is_one_row_its_mean(trial, reduction):
@@ -89,92 +83,6 @@ def test_gain_is_that_of_the_filter(frequency):
         row = reduction(np.cos(2 * np.pi * frequency * trial.time + phase))
         expected = np.cos(2 * np.pi * frequency * reduction.time + phase) / (1.0 + (frequency / 5.0) ** 6)
         np.testing.assert_allclose(row, expected, atol=0.01)
-
-
-def test_little_noise_folds_down():
-    """Of white noise less than a tenth of what rows keep comes from beyond their Nyquist frequency."""
-    trial = signals(400.0, 100.0, ())
-    reduction = Reduction.of(trial)
-    noise = np.random.default_rng(3).standard_normal(len(trial.time))
-    frequency = np.linspace(0.0, 50.0, 5001)
-    gain = 1.0 / (1.0 + (frequency / 5.0) ** 6) ** 2
-    assert np.var(reduction(noise)) == pytest.approx(np.mean(gain), rel=0.05)
-    high = np.sin(2 * np.pi * 11.0 * trial.time) * np.sqrt(2.0)
-    assert np.var(reduction(high)) < 1e-3
-    spectrum = welch(reduction(noise), 12.5, nperseg=256)[1]
-    low = spectrum[2:80].mean()
-    assert spectrum.max() < 2.0 * low  # nearly white up to 4 Hz, falling beyond
-    assert spectrum[-10:].mean() > 0.05 * low
-
-
-def test_rounded_angles_at_rest_still_rest():
-    reduction = Reduction.of(signals(rounded=True))
-    assert len(reduction.time) - reduction.moving == 1
-    assert reduction.time[-1] == pytest.approx(7.5, abs=0.1)
-
-
-def test_one_joint_that_moves_ends_a_hold():
-    trial = signals()
-    theta = trial.theta.copy()
-    theta[:, 1, 2] += 0.01 * np.sin(2.0 * trial.time)
-    moved = Reduction.of(Signals(trial.time, trial.phi, theta, trial.tau, 100.0))
-    assert moved.moving == len(moved.time)
-
-
-def test_nothing_moves():
-    reduction = Reduction.of(signals(20.0, holds=((-1.0, 30.0),)))
-    # What settles at the ends of a hold counts as motion.
-    assert reduction.moving <= 2 * round(0.3 * 12.5)
-    assert len(reduction.time) == reduction.moving + 1
-    x = np.random.default_rng(4).standard_normal(2000)
-    used = np.flatnonzero(reduction.operator.toarray()[-1])
-    assert len(used) > 1400
-    assert reduction(x)[-1] == pytest.approx(x[used].mean())
-
-
-def test_holds_that_are_too_short_count_as_motion():
-    holds = tuple((s, s + 1.0) for s in (4.0, 7.0, 10.0))
-    reduction = Reduction.of(signals(20.0, holds=holds))
-    assert reduction.moving == len(reduction.time)
-
-
-def test_every_hold_has_its_row():
-    holds = ((3.0, 8.0), (10.0, 15.0), (17.0, 22.0))
-    reduction = Reduction.of(signals(26.0, holds=holds))
-    np.testing.assert_allclose(reduction.time[reduction.moving :], [5.5, 12.5, 19.5], atol=0.1)
-    assert np.all(np.diff(reduction.time[: reduction.moving]) > 0)
-
-
-@pytest.mark.parametrize("duration", [4.2, 4.5, 5.0])
-def test_short_recording(duration):
-    reduction = Reduction.of(signals(duration, holds=()))
-    assert len(reduction.time) == pytest.approx((duration - 4.0) * 12.5, abs=1.0)
-    x = np.random.default_rng(5).standard_normal(round(100 * duration))
-    assert np.all(np.isfinite(reduction(x)))
-
-
-def test_recording_without_anything_left():
-    with pytest.raises(InputError, match="too few"):
-        Reduction.of(signals(4.0, holds=()))
-
-
-def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, reduction):
-    """The same as whole columns of samples; those that show in no row are left out."""
-    rng, samples = np.random.default_rng(5), len(trial.time)
-    direction = rng.standard_normal((samples, 2))
-    spans = [slice(0, 1), slice(300, 420), slice(410, 411), slice(samples - 200, samples)]
-    pieces = [(at, rng.standard_normal((at.stop - at.start, 3))) for at in spans]
-    whole = np.zeros((samples, 2, 3 * len(spans)))
-    for k, (at, values) in enumerate(pieces):
-        whole[at, :, 3 * k : 3 * k + 3] = direction[at, :, None] * values[:, None]
-    expected = reduction(whole)
-    shown = expected.any(axis=(0, 1))
-    assert not shown[0]  # before the first row
-    assert shown.sum() >= 9
-    np.testing.assert_allclose(
-        dense(reduction.of_pieces(direction, pieces)), expected[..., shown], atol=1e-12
-    )
-    assert dense(reduction.of_pieces(direction, [])).shape == (len(reduction.time), 2, 0)
 
 
 @pytest.mark.parametrize(

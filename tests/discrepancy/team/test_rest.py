@@ -78,25 +78,6 @@ def test_draws_are_torques_at_rest_of_the_tolerances_size(one_rest, tolerances, 
     assert abs(np.corrcoef(np.array(values).T)[0, 1]) < 0.5  # another torque at each rest
 
 
-def test_rows_far_from_a_rest_know_nothing_of_it(one_rest):
-    rows = Resting(one_rest, JOINT)(np.random.default_rng(2))[0]
-    away = np.min([np.abs(one_rest.reduction.time - t) for hold in HOLDS_S[:2] for t in hold], axis=0) > 1.0
-    away &= ~still(one_rest.reduction.time, HOLDS_S[:2])
-    assert away.sum() > 20
-    assert not rows[away].any()
-    assert rows[~away].any()
-
-
-def test_same_seed_same_bits_and_no_tolerance_no_friction(one_rest):
-    draw = Resting(one_rest, JOINT)
-    first = draw(np.random.default_rng(9))
-    np.testing.assert_array_equal(first, draw(np.random.default_rng(9)))
-    assert np.any(first != draw(np.random.default_rng(10)))
-    assert not Resting(one_rest, {})(np.random.default_rng(9)).any()
-    twice = Resting(one_rest, {"joint_friction": {"coulomb_Nm": 2.0 * LIMIT_NM}})
-    np.testing.assert_allclose(twice(np.random.default_rng(9)), 2.0 * first, rtol=1e-12)
-
-
 def test_friction_in_a_gimbal_is_a_moment_alone(one_rest):
     """It shows in the balance of moments, and neither in forces nor in poses."""
     rows = Resting(one_rest, {"gimbal_friction": {"coulomb_Nm": LIMIT_NM}})(np.random.default_rng(1))[0]

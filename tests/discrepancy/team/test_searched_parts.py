@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import mocobot
-from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team import long
 from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import diagnose_team
-from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.rows import Reduction
-from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import start_shared, trial_at, without_bases
-from discrepancy.team.long import Choice, Left, more_left, searched_s, times_as_much
+from discrepancy.team.long import Choice, Left, more_left
 from discrepancy.team.rig import AsFound, TeamRig
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.estimate.payload import estimate_payload
@@ -61,82 +54,10 @@ def test_parts_are_spread_evenly(recording) -> None:
     assert len(whole.parts) == 1  # as long as the rules allow of one part
 
 
-@pytest.mark.usefixtures("little_is_searched")
-def test_a_diagnosis_of_parts_is_of_their_recording(recording) -> None:
-    """As replay asks it, for one; not of another whose name begins alike."""
-    parts = Choice.of([replace(recording, name="logs/a, b.parquet")]).searched
-    written = WrittenDiagnosis("consistent", (), tuple(part.name for part in parts))
-    assert written.is_of("elsewhere/a, b.parquet")
-    assert not written.is_of("a")
-    assert not written.is_of("a, b.parquet2")
-    assert WrittenDiagnosis("consistent", (), ("logs/rec.parquet",)).is_of("rec.parquet")
-
-
-@pytest.mark.usefixtures("little_is_searched")
-def test_every_recording_has_its_part(recording) -> None:
-    """As many as fit."""
-    many = [replace(recording, name=f"{k}") for k in range(2)]
-    choice = Choice.of(many)
-    assert [choice.parts[k].name.split(",")[0] for k in choice.taken] == ["0", "1"]
-
-
-@pytest.mark.usefixtures("little_is_searched")
-def test_notes_of_recordings_with_one_name(recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each says how many parts it has, of all that are searched, too."""
-    choice = Choice.of([recording, recording])
-    notes = choice.beside(choice.others).notes
-    assert len(notes) == 2
-    assert all("in 5 parts" in note for note in notes)
-    monkeypatch.setattr(long, "PART_S", 30.0)
-    assert all("in 3 parts" in note for note in Choice.of([recording, recording], whole=True).notes)
-
-
-def test_less_of_longer_recordings() -> None:
-    """All of what lasts eight minutes, a part of what lasts longer."""
-    assert searched_s(3, long.WHOLE_S) == long.WHOLE_S > long.SEARCHED_S
-    assert searched_s(3, long.WHOLE_S + 1.0) == long.SEARCHED_S
-
-
-def test_less_of_many_robots() -> None:
-    assert searched_s(3) == long.SEARCHED_S
-    assert searched_s(2) > searched_s(3) > 3.0 * searched_s(10) > 0.0
-
-
-def test_windows(recording) -> None:
-    """Means and what is about them, of every ten seconds of motion or a little more."""
-    reduction = Reduction.of(Signals.of(recording))
-    time = reduction.time[: reduction.moving]
-    rows = np.zeros((len(reduction.time), 2))
-    length_s = (time[-1] - time[0]) / 5  # five windows of ten seconds would leave some over
-    assert 10.5 < length_s < 12.0
-    rows[: reduction.moving, 0] = np.where(time < time[0] + length_s + 1e-6, 3.0, -1.0)
-    rows[: reduction.moving, 1] = np.where(np.arange(len(time)) % 2, 0.5, -0.5)
-    left = Left.of(reduction, rows)
-    np.testing.assert_allclose(left.means[:, 0], [3.0] + [-1.0] * 4)
-    np.testing.assert_allclose(left.rms[:, 0], 0.0, atol=1e-12)
-    np.testing.assert_allclose(left.rms[:, 1], 0.5, rtol=1e-4)
-    np.testing.assert_allclose(left.means[:, 1], 0.0, atol=0.01)
-    assert len(left.holds) == len(reduction.time) - reduction.moving
-    assert times_as_much(
-        [replace(left, means=3.0 * left.means, rms=3.0 * left.rms)], [left]
-    ) == pytest.approx(3.0)
-    still = replace(left, means=left.means[:0], rms=left.rms[:0])
-    assert times_as_much([left], [still]) is times_as_much([still], [left]) is None
-
-
 def drawn(rng: np.random.Generator, windows: int = 12, holds: int = 0) -> Left:
     """Windows of a hundred normal rows of six channels."""
     rows = rng.standard_normal((windows, 100, 6)) * [1.0, 1e-3, 10.0, 1.0, 1.0, 1.0]
     return Left(rows.mean(axis=1), rows.std(axis=1), rng.standard_normal((holds, 6)))
-
-
-@pytest.mark.parametrize("parts", [2, 4])
-def test_noise_is_nothing_else(parts: int) -> None:
-    """Of 300 long recordings with nothing in them, none calls for another part."""
-    rng = np.random.default_rng(3)
-    for _ in range(300):
-        more = more_left({k: drawn(rng) for k in range(20)}, [drawn(rng, 12) for _ in range(parts)])
-        assert max(more.values()) < 1.0
 
 
 @pytest.mark.parametrize("what", ["push", "noise", "hold"])
@@ -154,13 +75,6 @@ def test_something_else_is_seen(what: str) -> None:
         left.holds[1, 4] += 12.0
     more = more_left(others, searched)
     assert [k for k, by in more.items() if by > 1.0] == [7]
-
-
-def test_what_cannot_be_compared_is_not() -> None:
-    rng = np.random.default_rng(5)
-    others = {0: drawn(rng, holds=2)}
-    others[0].holds[:] = 1e3
-    assert max(more_left(others, [drawn(rng), drawn(rng)]).values()) < 1.0
 
 
 def test_chance_is_as_stated() -> None:
@@ -206,22 +120,6 @@ def rms_of(left) -> np.ndarray:
     """Of every channel in motion, shape (C,)."""
     reduction, rows = left
     return np.sqrt(np.mean(rows[: reduction.moving] ** 2, axis=0))
-
-
-def test_a_rest_too_short_for_a_row(recording) -> None:
-    """Nothing is left of it, and nothing is held against anything."""
-    names = ("phi", "theta", "tau", "ref")
-    fields = {name: np.repeat(getattr(recording, name)[:1], 450, axis=0) for name in names}
-    fields["tau"] += 1e-6 * np.random.default_rng(0).normal(size=fields["tau"].shape)  # or it is one reading
-    still = replace(recording, time=recording.time[:450], **fields)
-    reduction = Reduction.of(Signals.of(still))
-    assert len(reduction.time) == 0
-    noise = Noise.of([Signals.of(recording)])
-    trial = trial_at(still, start_shared(estimate_payload([recording])), noise)
-    rows = without_bases(trial, trial.residual)
-    left = Left.of(reduction, rows)
-    assert len(left.means) == len(left.holds) == 0
-    assert more_left({0: left}, [left]) == {0: 0.0}
 
 
 @pytest.mark.slow

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.team.causes import CAUSES, default_tolerances
+from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.rows import Whitening
-from discrepancy.team.linear.start import Sensed, SignalNoise, noise_rows, with_adjusted_signals
+from discrepancy.team.linear.start import SignalNoise, noise_rows, with_adjusted_signals
 from discrepancy.team.linear.trial_linear import by_bases, by_shared, filtered
-from discrepancy.team.rig import TeamRig
 from estimator.rigid_team import balance, grasp_data
 from team_case import DESIGN, every_sample, exact, residual_of
 
@@ -92,59 +91,7 @@ def test_scales_of_all_are_unbiased(case, noise):
     assert np.all(np.abs(np.mean(adjusted, axis=0)) < 0.25 * np.abs(np.mean(raw, axis=0)), where=biased)
 
 
-def rig_of(case, noise, rng):
-    """A team whose only noise is this one."""
-    rows, errors = noise_rows(case.linear, noise, rng)
-    moving = case.reduction.moving
-    sensed = Sensed(noise, (Whitening.of(rows, moving),), (SignalNoise.of(rows, errors, moving),))
-    trials = (case.carried.recording,), sensed, (case.linear,)
-    return TeamRig(*trials, default_tolerances(), frozenset())
-
-
-def seen_by(rig, signals):
-    """The team with other readings."""
-    return replace(rig, linear=(replace(rig.linear[0], signals=signals),))
-
-
-def nowhere(case):
-    """Unknowns that stay, shared and local."""
-    return np.zeros(case.linear.by_shared.shape[2]), [np.zeros(case.linear.by_bases.shape[2])]
-
-
 FORCE, MOMENT = slice(-6, -3), slice(-3, None)
-
-
-def test_a_spring_that_is_stiffer_makes_no_noise_louder(case):
-    """Residuals without a strong cause are those of the noise that was read, not of that noise scaled up."""
-    rng, scale = np.random.default_rng(8), 0.4
-    rig = rig_of(case, FINE, rng)
-    read = next(FINE.draws(case.signals, rng, 1))
-    tau = case.signals.tau.copy()
-    tau[:, 1, 2] /= 1.0 + scale
-    signals = replace(case.signals, tau=tau).minus(-read.phi, -read.theta, -read.tau)
-    (cause,) = (c for c in rig.candidates() if (c.cause, c.robot, c.joint) == ("sea_scale", 2, 3))
-    (left,) = seen_by(rig, signals).residual_there(*nowhere(case), [(cause, np.array([scale]))])
-    alone = case.signals.minus(-read.phi, -read.theta, -read.tau)
-    (expected,) = seen_by(rig, alone).residual_there(*nowhere(case), [])
-    for part in (FORCE, MOMENT):
-        assert np.mean(left[:, part] ** 2) == pytest.approx(np.mean(expected[:, part] ** 2), rel=0.02)
-
-
-def test_a_payload_that_is_heavier_makes_no_noise_louder(case):
-    """Noise of accelerations is in the residual as it is where the whitening was made, whatever the mass."""
-    rng, heavier = np.random.default_rng(9), 1.0
-    rig = rig_of(case, COARSE, rng)
-    read = next(COARSE.draws(case.signals, rng, 1))
-    noisy = seen_by(rig, case.signals.minus(-read.phi, -read.theta, -read.tau))
-    shared, local = nowhere(case)
-    (here,) = (
-        a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True)
-    )
-    shared[12] = heavier
-    (there,) = (
-        a - b for a, b in zip(*(x.residual_there(shared, local, []) for x in (noisy, rig)), strict=True)
-    )
-    assert np.mean(there[:, FORCE] ** 2) == pytest.approx(np.mean(here[:, FORCE] ** 2), rel=0.02)
 
 
 def test_torques_are_moved_as_little_as_balances_the_wrenches(case):
@@ -164,38 +111,3 @@ def test_torques_are_moved_as_little_as_balances_the_wrenches(case):
     moved = (adjusted.s - linear.s)[t, :, 18:].ravel()
     np.testing.assert_allclose(moved, smallest, atol=0.01 * np.abs(smallest).max())
     np.testing.assert_array_equal(adjusted.s[:, :, :18], linear.s[:, :, :18])
-
-
-def test_what_causes_explain_is_no_noise(case):
-    """Beside a wrench of 5 N that is known, signals are adjusted as if it were not there."""
-    rng = np.random.default_rng(4)
-    linear = measured(case, noise_of(0.0, 0.0, 0.02), rng)
-    rows = rng.standard_normal((1, 500, 18))
-    errors = np.zeros((1, 500, 3, 21))
-    errors[..., 18:] = 0.02 * rows[..., 9:].reshape(1, 500, 3, 3)
-    told = SignalNoise.of(rows, errors, 500)
-    pulled = np.zeros((len(linear.s), 18))
-    pulled[:, 12:15] = [3.0, 0.0, 4.0]
-    alone = with_adjusted_signals(linear, told)
-    beside = with_adjusted_signals(linear, told, -pulled)
-    without = with_adjusted_signals(linear, told, np.zeros_like(pulled))
-    np.testing.assert_array_equal(without.s, alone.s)
-    torques = (beside.s - alone.s)[:, :, 18:].reshape(len(pulled), 9)
-    # That it is explained counts as if so much less were there.
-    expected = -0.02 * pulled[:, 9:]
-    np.testing.assert_allclose(torques, expected, atol=0.15 * np.abs(expected).max())
-
-
-def test_holds_have_a_noise_of_their_own():
-    """What residuals tell of signals in motion and in holds is that of their own draws; none where there are none."""
-    rng = np.random.default_rng(3)
-    rows = rng.standard_normal((400, 30, 12))
-    errors = rng.standard_normal((400, 30, 2, 21))
-    errors[:, :20, 1, 4] += 2.0 * rows[:, :20, 7]
-    errors[:, 20:, 1, 4] += 0.5 * rows[:, 20:, 7]
-    found = SignalNoise.of(rows, errors, 20)
-    for told, slope in zip(found.told, (2.0, 0.5), strict=True):
-        expected = np.zeros((2, 21, 12))
-        expected[1, 4, 7] = slope
-        np.testing.assert_allclose(told, expected, atol=0.1)
-    assert not SignalNoise.of(rows[:, :20], errors[:, :20], 20).told[1].any()

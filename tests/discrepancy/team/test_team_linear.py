@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.motion import PHI
-from estimator.rigid_team import balance, grasp_data, pose_error, pose_residual, poses, start_bases
-from recorded_team import GRASPS
-from team_case import DESIGN, every_sample, exact, residual_of, true_bases, true_shared
+from estimator.rigid_team import balance, grasp_data, pose_error, poses, start_bases
+from team_case import DESIGN, every_sample, exact, residual_of
 
 
 @pytest.fixture(scope="module")
@@ -40,27 +39,6 @@ def test_bases_are_found_from_grasps_and_joints(case):
     found = start_bases(*poses(case.signals.phi, case.signals.theta, DESIGN), case.shared)
     np.testing.assert_allclose(found.R, case.bases.R, atol=1e-8)
     np.testing.assert_allclose(found.p, case.bases.p, atol=1e-8)
-
-
-def test_pose_errors_by_hand(case):
-    """Robot 3 stands 2 mm off and turned; its grasp is 1 mm off: the errors follow from geometry."""
-    s = case.signals
-    step = np.array([0.002, -0.001, 0.0005])
-    bases = replace(case.bases, p=case.bases.p + np.array([np.zeros(3), np.zeros(3), step]))
-    x = pose_residual(s.phi, s.theta, case.shared, bases, DESIGN)
-    np.testing.assert_allclose(x[:, :9], 0.0, atol=3e-7)
-    np.testing.assert_allclose(x[:, 9:], np.tile(step, (len(x), 1)), atol=3e-7)
-
-    yaw = Rotation.from_rotvec([0.0, 0.0, 0.003]).as_matrix()
-    R = case.bases.R.copy()
-    R[1] = yaw @ R[1]
-    x = pose_residual(s.phi, s.theta, case.shared, replace(case.bases, R=R), DESIGN)
-    np.testing.assert_allclose(x[:, :3], np.tile([0.0, 0.0, 0.003], (len(x), 1)), atol=3e-7)
-
-    shift = np.array([0.0, 0.0, 0.0, 0.001, 0.0, 0.0, *np.zeros(6), *np.zeros(10)])
-    R_b1 = case.linear.data.R_bi[:, 0]
-    x = pose_residual(s.phi, s.theta, case.shared.moved(shift), case.bases, DESIGN)
-    np.testing.assert_allclose(x[:, 3:6], -R_b1[:, :, 0] * 0.001, atol=3e-7)
 
 
 def test_derivative_by_shared_unknowns(case, linear):
@@ -108,13 +86,6 @@ def test_derivative_by_readings(case, linear, robot, field, kind):
             np.testing.assert_allclose(got[:, part], expected[:, part], atol=6e-3 * scale)
 
 
-def test_errors_of_readings_add_up(linear):
-    rng = np.random.default_rng(3)
-    phi, theta, tau = rng.standard_normal((3, len(linear.signals.time), 3))
-    parts = linear.of_signals(1, phi=phi) + linear.of_signals(1, theta=theta) + linear.of_signals(1, tau=tau)
-    np.testing.assert_allclose(linear.of_signals(1, phi, theta, tau), parts, rtol=1e-9, atol=1e-9)
-
-
 def test_jacobian_is_one_of_filtered_signals(case, linear):
     """By brute force at single samples: one of the 21 signals moved, all formulas again."""
 
@@ -136,12 +107,6 @@ def test_jacobian_is_one_of_filtered_signals(case, linear):
             np.testing.assert_allclose(
                 every_sample(linear.J)[robot, at][:, :, k], expected, atol=2e-4 * scale
             )
-
-
-def test_signals_are_value_rate_and_acceleration(case, linear):
-    np.testing.assert_array_equal(linear.s[:, 1, 0:3], case.signals.with_rates(case.signals.phi)[0][:, 1])
-    np.testing.assert_array_equal(linear.s[:, 2, 15:18], case.signals.with_rates(case.signals.theta)[2][:, 2])
-    np.testing.assert_array_equal(linear.s[:, 0, 18:21], case.signals.with_rates(case.signals.tau)[0][:, 0])
 
 
 def test_outside_wrench_takes_from_what_robots_exert(case, linear):
@@ -180,16 +145,6 @@ def test_moved_grasp_frames(case, linear, robot):
         np.testing.assert_allclose(plain[..., 3:], np.tile(shift, (len(x), 2, 1)), atol=1e-9)
         np.testing.assert_array_equal(plain[..., :3], 0.0)
     np.testing.assert_allclose(x[:, 12:], 0.0, atol=1e-12)
-
-
-def test_truth_is_the_truth():
-    """The unknowns of the case are those of the recording: grasps, inertia about {1}."""
-    shared = true_shared()
-    for i, (R_1i, p_1i) in enumerate(GRASPS):
-        np.testing.assert_allclose(shared.grasps.R_1i[i], R_1i)
-        np.testing.assert_allclose(shared.grasps.p_1i[i], p_1i)
-    bases = true_bases()
-    np.testing.assert_allclose(bases.R[2] @ bases.R[2].T, np.eye(3), atol=1e-12)
 
 
 def test_wrists_are_accelerated_as_the_second_derivative_of_where_they_are(case, linear):
