@@ -205,17 +205,12 @@ class ClosedLoop:
         thin = max(1, round(s.rate_hz / MATRICES_HZ))
         at = np.arange(0, N, thin)
         inertia, damping, stiffness = (
-            x * (1.0 + scale)[:, None] for x in _matrices(tree, s.q[at], s.dq[at], s.ddq[at])
+            x * (1.0 + scale)[:, None] for x in derivatives(tree, s.q[at], s.dq[at], s.ddq[at])
         )
         K = stiffness[np.arange(N) // thin] + np.eye(J) * (free * kp)[:, None, :]
         D = damping[np.arange(N) // thin] + np.eye(J) * (free * kd + (1.0 + scale) * tree.viscous)[:, None, :]
         M = inertia[np.arange(N) // thin]
-        inner = np.linalg.inv(M + 0.5 * h * D + 0.25 * h**2 * K)
-        kept, back = inner @ (M - 0.5 * h * D - 0.25 * h**2 * K), inner @ K
-        A, B = np.empty((N, 2 * J, 2 * J)), np.empty((N, 2 * J, J))
-        A[:, :J, :J], A[:, :J, J:] = np.eye(J) - 0.5 * h**2 * back, 0.5 * h * (np.eye(J) + kept)
-        A[:, J:, :J], A[:, J:, J:] = -h * back, kept
-        B[:, :J], B[:, J:] = 0.5 * h**2 * inner, h * inner
+        A, B = midpoint(M, D, K, h)
         Q = np.tile(self.torque / h, (N, 1))
         for j in range(J):
             for a, b in friction.rests(s.dq[:, j], h, slow[j]):
@@ -294,19 +289,44 @@ def _reading(log: JointLog) -> Array:
     return np.median(white**2, axis=0) / 0.455 / 70.0
 
 
-def _matrices(tree: Tree, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array, Array]:
-    """Derivatives of the torques by accelerations, velocities and positions, shape (Q, J, J) each."""
+def midpoint(M: Array, D: Array, K: Array, h: float) -> tuple[Array, Array]:
+    """Steps A and B of M x'' + D x' + K x = u by the implicit midpoint rule, see ``loop_filter``.
+
+    Args:
+        M, D, K: inertia, damping and stiffness of each step, shape (N, J, J).
+        h: step [s].
+    """
+    N, J = M.shape[:2]
+    inner = np.linalg.inv(M + 0.5 * h * D + 0.25 * h**2 * K)
+    kept, back = inner @ (M - 0.5 * h * D - 0.25 * h**2 * K), inner @ K
+    A, B = np.empty((N, 2 * J, 2 * J)), np.empty((N, 2 * J, J))
+    A[:, :J, :J], A[:, :J, J:] = np.eye(J) - 0.5 * h**2 * back, 0.5 * h * (np.eye(J) + kept)
+    A[:, J:, :J], A[:, J:, J:] = -h * back, kept
+    B[:, :J], B[:, J:] = 0.5 * h**2 * inner, h * inner
+    return A, B
+
+
+def derivatives(
+    tree: Tree, q: Array, dq: Array, ddq: Array, count: int | None = None
+) -> tuple[Array, Array, Array]:
+    """Derivatives of the torques by accelerations, velocities and positions, shape (Q, J, J) each.
+
+    Args:
+        tree: kinematic tree.
+        q, dq, ddq: motion, shape (Q, J) each.
+        count: number of leading joints by which to differentiate, instead of J; None: all.
+    """
     J, out = q.shape[1], []
     for k in (2, 1, 0):
         columns = []
-        for j in range(J):
+        for j in range(J if count is None else count):
             step = STEP_M if tree.slides[j] else STEP_RAD
             up, down = ([x.copy() for x in (q, dq, ddq)] for _ in range(2))
             up[k][:, j] += step
             down[k][:, j] -= step
             columns.append((torque_of(tree, *up) - torque_of(tree, *down)) / (2.0 * step))
         out.append(np.stack(columns, axis=2))
-    out[0] = out[0] + np.diag(tree.armature)
+    out[0] = out[0] + np.diag(tree.armature)[:, :count]
     return out[0], out[1], out[2]
 
 

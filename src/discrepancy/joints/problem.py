@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
@@ -32,9 +32,10 @@ from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import gravity_at, ways
 from discrepancy.joints.pushes import Pushes
 from discrepancy.joints.signals import Signals, along
+from discrepancy.joints.stand import Stand
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
-from estimator.filtering import low_pass
+from estimator.filtering import differentiate, low_pass
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,10 @@ PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
 READ_RAD = 0.02
 """Prior standard deviation of an unlisted position error [rad]."""
+PLAYS = LOOP_AT_MOTOR, LOOP_BEHIND, READ_AT_MOTOR = 0.0, 1.0, 2.0
+"""Gears with play: position read behind it with the loop closed at the motor or there, and position read at the motor."""
+PLAY_RAD, PLAY_LOAD, PLAY_LATE_S = 0.01, 0.2, (0.01, 0.025)
+"""Prior width of a play [rad or m]; load at which it is passed, over the rms load; and the time that this takes [s]."""
 UNLISTED_NATS = 5.0
 """Prior log odds of a listed cause over an unlisted one."""
 REST = 1.5
@@ -122,6 +127,7 @@ class JointProblem(Pushes):
         channel: channel index of each joint with torques.
         changed: number of leading logs in which causes may act; None: all.
         dry_in_all: for each joint, the Coulomb friction column that also acts in the reference.
+        stand: stands that may yield; None: do not look for one.
     """
 
     model: SerialModel
@@ -144,6 +150,19 @@ class JointProblem(Pushes):
     changed: int | None = None
     dry_in_all: dict[int, int] = field(default_factory=dict)
     mount: Array | None = None
+    stand: Stand | None = None
+
+    def place(self, group: Group) -> Group:
+        """Add the columns of a push or of a stand."""
+        if self.stand is None or group.cause != "soft_stand":
+            return super().place(group)
+        return replace(group, columns=tuple(self.cells.add(self.rows(self.stand.series(group.shape)))))
+
+    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
+        """Variants of a push, or the stand whose springs explain most."""
+        if self.stand is None or group.cause != "soft_stand":
+            return super().nearby(group, posterior)
+        return [self.stand.fitted(group, posterior, self.cells, self.rows)]
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Prior variances without the chosen causes; friction at rest scales with Coulomb friction."""
@@ -215,7 +234,7 @@ class JointProblem(Pushes):
             turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]
             return self.rows([self.displaced(joint, way) for way in turns])
         named = {cause.name: cause for cause in CAUSES}
-        if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
+        if group.cause not in named and group.cause not in ("coupled_drive", "elasticity", "backlash"):
             return []
         out: list[Series] = []
         if group.cause == "elasticity":
@@ -392,7 +411,11 @@ class _Builder:
             self._elasticity(j)
             if j in self.more.back_emf:
                 self._braking(j)
+            if self.commanded:
+                self._backlash(j)
         self._arm()
+        if self.commanded and self.more.changed is None:
+            self._stand()
         for body in self.tree.links:
             self._link(int(body))
         for j in range(0 if self.more.loops else self.J):  # there, friction at rest is noise of the torque
@@ -562,6 +585,44 @@ class _Builder:
         k = self.add(f"{self.names[j]} braking", 0.0, {j: by})
         z = self.spans[j]
         self.group("back_emf", self.names[j], [k], [z.torque / z.speed], least=(0.0,))
+
+    @property
+    def commanded(self) -> bool:
+        """Whether commands tell the torques, and rows are torques."""
+        return not self.more.loops and all(s.by_command is not None for s in self.parts)
+
+    def _backlash(self, j: int) -> None:
+        n, b, m = self.names[j], self.given.viscous[j], self.given.armature[j]
+        for side in PLAYS:
+            for late in PLAY_LATE_S:
+                by = []
+                for s, own in zip(self.parts, self.joints[j], strict=True):
+                    drive, size = s.log.drive, PLAY_LOAD * float(np.sqrt(np.mean(own.load**2)))
+                    way = 0.5 * np.interp(own.t - late, own.t, np.tanh(own.load / max(size, 1e-12)))
+                    way = low_pass(way, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))
+                    if side == READ_AT_MOTOR:
+                        by.append(-along(s, j, way))
+                        continue
+                    rate = differentiate(way, s.rate_hz)
+                    gain = drive.position_gain[j] if side == LOOP_AT_MOTOR else 0.0
+                    torque = np.zeros_like(s.q)
+                    torque[:, j] = gain * way + m * differentiate(rate, s.rate_hz)
+                    torque[:, j] += (float(np.nan_to_num(drive.velocity_gain[j])) + b) * rate
+                    by.append(torque)
+                series = {c: [x[:, c] for x in by] for c in range(self.J) if any(x[:, c].any() for x in by)}
+                k = self.add(f"{n} backlash {side:g} {late}", 0.0, series)
+                self.group(
+                    "backlash", n, [k], [PLAY_RAD], least=(0.0,), shape=(("side", side), ("late_s", late)),
+                    log_prior=-math.log(len(PLAYS) * len(PLAY_LATE_S)),
+                )  # fmt: skip
+
+    def _stand(self) -> None:
+        stand = Stand(self.parts)
+        for number, shape in enumerate(stand.first()):
+            own = [self.add(f"stand {number} {k}", 0.0, x) for k, x in enumerate(stand.series(shape))]
+            group = stand.group(shape, own)
+            (self.out.withheld if group.cause in self.more.excluded else self.out.groups).append(group)
+        self.out.stand = stand
 
     def _arm(self) -> None:
         g = self.tree.gravity
