@@ -21,7 +21,8 @@ from discrepancy.joints import friction
 from discrepancy.joints.loop_filter import Filtered, LinearLoop, cost
 from discrepancy.joints.mechanics import Tree, inverse_torque, torque_of
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.signals import STEP_M, STEP_RAD, Signals
+from discrepancy.joints.signals import REST, STEP_M, STEP_RAD, Signals
+from discrepancy.joints.trials import Trials
 from estimator.arrays import Array
 from estimator.filtering import low_pass
 from mocobot_logs.joints.joint_log import JointLog
@@ -34,6 +35,9 @@ SHARE, MOTION_HZ = 0.4, 20.0
 """Highest frequency of the motion that readings tell, over the log's rate and at most [Hz]. Chosen."""
 FAR = 1.0
 """Least deviation of a model from the motion at which it runs away without readings [rad or m]. Chosen."""
+MOVES, FINE_HZ, FINE_SHARE = 4, 160.0, 0.2
+"""Steps that estimate the motion for a diagnosis; least rate of its signals [Hz], and their cut-off over that rate.
+Chosen: friction turns round within the period of a slower log."""
 DELAY_STEP_S = 1e-3
 """Half the step of the derivative by the delay [s]. Chosen: commands are held for longer."""
 START_RAD, START_RAD_PER_S = 0.02, 1.0
@@ -144,6 +148,19 @@ class ClosedLoop:
             self.signals, rate_hz=1.0 / h, time=time, q=q, dq=dq, ddq=ddq, torque=torque, usable=ones,
             inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, by_command=None, enabled=None,
             spoilt=None,
+        )  # fmt: skip
+
+    def thinned(self, seen: Signals) -> Signals:
+        """Signals of ``seen`` at a lower rate, with what comes with the commands."""
+        thin = max(1, int(seen.rate_hz / FINE_HZ))
+        kp, rate = self.gains(1)[0], seen.rate_hz
+        names = ("q", "dq", "ddq", "torque", "inverse", "by_delay")
+        every = {name: getattr(seen, name) for name in names}
+        every["by_command"] = kp * self.told(np.zeros(len(kp)))[0]
+        cutoff = FINE_SHARE * rate / thin
+        return replace(
+            seen, rate_hz=rate / thin, time=seen.time[::thin], usable=seen.usable[::thin],
+            **{name: low_pass(x, rate, cutoff)[::thin] for name, x in every.items()},
         )  # fmt: skip
 
     def gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
@@ -280,6 +297,37 @@ class ClosedLoop:
             self.q, self.dq = self.q + way[:, :J], self.dq + way[:, J:]
         else:
             self.q, self.dq = (low_pass(x, rate, cutoff) for x in (self.q + way[:, :J], self.dq + way[:, J:]))
+
+
+def estimated(model: SerialModel, trials: Trials) -> Trials:
+    """Trials whose motion and torques are those of the closed loop's likeliest course; as they are unless commanded.
+
+    Noise of positions is in the torque that a loop's formula tells and in every column alike. That reads as a torque
+    whose scale is off, so the motion is smoothed with the model first.
+
+    Args:
+        model: the robot as described.
+        trials: smoothed logs.
+    """
+    if not all(commanded(s.log) for s in trials.runs):
+        return trials
+    runs, none = [], np.zeros(len(model.joints))
+    for s in trials.runs:
+        loop, tree = ClosedLoop.of(s), s.tree
+        seen = loop.seen(model, none)
+        for _ in range(MOVES):
+            side = [friction.direction(v, loop.step_s, slow) for v, slow in zip(seen.dq.T, REST * s.slow, strict=True)]
+            lacking = seen.torque - seen.inverse - tree.coulomb * np.transpose(side) - tree.viscous * seen.dq
+            filtered = loop.filtered(seen, tree, none, tree.coulomb, REST * s.slow)
+            loop.move(filtered, lacking)
+            loop.learn(filtered, lacking)
+            seen = loop.seen(model, none)
+        runs.append(loop.thinned(seen))
+    parts = []
+    for k, at in trials.parts:
+        share = len(runs[k].time) / len(trials.runs[k].time)
+        parts.append((k, slice(round(at.start * share), round(at.stop * share))))
+    return replace(trials, runs=tuple(runs), parts=tuple(parts), noise=(), kept=())
 
 
 def _reading(log: JointLog) -> Array:

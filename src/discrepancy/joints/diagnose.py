@@ -69,7 +69,7 @@ def diagnose(
     """
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
-    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
+    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise or None, kept=trials.kept)
     if given.changed is None and not given.motors and "gravity_direction" not in given.excluded:
         given = replace(given, mount=mount_of(smooth, given.joints or range(len(model.joints))))
     problem = joint_problem(model, smooth, None, given)

@@ -31,7 +31,7 @@ from discrepancy.joints.mechanics import (
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import gravity_at, ways
 from discrepancy.joints.pushes import Pushes
-from discrepancy.joints.signals import Signals, along
+from discrepancy.joints.signals import REST, Signals, along
 from discrepancy.joints.stand import Stand
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
@@ -98,8 +98,6 @@ PLAY_RAD, PLAY_LOAD, PLAY_LATE_S = 0.01, 0.2, (0.01, 0.025)
 """Prior width of a play [rad or m]; load at which it is passed, over the rms load; and the time that this takes [s]."""
 UNLISTED_NATS = 5.0
 """Prior log odds of a listed cause over an unlisted one."""
-REST = 1.5
-"""Speed threshold for rest, in units of the speed below which the friction direction fades (``Signals.slow``)."""
 
 Values = Mapping[str, float]
 
@@ -497,7 +495,8 @@ class _Builder:
             "armature_kgm2": t.armature[j],
         }
         for cause in CAUSES:
-            for shape in cause.shapes:
+            exact = cause.name == "torque_scale" and self.commanded  # the gain of a formula, which does not bend
+            for shape in cause.shapes[: 1 if exact else None]:
                 plain = not any(shape.values())
                 columns = [cause.columns(s, shape) for s in self.joints[j]]
                 index = []
@@ -512,7 +511,7 @@ class _Builder:
                     self._known[label] = index[-1]
                 least = tuple(-own.get(p, 0.0) if p in cause.positive else -np.inf for p in cause.parameters)
                 self.group(
-                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(cause.shapes)),
+                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(1 if exact else len(cause.shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
         for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
