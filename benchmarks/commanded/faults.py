@@ -4,10 +4,10 @@
     python benchmarks/commanded/faults.py FOLDER --show
 
 Of each machine, ``calibrate`` fits the two runs of its healthy days. Then each fault is put into it, and ``diagnose``
-reads the held-out run of that machine with ``as_found.xml`` and the ``log.toml`` beside it. A fault is **named** if it is
-among the causes named, at its joint. A diagnosis is **falsely certain** if it has a cause at 99 % or more that the machine
-does not have. Friction of another law than Coulomb's and viscous, which no MJCF holds, is in machines of the laws M4 to M6
-beside the fault; causes of friction are true of these. What was done is kept in the sets' folders.
+reads the held-out run of that machine with ``as_found.xml`` and the ``log.toml`` beside it. A fault is **named** if it
+is among the causes named, at its joint. A diagnosis is **falsely certain** if it has a cause at 99 % or more that the
+machine does not have. Machines of the laws M4 to M6 have friction that no MJCF holds beside the fault; causes of
+friction are true of these. What was done is kept in the sets' folders.
 """
 
 from __future__ import annotations
@@ -57,7 +57,15 @@ class Options:
 
 def diagnosed(folder: Path, healthy: Path) -> dict[str, Any]:
     """Run the program; its exit code, CPU [s], and causes named as (cause, joint, probability, sentence)."""
-    command = [sys.executable, "-m", "mocobot", "diagnose", "held_out.csv", "--model", healthy / "out/as_found.xml"]
+    command = [
+        sys.executable,
+        "-m",
+        "mocobot",
+        "diagnose",
+        "held_out.csv",
+        "--model",
+        healthy / "out/as_found.xml",
+    ]
     command += ["--map", healthy / "out/log.toml", "--out", "out", "--force", "--no-closed-loop"]
     with (folder / "diagnose.txt").open("w", encoding="utf-8") as said:
         ran = subprocess.Popen([*map(str, command)], stdout=said, stderr=subprocess.STDOUT, cwd=folder)
@@ -91,24 +99,37 @@ def judged(truth: dict[str, Any], causes: list[list[Any]]) -> tuple[bool, list[s
 
 def one(root: Path, kind: Literal["leg", "arm"], seed: int, fault: Fault) -> None:
     """Make, diagnose and judge a set."""
-    rate, healthy, folder = {"leg": 200.0, "arm": 50.0}[kind], root / f"{kind}_{seed}", root / f"{kind}_{seed}_{fault}"
+    rate, healthy, folder = (
+        {"leg": 200.0, "arm": 50.0}[kind],
+        root / f"{kind}_{seed}",
+        root / f"{kind}_{seed}_{fault}",
+    )
     if (folder / "fault.json").is_file():
         return
     if not (healthy / "out/as_found.xml").is_file():
         make(kind, seed, rate, healthy)
-        print(f"{healthy.name}: calibrated in {calibrated(healthy)['cpu_s']:.0f} s", file=sys.stderr, flush=True)
+        print(
+            f"{healthy.name}: calibrated in {calibrated(healthy)['cpu_s']:.0f} s", file=sys.stderr, flush=True
+        )
     make(kind, seed, rate, folder, fault)
     out = diagnosed(folder, healthy)
     truth = score.read_truth(folder)
     out |= {"kind": kind, "seed": seed, "law": truth["law"], "fault": truth["fault"]}
     out["named"], out["false"] = judged(truth, out.get("causes", []))
     (folder / "fault.json").write_text(json.dumps(out, indent=1), encoding="utf-8")
-    print(f"{folder.name}: {out['cpu_s']:.0f} s, named {out['named']}, false {out['false']}", file=sys.stderr, flush=True)
+    print(
+        f"{folder.name}: {out['cpu_s']:.0f} s, named {out['named']}, false {out['false']}",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def table(sets: list[dict[str, Any]]) -> str:
     """Counts by fault, and what was missed or false."""
-    lines = ["| fault | sets | named | missed | falsely certain | CPU, median [s] |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| fault | sets | named | missed | falsely certain | CPU, median [s] |",
+        "|---|---|---|---|---|---|",
+    ]
     for fault in (*CAUSE, "all"):
         own = [s for s in sets if fault in ("all", s["fault"]["name"])]
         if own:

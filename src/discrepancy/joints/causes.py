@@ -223,8 +223,8 @@ def _again(n: Said) -> str:
 
 
 def _read_at(n: Said) -> str:
-    where = "at the motor" if n.value("side") > 1.0 else "behind it"
-    return f", whose positions are read {where}" if "side" in n.values else ""
+    where = "in front of" if n.value("side") > 1.0 else "behind"
+    return f"; its position is read {where} it" if "side" in n.values else ""
 
 
 def _springs(n: Said, unit: str) -> str:
@@ -419,8 +419,8 @@ OTHERS = (
             for axis in "xyz"
         ),
         lambda n: (
-            f"the base stands on springs: {_springs(n, 'N_per_m')} N/m along x, y and z and {_springs(n, 'Nm_per_rad')} "
-            "N m/rad about them"
+            f"the base stands on springs: {_springs(n, 'N_per_m')} N/m along x, y and z, and "
+            f"{_springs(n, 'Nm_per_rad')} N m/rad about them"
         ),
         "Push the base by hand, or fix it to the ground, and repeat the motion.",
     ),

@@ -316,7 +316,10 @@ def estimated(model: SerialModel, trials: Trials) -> Trials:
         loop, tree = ClosedLoop.of(s), s.tree
         seen = loop.seen(model, none)
         for _ in range(MOVES):
-            side = [friction.direction(v, loop.step_s, slow) for v, slow in zip(seen.dq.T, REST * s.slow, strict=True)]
+            side = [
+                friction.direction(v, loop.step_s, slow)
+                for v, slow in zip(seen.dq.T, REST * s.slow, strict=True)
+            ]
             lacking = seen.torque - seen.inverse - tree.coulomb * np.transpose(side) - tree.viscous * seen.dq
             filtered = loop.filtered(seen, tree, none, tree.coulomb, REST * s.slow)
             loop.move(filtered, lacking)

@@ -21,7 +21,16 @@ from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
-ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push", "soft_stand")
+ROBOTS = (
+    "payload",
+    "link_length",
+    "link_com",
+    "link_mass",
+    "link_inertia",
+    "gravity_direction",
+    "push",
+    "soft_stand",
+)
 GRAVITY = ("x_m_per_s2", "y_m_per_s2", "z_m_per_s2")
 """Parameters of a base that is mounted another way than in the model: gravity in the base's frame."""
 LEAST_KG = 1e-3

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
-from discrepancy.joints import friction
+from discrepancy.joints import backlash, friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.joints.closed_loop import ClosedLoop, bands_of, cells_of
 from discrepancy.joints.loop_filter import Filtered
@@ -35,7 +35,7 @@ from discrepancy.joints.signals import REST, Signals, along
 from discrepancy.joints.stand import Stand
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
-from estimator.filtering import differentiate, low_pass
+from estimator.filtering import low_pass
 
 
 @dataclass(frozen=True)
@@ -92,10 +92,6 @@ PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
 READ_RAD = 0.02
 """Prior standard deviation of an unlisted position error [rad]."""
-PLAYS = LOOP_AT_MOTOR, LOOP_BEHIND, READ_AT_MOTOR = 0.0, 1.0, 2.0
-"""Gears with play: position read behind it with the loop closed at the motor or there, and position read at the motor."""
-PLAY_RAD, PLAY_LOAD, PLAY_LATE_S = 0.01, 0.2, (0.01, 0.025)
-"""Prior width of a play [rad or m]; load at which it is passed, over the rms load; and the time that this takes [s]."""
 UNLISTED_NATS = 5.0
 """Prior log odds of a listed cause over an unlisted one."""
 
@@ -495,8 +491,11 @@ class _Builder:
             "armature_kgm2": t.armature[j],
         }
         for cause in CAUSES:
-            exact = cause.name == "torque_scale" and self.commanded  # the gain of a formula, which does not bend
-            for shape in cause.shapes[: 1 if exact else None]:
+            exact = (
+                cause.name == "torque_scale" and self.commanded
+            )  # the gain of a formula, which does not bend
+            shapes = cause.shapes[: 1 if exact else None]
+            for shape in shapes:
                 plain = not any(shape.values())
                 columns = [cause.columns(s, shape) for s in self.joints[j]]
                 index = []
@@ -511,7 +510,7 @@ class _Builder:
                     self._known[label] = index[-1]
                 least = tuple(-own.get(p, 0.0) if p in cause.positive else -np.inf for p in cause.parameters)
                 self.group(
-                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(1 if exact else len(cause.shapes)),
+                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
         for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
@@ -591,29 +590,15 @@ class _Builder:
         return not self.more.loops and all(s.by_command is not None for s in self.parts)
 
     def _backlash(self, j: int) -> None:
-        n, b, m = self.names[j], self.given.viscous[j], self.given.armature[j]
-        for side in PLAYS:
-            for late in PLAY_LATE_S:
-                by = []
-                for s, own in zip(self.parts, self.joints[j], strict=True):
-                    drive, size = s.log.drive, PLAY_LOAD * float(np.sqrt(np.mean(own.load**2)))
-                    way = 0.5 * np.interp(own.t - late, own.t, np.tanh(own.load / max(size, 1e-12)))
-                    way = low_pass(way, s.rate_hz, min(EDGES_HZ[-1], 0.2 * s.rate_hz))
-                    if side == READ_AT_MOTOR:
-                        by.append(-along(s, j, way))
-                        continue
-                    rate = differentiate(way, s.rate_hz)
-                    gain = drive.position_gain[j] if side == LOOP_AT_MOTOR else 0.0
-                    torque = np.zeros_like(s.q)
-                    torque[:, j] = gain * way + m * differentiate(rate, s.rate_hz)
-                    torque[:, j] += (float(np.nan_to_num(drive.velocity_gain[j])) + b) * rate
-                    by.append(torque)
-                series = {c: [x[:, c] for x in by] for c in range(self.J) if any(x[:, c].any() for x in by)}
-                k = self.add(f"{n} backlash {side:g} {late}", 0.0, series)
-                self.group(
-                    "backlash", n, [k], [PLAY_RAD], least=(0.0,), shape=(("side", side), ("late_s", late)),
-                    log_prior=-math.log(len(PLAYS) * len(PLAY_LATE_S)),
-                )  # fmt: skip
+        n, t = self.names[j], self.given
+        each = backlash.columns(self.parts, self.joints[j], j, float(t.viscous[j]), float(t.armature[j]))
+        for shape, torques in zip(backlash.SHAPES, each, strict=True):
+            of = {id(s): torque for s, torque in zip(self.parts, torques, strict=True)}
+            k = self.add(f"{n} backlash {dict(shape)}", 0.0, self.wide(lambda s, of=of: of[id(s)]))
+            self.group(
+                "backlash", n, [k], [backlash.WIDTH_RAD], least=(0.0,), shape=shape,
+                log_prior=-math.log(len(backlash.SHAPES)),
+            )  # fmt: skip
 
     def _stand(self) -> None:
         stand = Stand(self.parts)

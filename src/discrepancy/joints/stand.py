@@ -30,8 +30,8 @@ from estimator.filtering import differentiate
 CAUSE = "soft_stand"
 WAYS = 6
 FIRST_HZ, FIRST_DAMPING = (2.0, 4.0, 8.0, 16.0), 0.15
-"""Natural frequencies [Hz] and damping ratio of the stands that are tried first. Chosen: an octave apart, so damped that
-each answers to its neighbours' frequencies."""
+"""Natural frequencies [Hz] and damping ratio of the stands that are tried first. Chosen: an octave apart, so damped
+that each answers to its neighbours' frequencies."""
 SLAB = 0.5
 """Prior standard deviation of the logarithms around a shape. Chosen: half of the step between frequencies."""
 NEWTON, MATRICES_HZ = 3, 50.0
@@ -108,16 +108,27 @@ class Stand:
         if shape not in self.known:
             each = [self._swung(t, np.array([x for _, x in shape])) for t in range(len(self.parts))]
             self.known[shape] = [
-                {j: [x[:, j, k] for x in each] for j in range(each[0].shape[1])} for k in range(1 + len(SHAPE))
+                {j: [x[:, j, k] for x in each] for j in range(each[0].shape[1])}
+                for k in range(1 + len(SHAPE))
             ]
         return self.known[shape]
 
     def group(self, shape: Shape, columns: Sequence[int] = ()) -> Group:
         """The cause in a shape."""
         slab = (1.0, *(SLAB,) * len(SHAPE))
-        return Group(CAUSE, "base", tuple(columns), slab, -math.log(len(FIRST_HZ)), shape, (0.0, *(-np.inf,) * len(SHAPE)))
+        return Group(
+            CAUSE,
+            "base",
+            tuple(columns),
+            slab,
+            -math.log(len(FIRST_HZ)),
+            shape,
+            (0.0, *(-np.inf,) * len(SHAPE)),
+        )
 
-    def fitted(self, group: Group, posterior: Posterior, cells: Cells, rows: Callable[[list[Series]], list[Series]]) -> Group:
+    def fitted(
+        self, group: Group, posterior: Posterior, cells: Cells, rows: Callable[[list[Series]], list[Series]]
+    ) -> Group:
         """The stand that explains most beside what is in a posterior: Gauss-Newton steps from a shape.
 
         Args:
@@ -163,7 +174,9 @@ class Stand:
 
         x, v, a = (np.zeros((len(s.time), WAYS, 1)) for _ in range(3))
         for n in range(NEWTON + 1):
-            every = (np.hstack([b[:, :, 0], own]) for b, own in zip((x, v, a), (s.q, s.dq, s.ddq), strict=True))
+            every = (
+                np.hstack([b[:, :, 0], own]) for b, own in zip((x, v, a), (s.q, s.dq, s.ddq), strict=True)
+            )
             motion = Motion.of(tree, *every)
             torque = rigid_torque(motion)
             lacking = torque[:, :WAYS, None] + k[:, None] * x + d[:, None] * v
@@ -186,4 +199,6 @@ def moved_by(shape: Shape, mean: Array) -> tuple[Shape, float]:
     """A shape moved by the values of its columns, and the largest change of a logarithm."""
     size = max(float(mean[0]), 0.1)
     way = np.clip(mean[1:] / size - np.log(size), -MOST_STEP, MOST_STEP)
-    return tuple((n, float(x * np.exp(w))) for (n, x), w in zip(shape, way, strict=True)), float(np.abs(way).max())
+    return tuple((n, float(x * np.exp(w))) for (n, x), w in zip(shape, way, strict=True)), float(
+        np.abs(way).max()
+    )
