@@ -172,18 +172,18 @@ class Stand:
             v = differentiate(x, s.rate_hz)
             return [x, v, differentiate(v, s.rate_hz)]
 
-        x, v, a = (np.zeros((len(s.time), WAYS, 1)) for _ in range(3))
-        for n in range(NEWTON + 1):
-            every = (
-                np.hstack([b[:, :, 0], own]) for b, own in zip((x, v, a), (s.q, s.dq, s.ddq), strict=True)
-            )
+        def felt(*base: Array) -> tuple[Motion, Array, Array]:
+            """Motion of all, its torques, and the force on the base that is not in balance, shape (W, 6, 1)."""
+            every = (np.hstack([b[:, :, 0], own]) for b, own in zip(base, (s.q, s.dq, s.ddq), strict=True))
             motion = Motion.of(tree, *every)
             torque = rigid_torque(motion)
-            lacking = torque[:, :WAYS, None] + k[:, None] * x + d[:, None] * v
-            if n == 0:  # the log begins with the base at rest
-                x = x - np.linalg.solve(K[0, :WAYS] + np.diag(k), lacking[0])
-            elif n < NEWTON:
-                x, v, a = (b + more for b, more in zip((x, v, a), moved(-lacking), strict=True))
+            return motion, torque, torque[:, :WAYS, None] + k[:, None] * base[0] + d[:, None] * base[1]
+
+        x, v, a = (np.zeros((len(s.time), WAYS, 1)) for _ in range(3))
+        x = x - np.linalg.solve(K[0, :WAYS] + np.diag(k), felt(x, v, a)[2][0])  # the log begins at rest
+        for _ in range(NEWTON - 1):
+            x, v, a = (b + more for b, more in zip((x, v, a), moved(-felt(x, v, a)[2]), strict=True))
+        motion, torque, _ = felt(x, v, a)
         Y = body_regressor(motion, 1)[:, :WAYS]
         by = np.zeros((len(s.time), WAYS, len(SHAPE)))
         by[:, range(WAYS), range(WAYS)] = -k * x[:, :, 0]
