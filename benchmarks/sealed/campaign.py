@@ -91,9 +91,12 @@ def _simulate(request: SealedSet, out: Path) -> None:
 
 def _diagnose(request: SealedSet, how: How) -> None:
     result: dict[str, Any] = {"key": request.key, "set": request.to_dict(), "engine": engine(), "error": None}
+    excluded = request.names if request.kind == "left-out" else ()
     _stop_after(how.cpu_s)
     try:
-        result["verdict"] = verdict_on(sets.recordings_of(request, how.out), closed_loop=how.closed_loop)
+        result["verdict"] = verdict_on(
+            sets.recordings_of(request, how.out), excluded, closed_loop=how.closed_loop
+        )
         said = result["verdict"]["verdict"]
     except Exception:
         result["error"] = traceback.format_exc()
@@ -101,16 +104,19 @@ def _diagnose(request: SealedSet, how: How) -> None:
     result |= costs()
     result["truth"] = sets.truth_of(request, how.out)  # opened after the verdict
     if not result["error"]:
-        result["law_scores"] = [asdict(one) for one in score_laws(result)]
+        scores = score_laws(result, sets.recordings_of(request, how.out))
+        result["law_scores"] = [asdict(one) for one in scores]
     sets.append(how.path, result)
     if not how.keep:
         sets.forget(request, how.out)
     print(f"{result['key']}: {said}, {result['cpu_s']:.1f} s of CPU", flush=True)
 
 
-def verdict_on(trials: Sequence[Path], *, closed_loop: bool = True) -> dict[str, Any]:
+def verdict_on(
+    trials: Sequence[Path], excluded: Sequence[str] = (), *, closed_loop: bool = True
+) -> dict[str, Any]:
     """What the diagnosis says, through its public face."""
-    values = mocobot.diagnose(trials, closed_loop=closed_loop).to_dict()
+    values = mocobot.diagnose(trials, exclude=excluded, closed_loop=closed_loop).to_dict()
     return {key: value for key, value in values.items() if key not in LEFT_AWAY}
 
 

@@ -28,6 +28,9 @@ from sealed.form import (
     vector,
 )
 
+SLACK_RAD = 0.03
+"""Angle within which a hose hangs loose."""
+
 
 @dataclass(frozen=True)
 class _Torque(Form):
@@ -97,6 +100,34 @@ class CableSpring(_Torque):
 
 
 @dataclass(frozen=True)
+class SlackHose(_Torque):
+    """A hose through a gimbal axis that hangs loose, then resists with the square of the angle."""
+
+    kind, size = "gimbal", "square_Nm_per_rad2"
+    ranges: ClassVar = {"square_Nm_per_rad2": (0.0, 1e4)}
+    formula: ClassVar = (
+        ["own theta"], f"-a (theta beyond +-{SLACK_RAD:g}) |theta beyond|", "N m/rad^2"
+    )  # fmt: skip
+    square_Nm_per_rad2: float
+
+    def torque(self, angle: float, rate: float, time: float) -> float:
+        return -self.square_Nm_per_rad2 * math.copysign(max(abs(angle) - SLACK_RAD, 0.0) ** 2, angle)
+
+
+@dataclass(frozen=True)
+class DoorCloser(_Torque):
+    """A driven link that is braked in one direction only."""
+
+    kind, size = "driven", "damping_Nms_per_rad"
+    ranges: ClassVar = {"damping_Nms_per_rad": (0.0, 100.0)}
+    formula: ClassVar = (["own phi rate"], "-a max(phi_dot, 0)", "N m s/rad")
+    damping_Nms_per_rad: float
+
+    def torque(self, angle: float, rate: float, time: float) -> float:
+        return -self.damping_Nms_per_rad * max(rate, 0.0)
+
+
+@dataclass(frozen=True)
 class _Force(Form):
     """A force on a point of the payload, given in {1}, in a direction of robot 1's {b}."""
 
@@ -140,6 +171,21 @@ class GrowingPush(_Force):
 
 
 @dataclass(frozen=True)
+class Shaker(_Force):
+    """Something unbalanced that turns on the payload."""
+
+    size = "amplitude_N"
+    ranges: ClassVar = {"amplitude_N": (0.0, 1e3), "frequency_hz": (0.05, 200.0)}
+    draws: ClassVar = {"frequency_hz": (0.9, 3.5)}
+    formula: ClassVar = (["t"], "a sin(2 pi {frequency_hz:.4g} Hz t)", "N")
+    amplitude_N: float = 0.0
+    frequency_hz: float = 1.0
+
+    def force(self, time: float) -> float:
+        return self.amplitude_N * math.sin(2.0 * np.pi * self.frequency_hz * time)
+
+
+@dataclass(frozen=True)
 class Gyroscope(Form):
     """Something that spins in the payload: a moment omega x h, with h fixed in the payload."""
 
@@ -163,6 +209,46 @@ class Gyroscope(Form):
         spin = self.spin_kgm2ps * self.xyz("along")
         # The payload turns by some degrees only, so its axes are the world's but for that.
         return [PayloadWrench(lambda t, p, v, w: (np.zeros(3), -np.cross(w, spin)))]
+
+
+@dataclass(frozen=True)
+class ShiftingLoad(Form):
+    """A mass on a slow spring in the payload: it shifts sideways as the payload is tilted or hurried."""
+
+    on_payload = True
+    size, of = "mass_kg", "force and moment on the payload"
+    ranges: ClassVar = {"mass_kg": (0.0, 100.0), "frequency_hz": (0.1, 100.0)}
+    draws: ClassVar = {"frequency_hz": (0.8, 1.6), "heading_rad": (-np.pi, np.pi)}
+    formula: ClassVar = (
+        ["payload's tilt and acceleration"],
+        "mass that slides on a spring of {frequency_hz:.3g} Hz, damping ratio 0.7",
+        "kg",
+    )
+    mass_kg: float
+    frequency_hz: float
+    heading_rad: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+
+    @classmethod
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        drawn = super().others(ground, place, rng)
+        return drawn | vector("point", "m", near(ground.p_1c, REACH_M, rng))
+
+    def along(self) -> list[float]:
+        return [math.cos(self.heading_rad), math.sin(self.heading_rad), 0.0]
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        payload = scene.root.find("body", "omnid1/payload/payload")
+        body = payload.add("body", name="load", pos=self.xyz("point"))
+        omega = 2.0 * np.pi * self.frequency_hz
+        body.add(
+            "joint", name="load", type="slide", axis=[np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0],
+            stiffness=self.mass_kg * omega**2, damping=1.4 * self.mass_kg * omega, group=3,
+        )  # fmt: skip
+        body.add("inertial", pos=[0.0, 0.0, 0.0], mass=self.mass_kg, diaginertia=[1e-4 * self.mass_kg] * 3)
+        return scene
 
 
 @dataclass(frozen=True)

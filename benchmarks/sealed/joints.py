@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -184,8 +184,49 @@ class SecondOrderTorqueLag(Form):
         return [_late(self.robot, (1, 2, 3), self.time_constant_s, self.damping_ratio)]
 
 
+@dataclass(frozen=True)
+class SingleTorqueLag(Form):
+    """One torque sensor alone: first order (no damping ratio is then of use) or second."""
+
+    answer = "sensor_lag"
+    size, size_is_known = "time_constant_s", True
+    ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 50.0)}
+    robot: int
+    joint: int
+    time_constant_s: float
+    damping_ratio: float
+
+    @classmethod
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        # A damping ratio of 5 is a lag of first order but for a hundredth.
+        return {"damping_ratio": float(rng.choice([5.0, rng.uniform(0.6, 1.2)]))}
+
+    def readers(self, trial_number: int | None) -> Sequence[Reader]:
+        return [_late(self.robot, (self.joint,), self.time_constant_s, self.damping_ratio)]
+
+
 LARGEST_FORCE_N = 400.0
+LARGEST_MOMENT_NM = 60.0
+TURNING_ARMATURE_KGM2 = 0.01
 CONTACT_DAMPING_NS_PER_M = 20.0
+
+
+@dataclass(frozen=True)
+class SlowBaseCompliance(Form):
+    """A base on springs beside dampers (Kelvin and Voigt): it follows its load in tens of milliseconds."""
+
+    answer = "base_compliance"
+    size, size_is_known = "compliance_m_per_N", True
+    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.02, 10.0)}
+    draws: ClassVar = {"relaxation_s": (0.03, 0.15)}
+    robot: int
+    compliance_m_per_N: float
+    relaxation_s: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        precise(scene)
+        slides = base_slides(scene, self.robot, "slow", armature=SPRUNG_ARMATURE_KG)
+        return add_springs(scene, slides, f"slowbase{self.robot}", self.compliance_m_per_N, self.relaxation_s)
 
 
 @dataclass(frozen=True)
@@ -208,6 +249,54 @@ class SlowGrasp(Form):
             scene, slides, f"slowgrasp{self.robot}", self.compliance_m_per_N, self.relaxation_s
         )
         return widened(scene, self.robot, LARGEST_FORCE_N * self.compliance_m_per_N)
+
+
+@dataclass(frozen=True)
+class TurningGrasp(Form):
+    """A grasp that gives way to forces and to moments, about a point beside the gimbal's centre.
+
+    The gimbal passes no moment, so a grasp that turned about its centre would not turn at all.
+    """
+
+    answer = "grasp_flex"
+    size, size_is_known = "compliance_m_per_N", True
+    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "reach_m": (0.0, 10.0), "offset_m": (-1.0, 1.0)}
+    on_payload = True
+    robot: int
+    compliance_m_per_N: float
+    reach_m: float
+    """Compliance in rotation is that in translation over the square of this."""
+    offset_m: float
+    """From the gimbal's centre to where it turns, along z of {i}."""
+
+    @classmethod
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        reach, offset = rng.uniform(0.04, 0.1), rng.choice([-1.0, 1.0]) * rng.uniform(0.03, 0.08)
+        return {"reach_m": float(reach), "offset_m": float(offset)}
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        precise(scene)
+        body, turn = grasp_body(scene, self.robot), self.compliance_m_per_N / self.reach_m**2
+        slides = add_slides(body, "yield", "xyz", armature=SPRUNG_ARMATURE_KG)
+        hinges = [
+            body.add(
+                "joint",
+                pos=[0.0, 0.0, self.offset_m],
+                name=f"turn_{axis}",
+                type="hinge",
+                axis=along,
+                armature=TURNING_ARMATURE_KGM2,
+                group=3,
+            )
+            for axis, along in zip("xyz", np.eye(3).tolist(), strict=True)
+        ]
+        scene = add_springs(scene, slides, f"yield{self.robot}", self.compliance_m_per_N, 0.0)
+        scene = add_springs(scene, hinges, f"turn{self.robot}", turn, 0.0)
+        slack = np.array(scene.grasp_slack_rad or (0.0,) * scene.robots)
+        slack[self.robot - 1] += LARGEST_MOMENT_NM * turn
+        scene = replace(scene, grasp_slack_rad=tuple(slack.tolist()))
+        way = self.compliance_m_per_N + abs(self.offset_m) ** 2 * turn
+        return widened(scene, self.robot, LARGEST_FORCE_N * way)
 
 
 @dataclass(frozen=True)

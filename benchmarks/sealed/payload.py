@@ -64,6 +64,102 @@ def _home_turn(scene: TeamScene) -> Rotation:
 
 
 @dataclass(frozen=True)
+class RobotCable(Form):
+    """From a robot's wrist to a point of the room, given in its {b}."""
+
+    answer = "tether"
+    size = "stiffness_N_per_m"
+    size_is_known = True
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
+    robot: int
+    stiffness_N_per_m: float
+    length_m: float
+    anchor_x_m: float
+    anchor_y_m: float
+    anchor_z_m: float
+
+    @classmethod
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        distance, home = rng.uniform(0.5, 1.5), np.array([0.0, 0.0, omnid_design().home_height_m])
+        length = float(distance - rng.uniform(*TRAVEL_M))
+        return {"length_m": length} | vector("anchor", "m", home + distance * direction(rng))
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        platform = scene.root.find("body", f"omnid{self.robot}/platform")
+        site = add_site(platform, "cable", [0.0, 0.0, 0.0])
+        anchor = scene.X_Wb[self.robot - 1].apply(self.xyz("anchor"))
+        tie(scene, f"cable{self.robot}", site, anchor, self.stiffness_N_per_m, self.length_m)
+        return scene
+
+
+@dataclass(frozen=True)
+class StiffeningStrap(RobotCable):
+    """A cable that gets stiffer the more it is stretched: k e (1 + e / e_2), as woven straps do."""
+
+    size_is_known = False
+    doubled_m: float = 0.02
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        scene = super()._edit(scene)
+        tendon = scene.root.find("tendon", f"cable{self.robot}")
+        tendon.stiffness = [self.stiffness_N_per_m, self.stiffness_N_per_m / self.doubled_m]
+        return scene
+
+
+@dataclass(frozen=True)
+class RubberCord(PayloadCable):
+    """A cable that gets softer and then stiffer, k e (1 - e / e_1 + (e / e_2)^2), as rubber does."""
+
+    size_is_known = False
+    softer_m: float = 0.05
+    stiffer_m: float = 0.04
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        scene = super()._edit(scene)
+        k, tendon = self.stiffness_N_per_m, scene.root.find("tendon", "payload_cable")
+        tendon.stiffness = [k, -k / self.softer_m, k / self.stiffer_m**2]
+        return scene
+
+
+@dataclass(frozen=True)
+class TurningDrag(Form):
+    """Force -c v at the centre of mass, and moment -c r^2 omega."""
+
+    answer = "drag"
+    size, size_is_known = "coefficient_Ns_per_m", True
+    on_payload = True
+    ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3), "reach_m": (0.0, 10.0)}
+    draws: ClassVar = {"reach_m": (0.2, 0.6)}
+    coefficient_Ns_per_m: float
+    reach_m: float
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        c, turn = self.coefficient_Ns_per_m, self.coefficient_Ns_per_m * self.reach_m**2
+        return [PayloadWrench(lambda t, p, v, w: (-c * v, -turn * w))]
+
+
+@dataclass(frozen=True)
+class QuadraticDrag(Form):
+    """Force -c |v| v at the centre of mass, and moment -c r^3 |omega| omega."""
+
+    answer = "drag"
+    size = "coefficient_Ns2_per_m2"
+    on_payload = True
+    ranges: ClassVar = {"coefficient_Ns2_per_m2": (0.0, 1e4), "reach_m": (0.0, 10.0)}
+    draws: ClassVar = {"reach_m": (0.1, 0.4)}
+    coefficient_Ns2_per_m2: float
+    reach_m: float
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        c, turn = self.coefficient_Ns2_per_m2, self.coefficient_Ns2_per_m2 * self.reach_m**3
+        return [
+            PayloadWrench(
+                lambda t, p, v, w: (-c * float(np.sqrt(v @ v)) * v, -turn * float(np.sqrt(w @ w)) * w)
+            )
+        ]
+
+
+@dataclass(frozen=True)
 class PowerDrag(Form):
     """Force -c |v|^(n-1) v at the centre of mass, and moment -c r^(n+1) |omega|^(n-1) omega: between the two."""
 
@@ -98,6 +194,29 @@ class MassDrift(Form):
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         return [_Mass(lambda time: self.rate_kgps * time)]
+
+
+@dataclass(frozen=True)
+class MassOfTrials(Form):
+    """It is another one from some trial on: something was taken off or put on."""
+
+    answer = "payload_mass"
+    size = "more_kg"
+    on_payload = True
+    ranges: ClassVar = {"more_kg": (-10.0, 10.0)}
+    trial: int
+    more_kg: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        return cls(trial=int(rng.integers(2, 4)), more_kg=float(rng.choice([-1.0, 1.0]) * size))
+
+    def known(self) -> dict[str, float]:
+        return {"trial": self.trial, "last_trial": 0, "mass_kg": self.more_kg}
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        changed = trial_number is not None and trial_number >= self.trial
+        return [_Mass(lambda time: self.more_kg)] if changed else []
 
 
 class _Mass:
@@ -188,6 +307,60 @@ class DoublePendulum(Form):
 
 
 @dataclass(frozen=True)
+class UnequalPendulum(Form):
+    """A tank that is longer than wide: it swings at one frequency along it and at another across."""
+
+    answer = "slosh"
+    size, size_is_known = "mass_kg", True
+    on_payload = True
+    ranges: ClassVar = {
+        "mass_kg": (0.0, 100.0), "length_m": (0.01, 10.0), "ratio": (0.1, 1.0), "damping_ratio": (0.0, 10.0),
+        "heading_rad": (-4.0, 4.0),
+    }  # fmt: skip
+    mass_kg: float
+    length_m: float
+    ratio: float
+    damping_ratio: float
+    heading_rad: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        length = float(rng.uniform(0.15, 0.4))
+        return cls(
+            mass_kg=size * pendulum_limit_kg(length),
+            length_m=length,
+            ratio=float(rng.uniform(0.3, 0.6)),
+            damping_ratio=float(rng.uniform(0.03, 0.08)),
+            heading_rad=float(rng.uniform(-np.pi, np.pi)),
+            **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
+        )
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        half, short = 0.5 * self.heading_rad, self.ratio * self.length_m
+        gravity = omnid_design().gravity_mps2
+        body = scene.root.find("body", "omnid1/payload/payload").add(
+            "body", name="tank", pos=self.xyz("point"),
+            quat=[np.cos(half), 0.0, 0.0, np.sin(half)],
+        )  # fmt: skip
+        # About x it swings from the body's origin, about y from a point further down.
+        drop = self.length_m - short
+        for axis, along, pos, length in (
+            ("x", [1.0, 0.0, 0.0], 0.0, self.length_m),
+            ("y", [0.0, 1.0, 0.0], -drop, short),
+        ):
+            damping = 2.0 * self.damping_ratio * np.sqrt(gravity / length) * self.mass_kg * length**2
+            body.add(
+                "joint", name=f"tank_{axis}", type="hinge", axis=along, pos=[0.0, 0.0, pos], damping=damping, group=3
+            )  # fmt: skip
+        small = [1e-6 * self.mass_kg * self.length_m**2] * 3
+        body.add("inertial", pos=[0.0, 0.0, -self.length_m], mass=self.mass_kg, diaginertia=small)
+        return scene
+
+
+@dataclass(frozen=True)
 class _ShapedPush(Form):
     """A force during an interval of one trial; ``peak_*`` in robot 1's {b}, the point in {1}."""
 
@@ -261,3 +434,9 @@ class HalfSinePush(_ShapedPush):
 
     def shape(self, share: float) -> float:
         return math.sin(np.pi * share)
+
+
+def in_every_trial(kind: type[Form], size: float, ground: Ground, rng: np.random.Generator) -> list[Form]:
+    """One push in each trial that moves."""
+    assert issubclass(kind, _ShapedPush)
+    return [kind.drawn(size, ground, {}, rng, trial=number) for number, _, _ in ground.moving]

@@ -10,8 +10,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from mocobot_sim.trial.actors import Misreading, Reader, RobotReadings
-from sealed.form import Form, Ground, Place, Play
+from sealed.form import BoucWen, Form, Ground, Place, Play
 
+SCRATCH_RAD = 0.05
+"""Width of a scratch on an encoder's disc."""
+SOFT_NM = 8.0
+"""Torque at which a soft saturation is half way."""
+YIELD_NM = 0.4
+"""Torque over which a loose gauge changes sides."""
 HELD_S = (0.05, 0.2)
 """Shortest and longest time for which an encoder holds its last value."""
 
@@ -109,6 +115,16 @@ class CyclicPhi(EccentricPhi):
 
 
 @dataclass(frozen=True)
+class FineInterpolation(EccentricPhi):
+    """A gimbal encoder whose interpolation errs 64 times a turn."""
+
+    channel = "theta"
+    ranges: ClassVar = {"amplitude_rad": (0.0, 0.1)}
+    formula: ClassVar = (["own theta"], "a sin(64 theta + {phase_rad:.3g})", "rad")
+    times: ClassVar = 64
+
+
+@dataclass(frozen=True)
 class EncoderBacklash(Misread):
     """A driven joint's encoder sits behind a gear with play: it follows only once the truth has crossed a gap."""
 
@@ -120,6 +136,69 @@ class EncoderBacklash(Misread):
     def error_of_trial(self) -> Error:
         play = Play(self.half_width_rad)
         return lambda now: play.step(now.value) - now.value
+
+
+@dataclass(frozen=True)
+class TorqueBacklash(Misread):
+    """A loose gauge moves only once the torque has crossed a gap; its law is that of friction beside the spring.
+
+    Either reading stays behind the torque by a number whose sign is that of its change.
+    """
+
+    answer = "sea_hysteresis"
+    channel, size = "tau", "half_width_Nm"
+    ranges: ClassVar = {"half_width_Nm": (0.0, 5.0)}
+    half_width_Nm: float
+
+    def known(self) -> dict[str, float]:
+        return {"friction_Nm": self.half_width_Nm}
+
+    def error_of_trial(self) -> Error:
+        play = Play(self.half_width_Nm)
+        return lambda now: play.step(now.value) - now.value
+
+
+@dataclass(frozen=True)
+class SoftEncoderMount(Misread):
+    """A driven joint's encoder gives way to the joint's torque."""
+
+    channel, size, either_sign = "phi", "rad_per_Nm", True
+    ranges: ClassVar = {"rad_per_Nm": (-0.1, 0.1)}
+    formula: ClassVar = (["own tau"], "a tau", "rad/(N m)")
+    rad_per_Nm: float
+
+    def error(self, now: Instant) -> float:
+        return self.rad_per_Nm * now.tau(self.joint)
+
+
+@dataclass(frozen=True)
+class SlippingZero(Misread):
+    """A gimbal encoder's zero slips steadily, in every trial anew."""
+
+    channel, size, either_sign = "theta", "rate_radps", True
+    ranges: ClassVar = {"rate_radps": (-0.1, 0.1)}
+    formula: ClassVar = (["t"], "a t", "rad/s")
+    rate_radps: float
+
+    def error(self, now: Instant) -> float:
+        return self.rate_radps * now.time
+
+
+@dataclass(frozen=True)
+class ScratchedDisc(Misread):
+    """A driven joint's encoder errs where its disc is scratched, and nowhere else."""
+
+    channel, size, either_sign = "phi", "depth_rad", True
+    ranges: ClassVar = {"depth_rad": (-0.1, 0.1)}
+    draws: ClassVar = {"at_rad": (-0.1, 0.1)}
+    formula: ClassVar = (
+        ["own phi, from home"], f"a exp(-((phi - {{at_rad:.3g}}) / {SCRATCH_RAD})^2)", "rad"
+    )  # fmt: skip
+    depth_rad: float
+    at_rad: float
+
+    def error(self, now: Instant) -> float:
+        return self.depth_rad * math.exp(-(((now.value - self.at_rad) / SCRATCH_RAD) ** 2))
 
 
 @dataclass(frozen=True)
@@ -195,6 +274,19 @@ class Saturation(Misread):
 
 
 @dataclass(frozen=True)
+class SoftSaturation(Misread):
+    """A torque sensor that passes ever less of its torque, without a knee."""
+
+    channel, size = "tau", "lost_share"
+    ranges: ClassVar = {"lost_share": (0.0, 1.0)}
+    formula: ClassVar = (["own tau"], f"-a (tau - {SOFT_NM:g} tanh(tau / {SOFT_NM:g}))", "1")
+    lost_share: float
+
+    def error(self, now: Instant) -> float:
+        return -self.lost_share * (now.value - SOFT_NM * math.tanh(now.value / SOFT_NM))
+
+
+@dataclass(frozen=True)
 class QuadraticReading(Misread):
     """A torque sensor's scale grows with the load: a bridge that is not linear."""
 
@@ -240,6 +332,26 @@ class TorqueHum(Misread):
 
     def error(self, now: Instant) -> float:
         return self.amplitude_Nm * math.sin(2.0 * np.pi * self.frequency_hz * now.time)
+
+
+@dataclass(frozen=True)
+class LooseBridge(Misread):
+    """A torque sensor with the hysteresis of Bouc and Wen in its reading."""
+
+    channel, size = "tau", "amplitude_Nm"
+    ranges: ClassVar = {"amplitude_Nm": (0.0, 5.0)}
+    formula: ClassVar = (["own tau, its history"], f"a z(tau), Bouc-Wen over {YIELD_NM:g} N m", "N m")
+    amplitude_Nm: float
+
+    def error_of_trial(self) -> Error:
+        wen, last = BoucWen(self.amplitude_Nm, YIELD_NM, 0.5, 1.0), [math.nan]
+
+        def error(now: Instant) -> float:
+            rate = 0.0 if math.isnan(last[0]) else now.value - last[0]
+            last[0] = now.value
+            return wen.step(rate, 1.0)
+
+        return error
 
 
 @dataclass(frozen=True)

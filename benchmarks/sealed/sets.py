@@ -34,16 +34,25 @@ from sealed.limits import BACKGROUNDS, LIMITS, Background, limit_over_nominal, t
 
 LISTED: tuple[type[Form], ...] = (
     at_joints.DrivenLugre, at_joints.DrivenDahl, at_joints.GimbalLugre, at_joints.GimbalDahl,
-    at_joints.BoucWenSpring, at_joints.SoftPlay, at_joints.SlowGrasp, at_joints.LateCreep, at_payload.RampPush,
-    at_payload.HalfSinePush, at_payload.DoublePendulum, at_joints.SecondOrderTorqueLag, at_payload.PayloadCable,
-    at_payload.PowerDrag, at_payload.MassDrift,
+    at_joints.BoucWenSpring, at_joints.SoftPlay, at_joints.SlowGrasp, at_joints.TurningGrasp,
+    at_joints.SlowBaseCompliance, at_joints.LateCreep, at_payload.RampPush, at_payload.HalfSinePush,
+    at_payload.DoublePendulum, at_payload.UnequalPendulum, at_joints.SecondOrderTorqueLag,
+    at_joints.SingleTorqueLag, at_payload.PayloadCable, at_payload.RobotCable, at_payload.StiffeningStrap,
+    at_payload.RubberCord, at_payload.TurningDrag, at_payload.PowerDrag, at_payload.MassDrift,
+    at_payload.MassOfTrials,
 )  # fmt: skip
 UNLISTED: tuple[type[Form], ...] = (
     readings.CrossTalk, readings.WarmingScale, readings.WarmingZero, readings.Saturation,
     readings.QuadraticReading, readings.AngleInTorque, readings.TorqueHum, readings.EccentricPhi,
-    readings.EccentricTheta, readings.CyclicPhi, readings.EncoderBacklash, forces.Cogging, forces.CubicSpring,
-    forces.CableSpring, forces.GrowingPush, forces.Gyroscope, forces.SinkingBase,
+    readings.EccentricTheta, readings.CyclicPhi, readings.EncoderBacklash, readings.SoftEncoderMount,
+    readings.SlippingZero, forces.Cogging, forces.CubicSpring, forces.CableSpring, forces.DoorCloser,
+    forces.GrowingPush, forces.Shaker, forces.Gyroscope, forces.ShiftingLoad, forces.SinkingBase,
 )  # fmt: skip
+OUTSIDE: tuple[type[Form], ...] = (
+    readings.ScratchedDisc, readings.SoftSaturation, readings.LooseBridge, readings.FineInterpolation,
+    forces.SlackHose,
+)  # fmt: skip
+"""Unlisted ones whose formula the dictionary of laws does not have either."""
 FAULTY: tuple[type[Form], ...] = (
     readings.DropoutsPhi, readings.DropoutsTheta, readings.TorqueRamp, readings.TorqueWalk, readings.DeadBand,
 )  # fmt: skip
@@ -53,7 +62,9 @@ FAULTS = (
     at_payload.HalfSinePush,
 )  # fmt: skip
 """These, and others that come with use: drawn by themselves."""
-FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *UNLISTED, *FAULTY)}
+KNOWN: tuple[type[Form], ...] = (at_payload.QuadraticDrag, readings.TorqueBacklash)
+"""Listed ones whose law the catalogue has by now: hidden by name only."""
+FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE, *FAULTY)}
 
 
 SIZES = (2.0, 20.0)
@@ -63,9 +74,9 @@ MOST: dict[str, float] = {
     "base_compliance": 40.0, "grasp_flex": 25.0, "grasp_play": 20.0, "sea_bias": 50.0, "sea_scale": 40.0,
     "sea_hardening": 25.0, "sea_hysteresis": 30.0, "joint_friction": 40.0, "gimbal_friction": 25.0,
     "torque_skew": 15.0, "torque_lag": 5.0, "sensor_lag": 5.0, "clock_delay": 40.0,
-    "second_order_torque_lag": 5.0, "slow_grasp": 20.0,
+    "second_order_torque_lag": 5.0, "single_torque_lag": 5.0, "turning_grasp": 15.0, "slow_grasp": 20.0,
     "soft_play": 20.0, "bouc_wen_spring": 12.0, "driven_lugre": 40.0, "driven_dahl": 40.0, "gimbal_lugre": 25.0,
-    "gimbal_dahl": 25.0, "late_creep": 100.0, "cubic_spring": 6.0,
+    "gimbal_dahl": 25.0, "slow_base_compliance": 40.0, "late_creep": 100.0, "cubic_spring": 6.0,
     "dropouts_phi": 8.0, "dropouts_theta": 8.0,
 }  # fmt: skip
 """Largest size over the limit within tolerances with which a trial runs: a torque loop with 9 ms of lag does not."""
@@ -78,6 +89,8 @@ def largest(name: str, background: Background) -> float:
 
 def over_nominal(name: str, background: Background) -> float:
     """Detection limit of a cause or form in a background over that within tolerances."""
+    if name == "pushes":
+        return 1.0
     if name in FORMS:
         return LIMITS[name][background] / LIMITS[name]["x1"]
     return limit_over_nominal(name, background)
@@ -98,7 +111,10 @@ def family(name: str) -> str:
 def draw(
     name: str, factor: float, background: Background, ground: Ground, rng: np.random.Generator
 ) -> list[Effect]:
-    """One effect of ``factor`` times the limit of its background."""
+    """One effect of ``factor`` times the limit of its background; ``pushes`` are one in every trial that moves."""
+    if name == "pushes":
+        kind = at_payload.RampPush if rng.uniform() < 0.5 else at_payload.HalfSinePush
+        return list(at_payload.in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
     if name in EFFECTS:
         factor *= limit_over_nominal(name, background)
         return [draw_effect(name, factor, ground_of(ground.robots, ground.p_1c, ground.moving), rng)]
@@ -116,6 +132,7 @@ def _place(form: type[Form], ground: Ground, rng: np.random.Generator) -> dict[s
 CATALOGUE = tuple(name for name in CAUSES if name in EFFECTS)
 OTHER = tuple(form.cause for form in LISTED)
 NOWHERE = tuple(form.cause for form in UNLISTED)
+BEYOND = tuple(form.cause for form in OUTSIDE)
 WORN = tuple(form.cause for form in FAULTS)
 
 
@@ -130,9 +147,13 @@ Kind = Literal[
     "unlisted",
     "pairs",
     "triples",
+    "pushes",
     "sliding",
     "logs",
     "long",
+    "left-out",
+    "unlisted-pairs",
+    "outside",
     "faults",
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -232,10 +253,12 @@ def _names(
 ) -> tuple[str, ...]:
     if kind in ("clean", "logs"):
         return ()
-    several = {"pairs": 2, "triples": 3}.get(kind, 1)
+    if kind == "pushes":
+        return ("pushes",)
+    several = {"pairs": 2, "triples": 3, "unlisted-pairs": 2}.get(kind, 1)
     pools: dict[Kind, tuple[str, ...]] = {
-        "single": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "sliding": SLIDING,
-        "long": ("joint_friction", "push"), "faults": WORN,
+        "single": CATALOGUE, "left-out": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "unlisted-pairs": NOWHERE,
+        "sliding": SLIDING, "long": ("joint_friction", "push"), "outside": BEYOND, "faults": WORN,
     }  # fmt: skip
     found: list[str] = []
     while len(found) < several:

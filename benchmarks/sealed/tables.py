@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from mocobot.campaign.summary import interval
+from discrepancy.team.estimates import errors
+from mocobot.campaign.summary import interval, reliability
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.truth import GroundTruth
 from scoring import log_score, median_and_most
 from sealed.score import Score, Scored, score
 
 SIZES = ((0.0, 3.0, "below 3 limits"), (3.0, np.inf, "3 limits and more"))
+ESTIMATES = {
+    "mass_percent": "mass [%]",
+    "com_mm": "centre of mass [mm]",
+    "principal_inertia_percent": "inertia [%]",
+}
 HEAD = (
     "row", "sets", "hidden effects told", "and with formula", "sets wholly right", "falsely certain", "log score",
     "chi2/n left", "CPU median, most [s]", "memory median, most [GB]", "errors",
@@ -24,9 +33,12 @@ def tables(results: Iterable[Result]) -> str:
     """All tables there are results for."""
     results = list(results)
     scored = [score(result) for result in results if not result["error"]]
+    stated = [pair for one in scored for pair in one.stated]
     each = [
         _markdown("Rows", HEAD, [_line(name, own) for name, own in rows_of(results).items()]),
         _markdown("Effects by name", NAMES, _by_name(scored)),
+        _reliability(stated),
+        _markdown("What the verdict is worth: median before -> after, sets in which it falls", WORTH, _worth(scored)),
         "\n".join(f"{n} x {error}" for error, n in _failures(results).items()),
     ]  # fmt: skip
     return "\n\n".join(table for table in each if table)
@@ -89,13 +101,59 @@ def _by_name(scored: Sequence[Scored]) -> list[list[Any]]:
         z = [value for _, each in own for value in each.deviations]
         rows.append([
             name, len(own),
-            sum(each.right for _, each in own),
+            sum(each.right if each.listed else one.whole for one, each in own),
             _counts(each.named for _, each in own if each.named and not each.right),
             _counts(item["cause"] for one, _ in own for item in (*one.extras, *one.strangers)),
             median_and_most(off),
             f"{np.sqrt(np.mean(np.square(z))):.1f} ({len(z)})" if z else "-",
         ])  # fmt: skip
     return rows
+
+
+def _reliability(stated: Sequence[tuple[float, bool]]) -> str:
+    found = reliability(stated)
+    rows = [
+        [f"{100 * b['low']:.0f} to {100 * b['high']:.0f} %", b["right"]["of"], f"{100 * b['mean']:.1f} %",
+         _share(b["right"]["hits"], b["right"]["of"])]
+        for b in found["bins"]
+    ]  # fmt: skip
+    return _markdown("Stated probabilities", ("stated", "causes", "mean of it", "right"), rows)
+
+
+WORTH = ("row", "sets", "response chi2/n", "of its excess removed", *ESTIMATES.values())
+
+
+def _worth(scored: Sequence[Scored]) -> list[list[Any]]:
+    rows = []
+    by_kind = rows_of([one.result for one in scored])
+    for kind in sorted({one.result["set"]["kind"] for one in scored}):
+        gains = [
+            (r["verdict"]["gain"], r["set"]["payload"]) for r in by_kind.get(kind, ()) if r["verdict"]["gain"]
+        ]
+        held = [g["held_out"] for g, _ in gains if g["held_out"]["before"] and g["held_out"]["after"]]
+        pairs = [[each[name]["chi2_per_n"] for name in ("before", "after")] for each in held]
+        removed = [g["removed"]["share"] for g, _ in gains if g["removed"]]
+        off = [
+            [errors(g["estimates"][w], _truth(payload)) for w in ("before", "after")] for g, payload in gains
+        ]
+        if gains:
+            rows.append([
+                kind, len(gains), _before_after(pairs), f"{np.median(removed):.0%}" if removed else "-",
+                *(_before_after([[e[name] for e in pair] for pair in off]) for name in ESTIMATES),
+            ])  # fmt: skip
+    return rows
+
+
+@cache
+def _truth(payload: str) -> dict[str, Any]:
+    return GroundTruth.of(build_team(payload)).to_dict()
+
+
+def _before_after(pairs: Sequence[Sequence[float]]) -> str:
+    if not pairs:
+        return "-"
+    before, after = np.transpose(pairs)
+    return f"{np.median(before):.2g} -> {np.median(after):.2g}, {int(np.sum(after < before))}"
 
 
 def _failures(results: Iterable[Result]) -> Counter[str]:

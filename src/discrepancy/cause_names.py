@@ -55,6 +55,8 @@ JOINTS = (
     "spring",
     "counterbalance",
     "elasticity",
+    "backlash",
+    "soft_stand",
     "payload",
     "link_mass",
     "link_com",

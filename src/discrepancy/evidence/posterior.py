@@ -63,8 +63,8 @@ class Group:
 
     @property
     def name(self) -> str:
-        """Cause, place and shape in words."""
-        shape = ", ".join(f"{k} {v:g}" for k, v in self.shape)
+        """Cause, place and shape in words; of a long shape the first numbers."""
+        shape = ", ".join(f"{k} {v:g}" for k, v in self.shape[:3])
         return f"{self.cause} at {self.place}" + (f" ({shape})" if shape else "")
 
 

@@ -222,6 +222,16 @@ def _again(n: Said) -> str:
     return f"every {2.0 * np.pi / turns:.3g} m" if n.slide and turns else f"{turns:.4g} times in a turn"
 
 
+def _read_at(n: Said) -> str:
+    where = "in front of" if n.value("side") > 1.0 else "behind"
+    return f"; its position is read {where} it" if "side" in n.values else ""
+
+
+def _springs(n: Said, unit: str) -> str:
+    names = [f"stiffness_{axis}_{unit}" for axis in "xyz"]
+    return f"({', '.join(number(n.value(name), n.se.get(name), '') for name in names)})"
+
+
 VISCOUS, ASYMMETRY = "viscous_Nms_per_rad", "asymmetry_Nms_per_rad"
 WARM, STIFFNESS = "more_Nms_per_rad", "stiffness_Nm_per_rad"
 SHARES = ({"share": 0.1}, {"share": 0.3}, {"share": 1.0})
@@ -394,6 +404,25 @@ OTHERS = (
         "elasticity", "elasticity of {joint}", ("compliance_rad_per_Nm",),
         lambda n: f"{n.place} yields by {n('compliance_rad_per_Nm', 'mrad per N m', 1e3)} behind its encoder",
         "Hold the motor, load the link with a known torque, and read a dial gauge.",
+    ),
+    OtherCause(
+        "backlash", "backlash of {joint}", ("width_rad",),
+        lambda n: f"the gear of {n.place} has a play of {n('width_rad', 'mrad', 1e3)}{_read_at(n)}",
+        "Hold the motor and turn the link back and forth by hand.",
+    ),
+    OtherCause(
+        "soft_stand", "stand that yields",
+        tuple(
+            f"{what}_{axis}_{unit}"
+            for what, units in (("stiffness", ("N_per_m", "Nm_per_rad")), ("damping", ("Ns_per_m", "Nms_per_rad")))
+            for unit in units
+            for axis in "xyz"
+        ),
+        lambda n: (
+            f"the base stands on springs: {_springs(n, 'N_per_m')} N/m along x, y and z, and "
+            f"{_springs(n, 'Nm_per_rad')} N m/rad about them"
+        ),
+        "Push the base by hand, or fix it to the ground, and repeat the motion.",
     ),
     OtherCause(
         "back_emf", "back-EMF in {joint}", ("braking_Nms_per_rad",),

@@ -21,7 +21,8 @@ from discrepancy.joints import friction
 from discrepancy.joints.loop_filter import Filtered, LinearLoop, cost
 from discrepancy.joints.mechanics import Tree, inverse_torque, torque_of
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.signals import STEP_M, STEP_RAD, Signals
+from discrepancy.joints.signals import REST, STEP_M, STEP_RAD, Signals
+from discrepancy.joints.trials import Trials
 from estimator.arrays import Array
 from estimator.filtering import low_pass
 from mocobot_logs.joints.joint_log import JointLog
@@ -34,6 +35,9 @@ SHARE, MOTION_HZ = 0.4, 20.0
 """Highest frequency of the motion that readings tell, over the log's rate and at most [Hz]. Chosen."""
 FAR = 1.0
 """Least deviation of a model from the motion at which it runs away without readings [rad or m]. Chosen."""
+MOVES, FINE_HZ, FINE_SHARE = 4, 160.0, 0.2
+"""Steps that estimate the motion for a diagnosis; least rate of its signals [Hz], and their cut-off over that rate.
+Chosen: friction turns round within the period of a slower log."""
 DELAY_STEP_S = 1e-3
 """Half the step of the derivative by the delay [s]. Chosen: commands are held for longer."""
 START_RAD, START_RAD_PER_S = 0.02, 1.0
@@ -146,6 +150,19 @@ class ClosedLoop:
             spoilt=None,
         )  # fmt: skip
 
+    def thinned(self, seen: Signals) -> Signals:
+        """Signals of ``seen`` at a lower rate, with what comes with the commands."""
+        thin = max(1, int(seen.rate_hz / FINE_HZ))
+        kp, rate = self.gains(1)[0], seen.rate_hz
+        names = ("q", "dq", "ddq", "torque", "inverse", "by_delay")
+        every = {name: getattr(seen, name) for name in names}
+        every["by_command"] = kp * self.told(np.zeros(len(kp)))[0]
+        cutoff = FINE_SHARE * rate / thin
+        return replace(
+            seen, rate_hz=rate / thin, time=seen.time[::thin], usable=seen.usable[::thin],
+            **{name: low_pass(x, rate, cutoff)[::thin] for name, x in every.items()},
+        )  # fmt: skip
+
     def gains(self, steps: int) -> tuple[Array, Array, Array, Array]:
         """Gains on position and velocity, largest torque, shape (J,) each, and whether the drives are on, (N, 1)."""
         log = self.signals.log
@@ -205,17 +222,12 @@ class ClosedLoop:
         thin = max(1, round(s.rate_hz / MATRICES_HZ))
         at = np.arange(0, N, thin)
         inertia, damping, stiffness = (
-            x * (1.0 + scale)[:, None] for x in _matrices(tree, s.q[at], s.dq[at], s.ddq[at])
+            x * (1.0 + scale)[:, None] for x in derivatives(tree, s.q[at], s.dq[at], s.ddq[at])
         )
         K = stiffness[np.arange(N) // thin] + np.eye(J) * (free * kp)[:, None, :]
         D = damping[np.arange(N) // thin] + np.eye(J) * (free * kd + (1.0 + scale) * tree.viscous)[:, None, :]
         M = inertia[np.arange(N) // thin]
-        inner = np.linalg.inv(M + 0.5 * h * D + 0.25 * h**2 * K)
-        kept, back = inner @ (M - 0.5 * h * D - 0.25 * h**2 * K), inner @ K
-        A, B = np.empty((N, 2 * J, 2 * J)), np.empty((N, 2 * J, J))
-        A[:, :J, :J], A[:, :J, J:] = np.eye(J) - 0.5 * h**2 * back, 0.5 * h * (np.eye(J) + kept)
-        A[:, J:, :J], A[:, J:, J:] = -h * back, kept
-        B[:, :J], B[:, J:] = 0.5 * h**2 * inner, h * inner
+        A, B = midpoint(M, D, K, h)
         Q = np.tile(self.torque / h, (N, 1))
         for j in range(J):
             for a, b in friction.rests(s.dq[:, j], h, slow[j]):
@@ -287,6 +299,40 @@ class ClosedLoop:
             self.q, self.dq = (low_pass(x, rate, cutoff) for x in (self.q + way[:, :J], self.dq + way[:, J:]))
 
 
+def estimated(model: SerialModel, trials: Trials) -> Trials:
+    """Trials whose motion and torques are those of the closed loop's likeliest course; as they are unless commanded.
+
+    Noise of positions is in the torque that a loop's formula tells and in every column alike. That reads as a torque
+    whose scale is off, so the motion is smoothed with the model first.
+
+    Args:
+        model: the robot as described.
+        trials: smoothed logs.
+    """
+    if not all(commanded(s.log) for s in trials.runs):
+        return trials
+    runs, none = [], np.zeros(len(model.joints))
+    for s in trials.runs:
+        loop, tree = ClosedLoop.of(s), s.tree
+        seen = loop.seen(model, none)
+        for _ in range(MOVES):
+            side = [
+                friction.direction(v, loop.step_s, slow)
+                for v, slow in zip(seen.dq.T, REST * s.slow, strict=True)
+            ]
+            lacking = seen.torque - seen.inverse - tree.coulomb * np.transpose(side) - tree.viscous * seen.dq
+            filtered = loop.filtered(seen, tree, none, tree.coulomb, REST * s.slow)
+            loop.move(filtered, lacking)
+            loop.learn(filtered, lacking)
+            seen = loop.seen(model, none)
+        runs.append(loop.thinned(seen))
+    parts = []
+    for k, at in trials.parts:
+        share = len(runs[k].time) / len(trials.runs[k].time)
+        parts.append((k, slice(round(at.start * share), round(at.stop * share))))
+    return replace(trials, runs=tuple(runs), parts=tuple(parts), noise=(), kept=())
+
+
 def _reading(log: JointLog) -> Array:
     """Variance of the readings' white noise, from fourth differences, shape (J,)."""
     white = np.diff(log.q, 4, axis=0)
@@ -294,19 +340,44 @@ def _reading(log: JointLog) -> Array:
     return np.median(white**2, axis=0) / 0.455 / 70.0
 
 
-def _matrices(tree: Tree, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array, Array]:
-    """Derivatives of the torques by accelerations, velocities and positions, shape (Q, J, J) each."""
+def midpoint(M: Array, D: Array, K: Array, h: float) -> tuple[Array, Array]:
+    """Steps A and B of M x'' + D x' + K x = u by the implicit midpoint rule, see ``loop_filter``.
+
+    Args:
+        M, D, K: inertia, damping and stiffness of each step, shape (N, J, J).
+        h: step [s].
+    """
+    N, J = M.shape[:2]
+    inner = np.linalg.inv(M + 0.5 * h * D + 0.25 * h**2 * K)
+    kept, back = inner @ (M - 0.5 * h * D - 0.25 * h**2 * K), inner @ K
+    A, B = np.empty((N, 2 * J, 2 * J)), np.empty((N, 2 * J, J))
+    A[:, :J, :J], A[:, :J, J:] = np.eye(J) - 0.5 * h**2 * back, 0.5 * h * (np.eye(J) + kept)
+    A[:, J:, :J], A[:, J:, J:] = -h * back, kept
+    B[:, :J], B[:, J:] = 0.5 * h**2 * inner, h * inner
+    return A, B
+
+
+def derivatives(
+    tree: Tree, q: Array, dq: Array, ddq: Array, count: int | None = None
+) -> tuple[Array, Array, Array]:
+    """Derivatives of the torques by accelerations, velocities and positions, shape (Q, J, J) each.
+
+    Args:
+        tree: kinematic tree.
+        q, dq, ddq: motion, shape (Q, J) each.
+        count: number of leading joints by which to differentiate, instead of J; None: all.
+    """
     J, out = q.shape[1], []
     for k in (2, 1, 0):
         columns = []
-        for j in range(J):
+        for j in range(J if count is None else count):
             step = STEP_M if tree.slides[j] else STEP_RAD
             up, down = ([x.copy() for x in (q, dq, ddq)] for _ in range(2))
             up[k][:, j] += step
             down[k][:, j] -= step
             columns.append((torque_of(tree, *up) - torque_of(tree, *down)) / (2.0 * step))
         out.append(np.stack(columns, axis=2))
-    out[0] = out[0] + np.diag(tree.armature)
+    out[0] = out[0] + np.diag(tree.armature)[:, :count]
     return out[0], out[1], out[2]
 
 

@@ -69,7 +69,7 @@ def diagnose(
     """
     until = until or Until()
     trials = logs if isinstance(logs, Trials) else trials_of(model, logs)
-    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise, kept=trials.kept)
+    smooth, given = trials.runs, replace(given or Given(), noise=trials.noise or None, kept=trials.kept)
     if given.changed is None and not given.motors and "gravity_direction" not in given.excluded:
         given = replace(given, mount=mount_of(smooth, given.joints or range(len(model.joints))))
     problem = joint_problem(model, smooth, None, given)
@@ -113,14 +113,10 @@ def _around(found: Outcome, *, smooth: Sequence[Signals], given: Given, floor: A
     search = replace(before, problem=problem, floor=floor, best=None)
     chosen = []
     for c in found.state.chosen:
-        if c.group.event:
-            chosen.append(Chosen(problem.place(c.group), c.scale))
-        else:
-            chosen += [
-                Chosen(g, c.scale)
-                for g in problem.groups
-                if g.key == c.group.key and g.shape == c.group.shape
-            ]
+        again = [g for g in problem.groups if g.key == c.group.key and g.shape == c.group.shape]
+        if c.group.event or (c.group.cause == "soft_stand" and not again):
+            again = [problem.place(c.group)]
+        chosen += [Chosen(g, c.scale) for g in again]
     return Outcome(problem, search, search.fixed(chosen))
 
 

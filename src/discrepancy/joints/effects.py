@@ -21,7 +21,16 @@ from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 
 NAMES: Mapping[str, tuple[str, ...]] = {cause.name: tuple(cause.parameters) for cause in (*CAUSES, *OTHERS)}
-ROBOTS = ("payload", "link_length", "link_com", "link_mass", "link_inertia", "gravity_direction", "push")
+ROBOTS = (
+    "payload",
+    "link_length",
+    "link_com",
+    "link_mass",
+    "link_inertia",
+    "gravity_direction",
+    "push",
+    "soft_stand",
+)
 GRAVITY = ("x_m_per_s2", "y_m_per_s2", "z_m_per_s2")
 """Parameters of a base that is mounted another way than in the model: gravity in the base's frame."""
 LEAST_KG = 1e-3
@@ -68,6 +77,9 @@ def _change(problem: JointProblem, group: Group) -> Callable[[Array], Array] | N
         return lambda x: np.append(x[0] * mass, x[1:])
     if group.cause == "payload":
         return load_of
+    if group.cause == "soft_stand":
+        numbers = np.array([x for _, x in group.shape])[: len(NAMES[group.cause])]
+        return lambda x: numbers * np.exp(x[1 : 1 + len(numbers)] / max(x[0], 0.1)) / max(x[0], 0.1)
     if group.cause == "gravity_direction":
         along = axes_of_tilt(tree.gravity) @ horizontal(tree.gravity).T
         if problem.mount is None:
@@ -94,7 +106,7 @@ def load_of(moments: Array) -> Array:
 
 def absolute(problem: JointProblem, group: Group) -> dict[str, Any]:
     """Shape parameters of a cause, with the physical values that a simulation needs."""
-    shape: dict[str, Any] = dict(group.shape)
+    shape: dict[str, Any] = {} if group.cause == "soft_stand" else dict(group.shape)
     if group.cause == "gravity_direction" and problem.mount is not None:
         shape["turned_deg"] = np.degrees(angle_between(problem.model.model.opt.gravity, problem.mount))
     if group.place not in problem.model.joints:

@@ -13,7 +13,9 @@ MERGE_S = 0.025
 """Longest gap between rests that count as one [s]. Derived: a period of the smoothing filter (60 Hz) on each side."""
 KNOT_S = 0.06
 """Time at rest for each cosine of the friction [s]. Derived: half a period of the rows' highest frequency, 10 Hz."""
-MOST_KNOTS = 12
+MOST_KNOTS, MOST_IN_ALL = 12, 240
+"""Cosines of one rest; more of them in long rests if those of all rests of a joint are fewer than the second number.
+Chosen: a command that steps while the joint sticks makes friction jump, and 240 cosines resolve 14 s of that."""
 
 
 def rests(v: Array, step_s: float, slow: float) -> list[tuple[int, int]]:
@@ -59,17 +61,18 @@ def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, 
     """
     own: list[list[tuple[int, Array]]] = []
     common = [np.zeros(len(v)) for _ in range(3)]
-    for a, b in rests(v, step_s, slow):
+    found = rests(v, step_s, slow)
+    total = sum(b - a for a, b in found)
+    for a, b in found:
         n = b - a
         place = (np.arange(n) + 0.5) / n
-        cosines = [
-            np.cos(np.pi * k * place) for k in range(max(3, 1 + min(int(n * step_s / KNOT_S), MOST_KNOTS)))
-        ]
+        knots = min(int(n * step_s / KNOT_S), max(MOST_KNOTS, MOST_IN_ALL * n // total))
+        cosines = [np.cos(np.pi * k * place) for k in range(max(3, 1 + knots))]
         before, after = ends(v, a, b)
         if not np.isnan(before):
             for k in range(3):
                 common[k][a:b] = 0.5 * (after - before) * cosines[k]
-        own.append([(a, c) for c in cosines[: 1 + min(int(n * step_s / KNOT_S), MOST_KNOTS)]])
+        own.append([(a, c) for c in cosines[: 1 + knots]])
     return own, common
 
 

@@ -12,9 +12,10 @@ from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Pa
 from discrepancy.joints.forecast import Forecasts, errors, machine
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import MOMENTS, REST, JointProblem
+from discrepancy.joints.problem import MOMENTS, JointProblem
 from discrepancy.joints.quantities import described
 from discrepancy.joints.servo import with_torques
+from discrepancy.joints.signals import REST
 from discrepancy.joints.trials import Trials
 from estimator.arrays import Array
 from mocobot_logs.joints.asked_torque import with_asked_torques

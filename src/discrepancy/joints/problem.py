@@ -11,9 +11,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
-from discrepancy.joints import friction
+from discrepancy.joints import backlash, friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.joints.closed_loop import ClosedLoop, bands_of, cells_of
 from discrepancy.joints.loop_filter import Filtered
@@ -31,7 +31,8 @@ from discrepancy.joints.mechanics import (
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.mount import gravity_at, ways
 from discrepancy.joints.pushes import Pushes
-from discrepancy.joints.signals import Signals, along
+from discrepancy.joints.signals import REST, Signals, along
+from discrepancy.joints.stand import Stand
 from discrepancy.joints.unlisted import SIGNALS, SIZES, functions
 from estimator.arrays import Array
 from estimator.filtering import low_pass
@@ -93,8 +94,6 @@ READ_RAD = 0.02
 """Prior standard deviation of an unlisted position error [rad]."""
 UNLISTED_NATS = 5.0
 """Prior log odds of a listed cause over an unlisted one."""
-REST = 1.5
-"""Speed threshold for rest, in units of the speed below which the friction direction fades (``Signals.slow``)."""
 
 Values = Mapping[str, float]
 
@@ -122,6 +121,7 @@ class JointProblem(Pushes):
         channel: channel index of each joint with torques.
         changed: number of leading logs in which causes may act; None: all.
         dry_in_all: for each joint, the Coulomb friction column that also acts in the reference.
+        stand: stands that may yield; None: do not look for one.
     """
 
     model: SerialModel
@@ -144,6 +144,19 @@ class JointProblem(Pushes):
     changed: int | None = None
     dry_in_all: dict[int, int] = field(default_factory=dict)
     mount: Array | None = None
+    stand: Stand | None = None
+
+    def place(self, group: Group) -> Group:
+        """Add the columns of a push or of a stand."""
+        if self.stand is None or group.cause != "soft_stand":
+            return super().place(group)
+        return replace(group, columns=tuple(self.cells.add(self.rows(self.stand.series(group.shape)))))
+
+    def nearby(self, group: Group, posterior: Posterior) -> list[Group]:
+        """Variants of a push, or the stand whose springs explain most."""
+        if self.stand is None or group.cause != "soft_stand":
+            return super().nearby(group, posterior)
+        return [self.stand.fitted(group, posterior, self.cells, self.rows)]
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Prior variances without the chosen causes; friction at rest scales with Coulomb friction."""
@@ -215,7 +228,7 @@ class JointProblem(Pushes):
             turns = [[zero * wave(s.q[:, joint]) for s in self.parts] for wave in (np.sin, np.cos)]
             return self.rows([self.displaced(joint, way) for way in turns])
         named = {cause.name: cause for cause in CAUSES}
-        if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
+        if group.cause not in named and group.cause not in ("coupled_drive", "elasticity", "backlash"):
             return []
         out: list[Series] = []
         if group.cause == "elasticity":
@@ -392,7 +405,11 @@ class _Builder:
             self._elasticity(j)
             if j in self.more.back_emf:
                 self._braking(j)
+            if self.commanded:
+                self._backlash(j)
         self._arm()
+        if self.commanded and self.more.changed is None:
+            self._stand()
         for body in self.tree.links:
             self._link(int(body))
         for j in range(0 if self.more.loops else self.J):  # there, friction at rest is noise of the torque
@@ -474,7 +491,11 @@ class _Builder:
             "armature_kgm2": t.armature[j],
         }
         for cause in CAUSES:
-            for shape in cause.shapes:
+            exact = (
+                cause.name == "torque_scale" and self.commanded
+            )  # the gain of a formula, which does not bend
+            shapes = cause.shapes[: 1 if exact else None]
+            for shape in shapes:
                 plain = not any(shape.values())
                 columns = [cause.columns(s, shape) for s in self.joints[j]]
                 index = []
@@ -489,7 +510,7 @@ class _Builder:
                     self._known[label] = index[-1]
                 least = tuple(-own.get(p, 0.0) if p in cause.positive else -np.inf for p in cause.parameters)
                 self.group(
-                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(cause.shapes)),
+                    cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
         for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
@@ -562,6 +583,30 @@ class _Builder:
         k = self.add(f"{self.names[j]} braking", 0.0, {j: by})
         z = self.spans[j]
         self.group("back_emf", self.names[j], [k], [z.torque / z.speed], least=(0.0,))
+
+    @property
+    def commanded(self) -> bool:
+        """Whether commands tell the torques, and rows are torques."""
+        return not self.more.loops and all(s.by_command is not None for s in self.parts)
+
+    def _backlash(self, j: int) -> None:
+        n, t = self.names[j], self.given
+        each = backlash.columns(self.parts, self.joints[j], j, float(t.viscous[j]), float(t.armature[j]))
+        for shape, torques in zip(backlash.SHAPES, each, strict=True):
+            of = {id(s): torque for s, torque in zip(self.parts, torques, strict=True)}
+            k = self.add(f"{n} backlash {dict(shape)}", 0.0, self.wide(lambda s, of=of: of[id(s)]))
+            self.group(
+                "backlash", n, [k], [backlash.WIDTH_RAD], least=(0.0,), shape=shape,
+                log_prior=-math.log(len(backlash.SHAPES)),
+            )  # fmt: skip
+
+    def _stand(self) -> None:
+        stand = Stand(self.parts)
+        for number, shape in enumerate(stand.first()):
+            own = [self.add(f"stand {number} {k}", 0.0, x) for k, x in enumerate(stand.series(shape))]
+            group = stand.group(shape, own)
+            (self.out.withheld if group.cause in self.more.excluded else self.out.groups).append(group)
+        self.out.stand = stand
 
     def _arm(self) -> None:
         g = self.tree.gravity

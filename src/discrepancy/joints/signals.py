@@ -31,6 +31,8 @@ SLOW_SHARE = 0.01
 """Share of a joint's typical speed below which the friction direction fades. Chosen."""
 SLOW_ROUNDINGS = 2.0
 """Lower limit of that speed, in standard deviations of the velocity error from position rounding."""
+REST = 1.5
+"""Speed threshold for rest, in units of the speed below which the friction direction fades (``Signals.slow``)."""
 LEAST_SPEED = 1e-6
 """Lower limit of the typical speed [rad/s or m/s]. Chosen: only prevents division by zero."""
 

@@ -21,6 +21,7 @@ from discrepancy.evidence.search import Chosen, Until
 from discrepancy.evidence.settings import SETTINGS
 from discrepancy.formulas.law import Law
 from discrepancy.joints.causes import LINKS
+from discrepancy.joints.closed_loop import estimated
 from discrepancy.joints.diagnose import Outcome, diagnose, parts_of
 from discrepancy.joints.effects import NAMES, absolute, physical
 from discrepancy.joints.model import SerialModel
@@ -105,7 +106,7 @@ def judged(
     """
     until = Until(math.inf if seconds is None else time.monotonic() + seconds)
     say("smoothing the logs")
-    trials = trials_of(model, logs, reference)
+    trials = estimated(model, trials_of(model, logs, reference))
     volts = driven_by_voltage(trials.motors, len(model.joints))
     switched = any(s.enabled is not None and not s.enabled.all() for s in trials.runs)
     given = Given(
