@@ -189,12 +189,13 @@ def scored(folder: Path, options: Options) -> list[Scored]:
     _, law = told_law(folder)
     parameters, plain = parameters_of(options.result), truth["law"] == "M1"
     acts = _each(truth, "kd") - _each(truth, "kp") * _each(truth, "loop_delay_s")
+    told = law.kd * _each(truth, "kp") / law.kp
     for j, (joint, own) in enumerate(truth["joints"].items()):
         gain = _found(parameters, joint, KD)
         wanted = {ARMATURE: own[ARMATURE], f"command_{DELAY}": own[DELAY], KP: own["kp"], KD: acts[j]}
         if plain:
             wanted[COULOMB] = own[COULOMB]
-            wanted[VISCOUS] = own[VISCOUS] + (0.0 if gain else acts[j] - law.kd[j])
+            wanted[VISCOUS] = own[VISCOUS] + (0.0 if gain else acts[j] - told[j])
         for stem, value in wanted.items():
             if (p := _found(parameters, joint, stem)) is not None:
                 name = p.get("parameter") or p["name"]
