@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,9 +132,11 @@ class Fit:
 
     Attributes:
         late_s: prior standard deviation of the delays [s].
+        friction: of joints whose friction deviates from its law: Coulomb friction and damping of first to third degree.
     """
 
     late_s = DELAY_S
+    friction: Mapping[int, Array] = MappingProxyType({})
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
         self.model, self.trials = model, trials
@@ -337,7 +340,9 @@ class Fit:
         for k in np.tile(np.arange(len(forms)), LAW_SWEEPS):
             prior[k] = 0.0
             on = np.flatnonzero(prior)
-            others = np.linalg.solve(np.diag(1.0 / prior[on]) + R[np.ix_(on, on)], np.column_stack([R[on, k], Q[on]]))
+            others = np.linalg.solve(
+                np.diag(1.0 / prior[on]) + R[np.ix_(on, on)], np.column_stack([R[on, k], Q[on]])
+            )
             information, score = np.array([R[k, k], Q[k]]) - R[k, on] @ others
             ratio = max(score**2 / information, 1.0)
             if 0.5 * (ratio - 1.0 - np.log(ratio)) > odds:
@@ -351,14 +356,7 @@ class Fit:
         the law nearest to it: the fit without deviations. Its difference from that with them counts as an error, also
         at a bound.
         """
-        H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
-        information, start = self.basis.T @ H @ self.basis, np.linalg.pinv(self.basis) @ self.x
-        y = self._mode(information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start)
-        x = np.maximum(self.basis @ y, self.least)  # rounding may end below a bound
-        # For errors, the prior counts with its curvature at the given model, and less, so that it does not make them.
-        weak = self.curvature.copy()
-        weak[: self.first, : self.first] /= PLAIN**2
-        covariance = self.basis @ np.linalg.inv(information + weak) @ self.basis.T
+        x, covariance = self.lawful(parts)
         H, g = self._reduced(self.plain, parts, self.rests)
         at = self.rubbing
         least = self.least[at]
@@ -376,6 +374,18 @@ class Fit:
             free &= ~beyond
         covariance[at, at] += (nearest - lawful) ** 2
         x[at] = nearest
+        return x, covariance
+
+    def lawful(self, parts: Sequence[int]) -> tuple[Array, Array]:
+        """Values of ``x`` beside the deviations of friction from its law, and their covariance, from some parts."""
+        H, g = self._reduced(self.normals, parts, np.concatenate([self.rests, self.laws]))
+        information, start = self.basis.T @ H @ self.basis, np.linalg.pinv(self.basis) @ self.x
+        y = self._mode(information, self.basis.T @ (g - H @ (self.basis @ start - self.x)), start)
+        x = np.maximum(self.basis @ y, self.least)  # rounding may end below a bound
+        # For errors, the prior counts with its curvature at the given model, and less, so that it does not make them.
+        weak = self.curvature.copy()
+        weak[: self.first, : self.first] /= PLAIN**2
+        covariance = self.basis @ np.linalg.inv(information + weak) @ self.basis.T
         return x, covariance
 
     def _reduced(

@@ -10,9 +10,10 @@ import numpy as np
 from discrepancy.joints.closed_loop import ClosedLoop
 from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
 from discrepancy.joints.forecast import Forecasts, errors, machine
+from discrepancy.joints.friction import deviations, polynomial
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import MOMENTS, REST, JointProblem
+from discrepancy.joints.problem import FORM, MOMENTS, REST, JointProblem
 from discrepancy.joints.quantities import described
 from discrepancy.joints.servo import with_torques
 from discrepancy.joints.trials import Trials
@@ -167,7 +168,7 @@ class LoopFit(Fit):
         """Position gain, velocity gain with negative damping, torque added, and largest torque, shape (J, 4)."""
         kp, kd, limit, _ = self.loops[0].gains(1)
         true = 1.0 / (1.0 + self.each("scale"))
-        damping = kd * true + np.minimum(self.tree.viscous, 0.0)
+        damping = kd * true + np.minimum(self.numbers().viscous, 0.0)
         return np.column_stack([kp * true, damping, -self.offset * true, limit * true])
 
     @property
@@ -177,9 +178,37 @@ class LoopFit(Fit):
         return np.array([own.get(f"{n} offset_Nm", 0.0) for n in self.model.joints])
 
     def numbers(self) -> Tree:
-        """The tree with the fitted lengths and gravity, too."""
-        names = ("mass", "com", "inertia", "armature", "coulomb", "viscous")
-        return replace(self.problem.parts[0].tree, **{name: getattr(self.tree, name) for name in names})
+        """The tree with the fitted lengths and gravity, too, and with friction as MJCF holds it."""
+        names = ("mass", "com", "inertia", "armature")
+        coulomb, viscous, drag = (a.copy() for a in (self.tree.coulomb, self.tree.viscous, self.tree.drag))
+        for j, law in self.friction.items():
+            coulomb[j], viscous[j], drag[j] = law[0], law[1], self.given.drag[j] + law[2:]
+        own = {name: getattr(self.tree, name) for name in names}
+        return replace(self.problem.parts[0].tree, **own, coulomb=coulomb, viscous=viscous, drag=drag)
+
+    def deviating(self, parts: Sequence[int]) -> dict[int, Array]:
+        """Friction of the joints that deviate from Coulomb and viscous friction, from some parts, as ``friction``."""
+        x, at, out = self.lawful(parts)[0], np.concatenate([self.rests, self.laws]), dict[int, Array]()
+        if not len(self.laws):
+            return out
+        G, b = (sum(self.normals[t][k] for t in parts[1:]) + self.normals[parts[0]][k] for k in range(2))
+        inner = G[np.ix_(at, at)] + np.diag(1.0 / self.spread[at])
+        sizes = np.linalg.solve(inner, b[at] - G[np.ix_(at, self.fit)] @ (x - self.at))[len(self.rests) :]
+        size = dict(zip((self.problem.labels[self.active[k]] for k in self.laws), sizes, strict=True))
+        own = dict(zip((s.label for s in self.scalars), x[self.first :], strict=True))
+        tree = self.problem.parts[0].tree
+        for j in self.known:
+            n, signals = self.model.joints[j], self.problem.joints[j]
+            coulomb = self.given.coulomb[j] + own[f"{n} coulomb_Nm"]
+            viscous = self.given.viscous[j] + own[f"{n} viscous_Nms_per_rad"]
+            torque = [coulomb * s.direction + viscous * s.v for s in signals]
+            forms = deviations(signals, float(tree.coulomb[j]), float(tree.viscous[j]), FORM, servo=True)
+            told = {f"{n} form {i}": form for i, form in enumerate(forms) if f"{n} form {i}" in size}
+            for label, form in told.items():
+                torque = [t + size[label] * f for t, f in zip(torque, form, strict=True)]
+            if told:
+                out[j] = polynomial(signals, torque, self.least_damping(j))
+        return out
 
     def held_out(self) -> tuple[HeldOut, ...]:
         """Forecast the positions of each part from its commands, with values from the others."""
@@ -191,6 +220,7 @@ class LoopFit(Fit):
             loop = self.loops[k]
             self.x = self.solved([o for o in parts if o != t] or [t])[0]
             self.jump(self.x)
+            self.friction = self.deviating([o for o in parts if o != t] or [t])
             fitted, zero, late = (
                 machine(self.model, self.given, self.numbers()),
                 self.zero(),
@@ -209,6 +239,7 @@ class LoopFit(Fit):
             out.append(HeldOut(self.trials.names[t], model, none + np.nan, best, read, size))
         self.x = before
         self.jump(before)
+        self.friction = self.deviating(parts)
         return tuple(out)
 
     def notes(self) -> Iterator[str]:
@@ -223,6 +254,12 @@ class LoopFit(Fit):
                 f"Velocity gain and viscous friction of {', '.join(names)} have the same effect: only their sum is "
                 "determined. The viscous friction is told for the velocity gain of the map, 0 where it is free, which "
                 "is off by the same factor as the position gain."
+            )
+        if self.friction:
+            names = [self.model.joints[j] for j in self.friction]
+            yield (
+                f"Friction of {', '.join(names)} deviates from Coulomb and viscous friction. as_found.xml has Coulomb "
+                "friction and damping of third degree in the speed, the table the nearest Coulomb and viscous friction."
             )
         wide = {name: factor for name, factor in self.widened.items() if factor > WIDE}
         if wide:

@@ -127,6 +127,12 @@ def _at_joint(
         if min(coulomb, viscous) < 0:
             return False
         damping[0] = viscous
+        if "cubic" in effect.parameters:
+            damping = np.append(damping, np.zeros(2))[:3] + [
+                0.0,
+                effect.number("quadratic"),
+                effect.number("cubic"),
+            ]
         joint.frictionloss, joint.damping = coulomb, damping if damping.size > 1 else viscous
     elif effect.cause == "armature":
         joint.armature = max(float(joint.armature) + effect.number("armature"), 0.0)
