@@ -128,11 +128,8 @@ def _at_joint(
             return False
         damping[0] = viscous
         if "cubic" in effect.parameters:
-            damping = np.append(damping, np.zeros(2))[:3] + [
-                0.0,
-                effect.number("quadratic"),
-                effect.number("cubic"),
-            ]
+            damping = np.pad(damping, (0, 3 - damping.size))
+            damping[1:] += effect.number("quadratic"), effect.number("cubic")
         joint.frictionloss, joint.damping = coulomb, damping if damping.size > 1 else viscous
     elif effect.cause == "armature":
         joint.armature = max(float(joint.armature) + effect.number("armature"), 0.0)
