@@ -151,14 +151,15 @@ def polynomial(signals: Sequence[JointSignals], torque: Sequence[Array], least: 
 def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -> Iterator[list[Array]]:
     """Series of one standard deviation by which friction in a servo's gear may exceed Coulomb and viscous friction.
 
-    More at low speed (Stribeck), more under torque, and both together: the laws M4 and M5 of M. Duclusaud et al.,
-    "Extended friction models for the physics simulation of servo actuators", 2024.
+    With the square of the speed, more at low speed (Stribeck), more under torque, and the last two together: the laws M4
+    to M6 of M. Duclusaud et al., "Extended friction models for the physics simulation of servo actuators", 2024.
 
     Args:
         signals: signals of one joint, one for each log.
         coulomb: Coulomb friction [N m].
         share: deviation relative to the friction, and to the torque.
     """
+    yield [coulomb * s.v * np.abs(s.v) / s.span.speed**2 for s in signals]
     for speed in (0.05, 0.2, 0.5):
         slow = [s.direction * np.exp(-np.abs(s.v) / (speed * s.span.speed)) for s in signals]
         yield [coulomb * x for x in slow]

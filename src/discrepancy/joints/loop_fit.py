@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.joints.closed_loop import ClosedLoop
-from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
+from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, LEARNING, Fit, HeldOut, Parameter, Scalar
 from discrepancy.joints.forecast import Forecasts, errors, machine
 from discrepancy.joints.friction import deviations, polynomial
 from discrepancy.joints.mechanics import Tree
@@ -23,8 +23,6 @@ from mocobot_logs.joints.joint_log import JointLog
 
 LATE_S = 0.02
 """Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
-LEARNING = 4
-"""Steps in which the noise is learnt, too. Chosen: the fit settles only when it is held."""
 WIDE = 1.5
 """Least factor on standard errors that is told. Chosen: ten values of two parts scatter by less than that."""
 REST_SHARE = 0.05
@@ -67,16 +65,16 @@ class LoopFit(Fit):
 
     Attributes:
         loops: closed loops of the runs.
-        steps: steps done.
         widened: factor on the standard errors by quantity, see ``widen``.
         forecasts: what ``held_out`` keeps of the first part.
     """
 
     late_s = LATE_S
     forecasts: Forecasts | None = None
+    likeliest: tuple[float, Array, list[tuple[Array, Array]]]
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
-        self.loops, self.steps = [ClosedLoop.of(s) for s in trials.runs], 0
+        self.loops = [ClosedLoop.of(s) for s in trials.runs]
         self.widened: dict[str, float] = {}
         super().__init__(model, replace(trials, noise=(), kept=()))
         names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
@@ -101,7 +99,7 @@ class LoopFit(Fit):
         pairs = []
         for loop, s in zip(self.loops, runs, strict=True):
             dry = np.maximum(self.tree.coulomb, REST_SHARE * np.sqrt(np.mean(s.torque**2, axis=0)))
-            pairs.append((loop, loop.filtered(s, self.tree, scale, dry, REST * s.slow)))
+            pairs.append((loop, loop.filtered(s, self.with_friction(self.tree), scale, dry, REST * s.slow)))
         self.options = replace(self.options, noise=None, loops=pairs)
         parts = []
         for k, at in self.trials.parts:
@@ -111,17 +109,36 @@ class LoopFit(Fit):
         return super().linear()
 
     def step(self) -> float:
-        """Fit around the current values and motion, and move both; return the largest step in standard errors."""
+        """Fit around the current values and motion, and move both; return the largest step in standard errors.
+
+        Once the noise is held, a step that makes the positions less likely than before is halved.
+        """
+        begun = self.x, [(loop.q, loop.dq) for loop in self.loops]
         moved = super().step()
-        for t, (loop, filtered) in enumerate(self.options.loops):
-            lacking = self.problem.residual[t].copy()
-            for i, value in zip(self.columns(), self.x - self.at, strict=True):
-                for j, own in self.problem.series[i].items():
-                    lacking[:, j] -= value * own[t]
-            loop.move(filtered, lacking)
-            if self.steps < LEARNING:
-                loop.learn(filtered, lacking)
-        self.steps += 1
+        parts = range(len(self.normals))
+        self.friction = self.deviating(parts)
+        lacking = [own.copy() for own in self.problem.residual]
+        for i, value in self.explained(parts)[1]:
+            for j, series in self.problem.series[i].items():
+                for own, column in zip(lacking, series, strict=True):
+                    own[:, j] -= value * column
+        every = [
+            (loop, filtered, own) for (loop, filtered), own in zip(self.options.loops, lacking, strict=True)
+        ]
+        likelihood = sum(filtered.log_density(own, loop.off) for loop, filtered, own in every)
+        if self.steps > LEARNING + 1 and likelihood < self.likeliest[0]:
+            _, x, motions = self.likeliest
+            moved = float(np.max(np.abs(begun[0] - x) / np.sqrt(np.diag(self.covariance)))) / 2.0
+            self.x = 0.5 * (begun[0] + x)
+            for loop, *pairs in zip(self.loops, begun[1], motions, strict=True):
+                loop.q, loop.dq = (0.5 * (p + q) for p, q in zip(*pairs, strict=True))
+            self.jump(self.x)
+            return moved
+        self.likeliest = likelihood, *begun
+        for loop, filtered, own in every:
+            loop.move(filtered, own)
+            if self.steps <= LEARNING:
+                loop.learn(filtered, own)
         return moved if self.steps > LEARNING else np.inf
 
     def widen(self) -> None:
@@ -179,22 +196,26 @@ class LoopFit(Fit):
 
     def numbers(self) -> Tree:
         """The tree with the fitted lengths and gravity, too, and with friction as MJCF holds it."""
-        names = ("mass", "com", "inertia", "armature")
-        coulomb, viscous, drag = (a.copy() for a in (self.tree.coulomb, self.tree.viscous, self.tree.drag))
+        own = {
+            name: getattr(self.tree, name)
+            for name in ("mass", "com", "inertia", "armature", "coulomb", "viscous")
+        }
+        return self.with_friction(replace(self.problem.parts[0].tree, **own))
+
+    def with_friction(self, tree: Tree) -> Tree:
+        """A tree with the friction of joints that deviate from Coulomb and viscous friction."""
+        coulomb, viscous, drag = (a.copy() for a in (tree.coulomb, tree.viscous, tree.drag))
         for j, law in self.friction.items():
             coulomb[j], viscous[j], drag[j] = law[0], law[1], self.given.drag[j] + law[2:]
-        own = {name: getattr(self.tree, name) for name in names}
-        return replace(self.problem.parts[0].tree, **own, coulomb=coulomb, viscous=viscous, drag=drag)
+        return replace(tree, coulomb=coulomb, viscous=viscous, drag=drag)
 
     def deviating(self, parts: Sequence[int]) -> dict[int, Array]:
         """Friction of the joints that deviate from Coulomb and viscous friction, from some parts, as ``friction``."""
-        x, at, out = self.lawful(parts)[0], np.concatenate([self.rests, self.laws]), dict[int, Array]()
+        out = dict[int, Array]()
         if not len(self.laws):
             return out
-        G, b = (sum(self.normals[t][k] for t in parts[1:]) + self.normals[parts[0]][k] for k in range(2))
-        inner = G[np.ix_(at, at)] + np.diag(1.0 / self.spread[at])
-        sizes = np.linalg.solve(inner, b[at] - G[np.ix_(at, self.fit)] @ (x - self.at))[len(self.rests) :]
-        size = dict(zip((self.problem.labels[self.active[k]] for k in self.laws), sizes, strict=True))
+        x, every = self.explained(parts)
+        size = {self.problem.labels[k]: value for k, value in every}
         own = dict(zip((s.label for s in self.scalars), x[self.first :], strict=True))
         tree = self.problem.parts[0].tree
         for j in self.known:
