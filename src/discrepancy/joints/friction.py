@@ -151,8 +151,8 @@ def polynomial(signals: Sequence[JointSignals], torque: Sequence[Array], least: 
 def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -> Iterator[list[Array]]:
     """Series of one standard deviation by which friction in a servo's gear may exceed Coulomb and viscous friction.
 
-    With the square of the speed, more at low speed (Stribeck), more under torque, and the last two together: the laws M4
-    to M6 of M. Duclusaud et al., "Extended friction models for the physics simulation of servo actuators", 2024.
+    With the square of the speed, more at low speed (Stribeck), more under torque, and the last two together: the laws
+    M4 to M6 of M. Duclusaud et al., "Extended friction models for the physics simulation of servo actuators", 2024.
 
     Args:
         signals: signals of one joint, one for each log.
