@@ -37,8 +37,9 @@ from commanded.rubbing import LAWS, Law, law_of
 
 Fault = Literal["backlash", "soft_stand", "half_gain", "friction_tripled", "extra_delay"]
 RUNS = ("fit_0", "fit_1", "held_out")
-WRONG, WRONG_MASS = 3.0, 0.1
-"""Most that the maker's model is off: a factor either way, a share of a leg's masses."""
+WRONG, WRONG_MASS, GAIN = 3.0, 0.1, 0.02
+"""Most that the maker's model is off: a factor either way, a share of a leg's masses; standard deviation of a drive's
+torque constant from the told one, relative."""
 LEG_KP, LEG_KD, LEG_MOST = 20.0, 1.5, np.array([23.7, 23.7, 45.43] * 2)
 LEG_ARMATURE = np.array([0.010, 0.018, 0.036] * 2)
 KT, OHM, VOLT, ARMATURE = 1.2116, 2.676, 7.4, 0.0284
@@ -182,14 +183,16 @@ def make(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     own, joints = KINDS[kind], KINDS[kind].joints
-    rng, maker, wish, read, harm = (
-        np.random.default_rng([seed, len(kind), kind == "arm", k]) for k in range(5)
+    rng, maker, wish, read, harm, made = (
+        np.random.default_rng([seed, len(kind), kind == "arm", k]) for k in range(6)
     )
     n = len(joints)
     if friction is None:
         friction = ("M1", LAWS[1 + seed // 2 % 3])[seed % 2] if kind == "leg" else LAWS[seed % 4]
     drives, rubs = _drives(kind, rng), law_of(kind, friction, rng)
     told = _Drives(drives.kp.copy(), drives.kd, drives.most, drives.armature, drives.told_kd)
+    true = 1.0 + GAIN * made.standard_normal(n)
+    drives.kp, drives.kd = drives.kp * true, drives.kd * true
     delay = rng.uniform(*LATE_S[kind])
     command_hz = float(rng.choice([50.0, 100.0])) if kind == "leg" else rate_hz
 

@@ -189,12 +189,13 @@ def scored(folder: Path, options: Options) -> list[Scored]:
     _, law = told_law(folder)
     parameters, plain = parameters_of(options.result), truth["law"] == "M1"
     acts = _each(truth, "kd") - _each(truth, "kp") * _each(truth, "loop_delay_s")
+    told = law.kd * _each(truth, "kp") / law.kp
     for j, (joint, own) in enumerate(truth["joints"].items()):
         gain = _found(parameters, joint, KD)
         wanted = {ARMATURE: own[ARMATURE], f"command_{DELAY}": own[DELAY], KP: own["kp"], KD: acts[j]}
         if plain:
             wanted[COULOMB] = own[COULOMB]
-            wanted[VISCOUS] = own[VISCOUS] + (0.0 if gain else acts[j] - law.kd[j])
+            wanted[VISCOUS] = own[VISCOUS] + (0.0 if gain else acts[j] - told[j])
         for stem, value in wanted.items():
             if (p := _found(parameters, joint, stem)) is not None:
                 name = p.get("parameter") or p["name"]
@@ -209,8 +210,8 @@ def curve_errors(folder: Path, options: Options) -> Array:
     """Error of each joint's friction over speed, a share of the curve: rms over the speeds of the fitted runs.
 
     MuJoCo tells what the fitted model and its drives, without an error of position, set against a speed. The true
-    drives' part is taken off, so that what a fit has too much or too little there counts as friction. The true curve is
-    the mean over the loads of the runs.
+    drives' part is taken off, so that what a fit has too much or too little there counts as friction. All torques share
+    the error of the position gain, which is taken off, too. The true curve is the mean over the loads of the runs.
     """
     truth, out = read_truth(folder), []
     m, _ = fitted_model(folder, options)
@@ -226,13 +227,14 @@ def curve_errors(folder: Path, options: Options) -> Array:
 
     acts = _each(truth, "kd") - _each(truth, "kp") * _each(truth, "loop_delay_s")
     rest = against(np.zeros(len(joints)))
+    gain = m.actuator_gainprm[: len(joints), 0] * m.actuator_gear[: len(joints), 0] ** 2 / _each(truth, "kp")
     for j, own in enumerate(truth["joints"].values()):
         curve = {
             name: np.array(own["friction"][name], float) for name in ("speed_rads", "torque_Nm", "samples")
         }
         only = np.eye(len(joints))[j]
         off = [
-            m.dof_frictionloss[dof[j]] + (against(v * only) - rest)[j] - acts[j] * v - torque
+            (m.dof_frictionloss[dof[j]] + (against(v * only) - rest)[j]) / gain[j] - acts[j] * v - torque
             for v, torque in zip(curve["speed_rads"], curve["torque_Nm"], strict=True)
         ]
         size = np.average(curve["torque_Nm"] ** 2, weights=curve["samples"])

@@ -31,13 +31,18 @@ limit = {LIMIT_NM}
 """
 
 
-def write_leg(folder: Path, seconds: float = 30.0, rate_hz: float = RATE_HZ) -> Path:
-    """Write ``leg.xml`` without rotors and friction, ``log.toml`` and ``log.csv``; return the folder."""
+def write_leg(
+    folder: Path, seconds: float = 30.0, rate_hz: float = RATE_HZ, drag: tuple[float, float] = (0.0, 0.0)
+) -> Path:
+    """Write ``leg.xml`` without rotors and friction, ``log.toml`` and ``log.csv``; return the folder.
+
+    ``drag`` has MuJoCo's damping of second and third degree in the speed.
+    """
     (folder / "leg.xml").write_text(LEG, encoding="utf-8")
     (folder / "log.toml").write_text(MAP, encoding="utf-8")
     spec = mujoco.MjSpec.from_string(LEG)
     for joint, rotor, dry, viscous in zip(spec.joints, ROTOR_KGM2, DRY_NM, VISCOUS, strict=True):
-        joint.armature, joint.frictionloss, joint.damping = rotor, dry, [viscous, 0.0, 0.0]
+        joint.armature, joint.frictionloss, joint.damping = rotor, dry, [viscous, *drag]
         joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
         actuator = spec.add_actuator(name=joint.name, target=joint.name, forcerange=[-LIMIT_NM, LIMIT_NM])
         actuator.trntype, actuator.biastype = mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtBias.mjBIAS_AFFINE

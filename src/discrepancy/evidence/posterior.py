@@ -278,6 +278,11 @@ class Posterior:
         U = L.forward(s[:, None] * G[self.active])
         return G - U.T @ U, b - U.T @ z
 
+    def conditional(self, columns: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Information matrix (k, k) and score (k,) of columns outside the model, with those in it marginalised."""
+        R, Q = self._conditional
+        return R[np.ix_(columns, columns)], Q[columns]
+
     def errors_of(self, columns: Sequence[int]) -> Array:
         """Standard errors of columns without a prior, each beside the active ones, shape (k,)."""
         R, _ = self._conditional

@@ -320,6 +320,9 @@ def effects_of(found: ArmCalibration) -> list[RobotEffect]:
                 q for q in found.parameters if q.place == p.place and q.name.startswith("viscous_")
             )
             numbers = {p.name: change, viscous.name: max(viscous.value, 0.0) - viscous.model}
+            if (law := found.friction.get(j - 1)) is not None:
+                numbers = {p.name: law[0] - p.model, viscous.name: max(law[1], 0.0) - viscous.model}
+                numbers |= {"quadratic": law[2], "cubic": law[3]}
             out.append(RobotEffect("friction", j, None, numbers, ""))
         elif p.name.startswith("armature_"):
             out.append(RobotEffect("armature", j, None, {p.name: change}, ""))

@@ -7,7 +7,7 @@ with wide priors around the given model. Rows are torques (``fit``), or position
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -52,6 +52,8 @@ class ArmCalibration:
             position gain, velocity gain with negative damping, torque added to it, and largest torque.
         covariance: posterior covariance of ``parameters``, in their order, shape (P, P).
         forecasts: of the first part; None unless positions are predicted.
+        friction: of joints whose friction deviates from its law, where positions are predicted: Coulomb friction and
+            damping of first to third degree in the speed, shape (4,).
     """
 
     model: SerialModel
@@ -71,6 +73,7 @@ class ArmCalibration:
     covariance: Array | None = None
     servos: Array | None = None
     forecasts: Forecasts | None = None
+    friction: Mapping[int, Array] = field(default_factory=dict)
 
 
 def calibrate_arm(
@@ -117,5 +120,5 @@ def calibrate_arm(
         model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
         len(trials.parts) > 1, names, tuple(notes), "position" if positions else "torque", fit.covariances(),
-        fit.servos(), fit.forecasts if isinstance(fit, LoopFit) else None,
+        fit.servos(), fit.forecasts if isinstance(fit, LoopFit) else None, fit.friction,
     )  # fmt: skip

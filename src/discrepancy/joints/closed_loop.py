@@ -225,7 +225,9 @@ class ClosedLoop:
             x * (1.0 + scale)[:, None] for x in derivatives(tree, s.q[at], s.dq[at], s.ddq[at])
         )
         K = stiffness[np.arange(N) // thin] + np.eye(J) * (free * kp)[:, None, :]
-        D = damping[np.arange(N) // thin] + np.eye(J) * (free * kd + (1.0 + scale) * tree.viscous)[:, None, :]
+        v = np.abs(s.dq)
+        rubbing = tree.viscous + 2.0 * tree.drag[:, 0] * v + 3.0 * tree.drag[:, 1] * v**2
+        D = damping[np.arange(N) // thin] + np.eye(J) * (free * kd + (1.0 + scale) * rubbing)[:, None, :]
         M = inertia[np.arange(N) // thin]
         A, B = midpoint(M, D, K, h)
         Q = np.tile(self.torque / h, (N, 1))

@@ -106,6 +106,7 @@ def machine(model: SerialModel, given: Tree, found: Tree) -> mujoco.MjModel:
     m.dof_armature[own] += found.armature - given.armature
     m.dof_frictionloss[own] += found.coulomb - given.coulomb
     m.dof_damping[own] += np.maximum(found.viscous, 0.0) - given.viscous
+    m.dof_dampingpoly[own] += found.drag - given.drag
     off = mujoco.mjtDisableBit
     for bit in (off.mjDSBL_CONTACT, off.mjDSBL_LIMIT, off.mjDSBL_ACTUATION, off.mjDSBL_AUTORESET):
         m.opt.disableflags |= int(bit)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from discrepancy.joints.causes import JointSignals
 from estimator.arrays import Array
@@ -96,6 +97,14 @@ def smooth(s: JointSignals) -> list[Array]:
     return [q, 1.5 * q**2 - 0.5, w, w**2 - 1.0, t, 1.5 * t**2 - 0.5, load, 2.0 * load**2 - 0.5, s.direction]
 
 
+def deviations(
+    signals: Sequence[JointSignals], coulomb: float, viscous: float, share: float, *, servo: bool
+) -> list[list[Array]]:
+    """The series of ``other_forms`` and, for a servo, of ``servo_forms``."""
+    servos = servo_forms(signals, coulomb, share) if servo else ()
+    return [*other_forms(signals, coulomb, viscous, share, share), *servos]
+
+
 def other_forms(
     signals: Sequence[JointSignals], coulomb: float, viscous: float, share: float, slow: float
 ) -> Iterator[list[Array]]:
@@ -122,17 +131,38 @@ def other_forms(
         ]
 
 
+def polynomial(signals: Sequence[JointSignals], torque: Sequence[Array], least: float) -> Array:
+    """Coulomb friction, and damping of first to third degree in the speed, nearest to a friction while it moves.
+
+    Args:
+        signals: signals of one joint, one for each log.
+        torque: its friction, one for each log.
+        least: least damping of the first degree; that of the third is not negative, so that friction grows in the end.
+
+    Returns:
+        The four numbers, as MJCF's ``frictionloss`` and ``damping`` have them.
+    """
+    A = np.concatenate([
+        np.column_stack([s.direction, s.v, s.v * np.abs(s.v), s.v**3])[np.abs(s.direction) == 1.0] for s in signals
+    ])  # fmt: skip
+    y = np.concatenate([x[np.abs(s.direction) == 1.0] for s, x in zip(signals, torque, strict=True)])
+    size = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
+    bounds = np.array([0.0, least, -np.inf, 0.0]) * size, np.inf
+    return np.asarray(lsq_linear(A / size, y, bounds).x / size)
+
+
 def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -> Iterator[list[Array]]:
     """Series of one standard deviation by which friction in a servo's gear may exceed Coulomb and viscous friction.
 
-    More at low speed (Stribeck), more under torque, and both together: the laws M4 and M5 of M. Duclusaud et al.,
-    "Extended friction models for the physics simulation of servo actuators", 2024.
+    With the square of the speed, more at low speed (Stribeck), more under torque, and the last two together: the laws
+    M4 to M6 of M. Duclusaud et al., "Extended friction models for the physics simulation of servo actuators", 2024.
 
     Args:
         signals: signals of one joint, one for each log.
         coulomb: Coulomb friction [N m].
         share: deviation relative to the friction, and to the torque.
     """
+    yield [coulomb * s.v * np.abs(s.v) / s.span.speed**2 for s in signals]
     for speed in (0.05, 0.2, 0.5):
         slow = [s.direction * np.exp(-np.abs(s.v) / (speed * s.span.speed)) for s in signals]
         yield [coulomb * x for x in slow]

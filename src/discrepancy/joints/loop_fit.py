@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.joints.closed_loop import ClosedLoop
-from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, Fit, HeldOut, Parameter, Scalar
+from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, LEARNING, Fit, HeldOut, Parameter, Scalar
 from discrepancy.joints.forecast import Forecasts, errors, machine
+from discrepancy.joints.friction import deviations, polynomial
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
-from discrepancy.joints.problem import MOMENTS, JointProblem
+from discrepancy.joints.problem import FORM, MOMENTS, JointProblem
 from discrepancy.joints.quantities import described
 from discrepancy.joints.servo import with_torques
 from discrepancy.joints.signals import REST
@@ -23,8 +24,6 @@ from mocobot_logs.joints.joint_log import JointLog
 
 LATE_S = 0.02
 """Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
-LEARNING = 4
-"""Steps in which the noise is learnt, too. Chosen: the fit settles only when it is held."""
 WIDE = 1.5
 """Least factor on standard errors that is told. Chosen: ten values of two parts scatter by less than that."""
 REST_SHARE = 0.05
@@ -67,16 +66,16 @@ class LoopFit(Fit):
 
     Attributes:
         loops: closed loops of the runs.
-        steps: steps done.
         widened: factor on the standard errors by quantity, see ``widen``.
         forecasts: what ``held_out`` keeps of the first part.
     """
 
     late_s = LATE_S
     forecasts: Forecasts | None = None
+    likeliest: tuple[float, Array, list[tuple[Array, Array]]]
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
-        self.loops, self.steps = [ClosedLoop.of(s) for s in trials.runs], 0
+        self.loops = [ClosedLoop.of(s) for s in trials.runs]
         self.widened: dict[str, float] = {}
         super().__init__(model, replace(trials, noise=(), kept=()))
         names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
@@ -101,7 +100,7 @@ class LoopFit(Fit):
         pairs = []
         for loop, s in zip(self.loops, runs, strict=True):
             dry = np.maximum(self.tree.coulomb, REST_SHARE * np.sqrt(np.mean(s.torque**2, axis=0)))
-            pairs.append((loop, loop.filtered(s, self.tree, scale, dry, REST * s.slow)))
+            pairs.append((loop, loop.filtered(s, self.with_friction(self.tree), scale, dry, REST * s.slow)))
         self.options = replace(self.options, noise=None, loops=pairs)
         parts = []
         for k, at in self.trials.parts:
@@ -111,17 +110,36 @@ class LoopFit(Fit):
         return super().linear()
 
     def step(self) -> float:
-        """Fit around the current values and motion, and move both; return the largest step in standard errors."""
+        """Fit around the current values and motion, and move both; return the largest step in standard errors.
+
+        Once the noise is held, a step that makes the positions less likely than before is halved.
+        """
+        begun = self.x, [(loop.q, loop.dq) for loop in self.loops]
         moved = super().step()
-        for t, (loop, filtered) in enumerate(self.options.loops):
-            lacking = self.problem.residual[t].copy()
-            for i, value in zip(self.columns(), self.x - self.at, strict=True):
-                for j, own in self.problem.series[i].items():
-                    lacking[:, j] -= value * own[t]
-            loop.move(filtered, lacking)
-            if self.steps < LEARNING:
-                loop.learn(filtered, lacking)
-        self.steps += 1
+        parts = range(len(self.normals))
+        self.friction = self.deviating(parts)
+        lacking = [own.copy() for own in self.problem.residual]
+        for i, value in self.explained(parts)[1]:
+            for j, series in self.problem.series[i].items():
+                for own, column in zip(lacking, series, strict=True):
+                    own[:, j] -= value * column
+        every = [
+            (loop, filtered, own) for (loop, filtered), own in zip(self.options.loops, lacking, strict=True)
+        ]
+        likelihood = sum(filtered.log_density(own, loop.off) for loop, filtered, own in every)
+        if self.steps > LEARNING + 1 and likelihood < self.likeliest[0]:
+            _, x, motions = self.likeliest
+            moved = float(np.max(np.abs(begun[0] - x) / np.sqrt(np.diag(self.covariance)))) / 2.0
+            self.x = 0.5 * (begun[0] + x)
+            for loop, *pairs in zip(self.loops, begun[1], motions, strict=True):
+                loop.q, loop.dq = (0.5 * (p + q) for p, q in zip(*pairs, strict=True))
+            self.jump(self.x)
+            return moved
+        self.likeliest = likelihood, *begun
+        for loop, filtered, own in every:
+            loop.move(filtered, own)
+            if self.steps <= LEARNING:
+                loop.learn(filtered, own)
         return moved if self.steps > LEARNING else np.inf
 
     def widen(self) -> None:
@@ -168,7 +186,7 @@ class LoopFit(Fit):
         """Position gain, velocity gain with negative damping, torque added, and largest torque, shape (J, 4)."""
         kp, kd, limit, _ = self.loops[0].gains(1)
         true = 1.0 / (1.0 + self.each("scale"))
-        damping = kd * true + np.minimum(self.tree.viscous, 0.0)
+        damping = kd * true + np.minimum(self.numbers().viscous, 0.0)
         return np.column_stack([kp * true, damping, -self.offset * true, limit * true])
 
     @property
@@ -178,9 +196,41 @@ class LoopFit(Fit):
         return np.array([own.get(f"{n} offset_Nm", 0.0) for n in self.model.joints])
 
     def numbers(self) -> Tree:
-        """The tree with the fitted lengths and gravity, too."""
-        names = ("mass", "com", "inertia", "armature", "coulomb", "viscous")
-        return replace(self.problem.parts[0].tree, **{name: getattr(self.tree, name) for name in names})
+        """The tree with the fitted lengths and gravity, too, and with friction as MJCF holds it."""
+        own = {
+            name: getattr(self.tree, name)
+            for name in ("mass", "com", "inertia", "armature", "coulomb", "viscous")
+        }
+        return self.with_friction(replace(self.problem.parts[0].tree, **own))
+
+    def with_friction(self, tree: Tree) -> Tree:
+        """A tree with the friction of joints that deviate from Coulomb and viscous friction."""
+        coulomb, viscous, drag = (a.copy() for a in (tree.coulomb, tree.viscous, tree.drag))
+        for j, law in self.friction.items():
+            coulomb[j], viscous[j], drag[j] = law[0], law[1], self.given.drag[j] + law[2:]
+        return replace(tree, coulomb=coulomb, viscous=viscous, drag=drag)
+
+    def deviating(self, parts: Sequence[int]) -> dict[int, Array]:
+        """Friction of the joints that deviate from Coulomb and viscous friction, from some parts, as ``friction``."""
+        out = dict[int, Array]()
+        if not len(self.laws):
+            return out
+        x, every = self.explained(parts)
+        size = {self.problem.labels[k]: value for k, value in every}
+        own = dict(zip((s.label for s in self.scalars), x[self.first :], strict=True))
+        tree = self.problem.parts[0].tree
+        for j in self.known:
+            n, signals = self.model.joints[j], self.problem.joints[j]
+            coulomb = self.given.coulomb[j] + own[f"{n} coulomb_Nm"]
+            viscous = self.given.viscous[j] + own[f"{n} viscous_Nms_per_rad"]
+            torque = [coulomb * s.direction + viscous * s.v for s in signals]
+            forms = deviations(signals, float(tree.coulomb[j]), float(tree.viscous[j]), FORM, servo=True)
+            told = {f"{n} form {i}": form for i, form in enumerate(forms) if f"{n} form {i}" in size}
+            for label, form in told.items():
+                torque = [t + size[label] * f for t, f in zip(torque, form, strict=True)]
+            if told:
+                out[j] = polynomial(signals, torque, self.least_damping(j))
+        return out
 
     def held_out(self) -> tuple[HeldOut, ...]:
         """Forecast the positions of each part from its commands, with values from the others."""
@@ -192,6 +242,7 @@ class LoopFit(Fit):
             loop = self.loops[k]
             self.x = self.solved([o for o in parts if o != t] or [t])[0]
             self.jump(self.x)
+            self.friction = self.deviating([o for o in parts if o != t] or [t])
             fitted, zero, late = (
                 machine(self.model, self.given, self.numbers()),
                 self.zero(),
@@ -210,6 +261,7 @@ class LoopFit(Fit):
             out.append(HeldOut(self.trials.names[t], model, none + np.nan, best, read, size))
         self.x = before
         self.jump(before)
+        self.friction = self.deviating(parts)
         return tuple(out)
 
     def notes(self) -> Iterator[str]:
@@ -224,6 +276,12 @@ class LoopFit(Fit):
                 f"Velocity gain and viscous friction of {', '.join(names)} have the same effect: only their sum is "
                 "determined. The viscous friction is told for the velocity gain of the map, 0 where it is free, which "
                 "is off by the same factor as the position gain."
+            )
+        if self.friction:
+            names = [self.model.joints[j] for j in self.friction]
+            yield (
+                f"Friction of {', '.join(names)} deviates from Coulomb and viscous friction. as_found.xml has Coulomb "
+                "friction and damping of third degree in the speed, the table the nearest Coulomb and viscous friction."
             )
         wide = {name: factor for name, factor in self.widened.items() if factor > WIDE}
         if wide:

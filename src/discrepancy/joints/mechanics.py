@@ -87,6 +87,7 @@ class Tree:
         gravity: in the world frame, shape (3,) [m/s^2].
         armature: reflected rotor inertia, shape (J,).
         coulomb, viscous: Coulomb friction [N m or N] and damping [N m s/rad or N s/m], shape (J,) each.
+        drag: damping of second and third degree in the speed, as of MJCF's ``damping``, shape (J, 2).
         coupling: how the N joints move with the J joints.
     """
 
@@ -105,6 +106,7 @@ class Tree:
     armature: Array
     coulomb: Array
     viscous: Array
+    drag: Array
     coupling: Coupling
 
     @classmethod
@@ -129,6 +131,7 @@ class Tree:
             armature=model.dof_armature @ size**2,
             coulomb=model.dof_frictionloss @ size,
             viscous=model.dof_damping @ size**2,
+            drag=np.column_stack([model.dof_dampingpoly[:, k] @ size ** (3 + k) for k in range(2)]),
             coupling=replace(c, own=np.arange(len(c.own)), ratio=c.ratio[order], offset=c.offset[order]),
         )
 

@@ -527,9 +527,8 @@ class _Builder:
                 shape=(("signal", float(number)),), late=True, family=f"angle of {n}" if read else "",
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
-            forms = friction.other_forms(self.joints[j], float(t.coulomb[j]), float(t.viscous[j]), FORM, FORM)
-            servo = friction.servo_forms(self.joints[j], float(t.coulomb[j]), FORM) if self.more.loops else ()
-            for i, x in enumerate((*forms, *servo)):
+            sizes, servo = (float(t.coulomb[j]), float(t.viscous[j])), bool(self.more.loops)
+            for i, x in enumerate(friction.deviations(self.joints[j], *sizes, FORM, servo=servo)):
                 self.add(f"{n} form {i}", 1.0, {j: x})
 
     def _kinds(self) -> None:

@@ -67,7 +67,8 @@ def with_stand(tree: Tree) -> Tree:
         slides=np.append(np.arange(WAYS) < 3, tree.slides), anchor=np.concatenate([none, tree.anchor]),
         axis=np.concatenate([np.eye(3), np.eye(3), tree.axis]), zero=np.append(few, tree.zero), mass=apart(tree.mass),
         com=apart(tree.com), inertia=apart(tree.inertia), armature=np.append(few, tree.armature),
-        coulomb=np.append(few, tree.coulomb), viscous=np.append(few, tree.viscous), coupling=coupling,
+        coulomb=np.append(few, tree.coulomb), viscous=np.append(few, tree.viscous),
+        drag=np.concatenate([np.zeros((WAYS, 2)), tree.drag]), coupling=coupling,
     )  # fmt: skip
 
 

@@ -127,6 +127,9 @@ def _at_joint(
         if min(coulomb, viscous) < 0:
             return False
         damping[0] = viscous
+        if "cubic" in effect.parameters:
+            damping = np.pad(damping, (0, 3 - damping.size))
+            damping[1:] += effect.number("quadratic"), effect.number("cubic")
         joint.frictionloss, joint.damping = coulomb, damping if damping.size > 1 else viscous
     elif effect.cause == "armature":
         joint.armature = max(float(joint.armature) + effect.number("armature"), 0.0)

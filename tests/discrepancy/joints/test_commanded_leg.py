@@ -15,7 +15,10 @@ import scipy.stats
 import mocobot
 from command import refused, run
 from discrepancy.joints.actuators import quantity_of, to_dict
+from discrepancy.joints.calibrated import as_found
 from discrepancy.joints.calibration import Parameter
+from discrepancy.joints.causes import JointSignals, Span
+from discrepancy.joints.friction import polynomial
 from estimator.errors import InputError
 from made_leg import DRY_NM, HEADER, KD, KP, LEG, LIMIT_NM, MAP, RATE_HZ, ROTOR_KGM2, VISCOUS, write_leg
 
@@ -266,3 +269,50 @@ def test_commands_of_the_wrong_sign_are_doubted(leg, tmp_path):
     np.savetxt(tmp_path / "log.csv", columns, delimiter=",", comments="", header=HEADER, fmt="%.8g")
     found = mocobot.calibrate(tmp_path / "log.csv", leg / "leg.xml", map=leg / "log.toml")
     assert any(said.startswith("It does not follow the motion") for said in found.findings)
+
+
+# Friction that deviates from Coulomb and viscous friction.
+
+
+def test_drag_with_the_square_of_the_speed_is_in_the_model_as_found(tmp_path):
+    """MuJoCo's own polynomial damping is the truth; the curve of friction over speed is compared, not its terms."""
+    drag = 0.015
+    folder = write_leg(tmp_path, 20.0, drag=(drag, 0.0))
+    calibration = mocobot.calibrate(folder / "log.csv", folder / "leg.xml")
+    assert any("deviates from Coulomb and viscous friction" in note for note in calibration.found.notes)
+    found = as_found(calibration.found)[0].compile()
+    values = {(p.place, p.name): p.value for p in calibration.found.parameters}
+    data, log = mujoco.MjData(found), np.genfromtxt(folder / "log.csv", delimiter=",", names=True)
+    for j, joint in enumerate(("hip", "knee")):
+        speeds = np.linspace(0.3, 0.8, 9) * np.abs(np.gradient(log[f"{joint}_q"], log["t"])).max()
+        true = DRY_NM[j] + VISCOUS[j] * speeds + drag * speeds**2
+        nearest = values[joint, "coulomb_Nm"] + values[joint, "viscous_Nms_per_rad"] * speeds
+        held = []
+        for speed in speeds:
+            data.qvel[:], data.qpos[:], data.ctrl[:] = np.eye(2)[j] * speed, 0.0, 0.0
+            mujoco.mj_forward(found, data)
+            held.append(
+                found.dof_frictionloss[j] - data.qfrc_passive[j] - found.actuator_biasprm[j, 2] * speed
+            )
+        # All torques share the error of the gain, and the loop's own damping is no friction.
+        gain = found.actuator_gainprm[j, 0] / KP
+        off, off_nearest = (
+            np.abs(x / true - 1.0).max() for x in (np.array(held) / gain - KD * speeds, nearest / gain)
+        )
+        assert off < min(0.02, 0.6 * off_nearest)
+
+
+def test_friction_nearest_to_a_polynomial_is_that_polynomial():
+    span = Span(torque=1.0, speed=2.0, acceleration=1.0, travel=1.0, middle=0.0, until_s=1.0)
+    v = np.concatenate([np.linspace(-3.0, -0.1, 40), np.linspace(0.1, 3.0, 40)])
+    none = np.zeros_like(v)
+    signals = JointSignals(none, v, none, np.sign(v), none, none, none, none, none, span)
+
+    def nearest(c: float, b: float, d: float, e: float) -> np.ndarray:
+        return polynomial([signals], [c * np.sign(v) + b * v + d * v * np.abs(v) + e * v**3], -0.2)
+
+    assert nearest(0.4, -0.1, 0.05, 0.02) == pytest.approx([0.4, -0.1, 0.05, 0.02])
+    at_bounds = nearest(0.1, -0.3, 0.2, -0.05)
+    assert at_bounds[1] >= -0.2
+    assert at_bounds[3] >= 0.0
+    assert at_bounds[0] >= 0.0
