@@ -12,7 +12,7 @@ or held at the calibration from another payload's recordings.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -198,7 +198,7 @@ class PaperPlan:
         ]
 
     def teams(self) -> list[list[SensorPreset]]:
-        """Groups of presets that share robots, effects and trials, each in the order of ``PRESETS`` (worst sensors last)."""
+        """Groups of presets that share robots, effects and trials, each in the order of ``PRESETS`` (worst last)."""
         groups: dict[Any, list[SensorPreset]] = {}
         for name in sorted(self.presets, key=[*PRESETS, SCATTERED].index):
             preset = preset_named(name)

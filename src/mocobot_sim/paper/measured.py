@@ -86,7 +86,10 @@ def entry(errors: Mapping[str, Any], path: str) -> tuple[float | None, float | N
 
 
 def agreement(
-    scores: Mapping[str, Mapping[str, Any]], trials: int, drawn: bool, teams: Mapping[str, Any] | None = None
+    scores: Mapping[str, Mapping[str, Any] | None],
+    trials: int,
+    drawn: bool,
+    teams: Mapping[str, Any] | None = None,
 ) -> list[Agreement]:
     """Compare one column with Tables II-V.
 
@@ -102,9 +105,9 @@ def agreement(
     for table, paths in ENTRIES.items():
         count = 2 * max(1, trials // 2) if table == "V" else trials
         pulls, logs, ratios = [], [], []
-        for payload in scores:
-            for k, path in enumerate(paths):
-                theirs, ours = entry(published_errors(payload), path), entry(scores[payload], path)
+        for payload, errors in scores.items():
+            for k, path in enumerate(paths if errors else ()):
+                theirs, ours = entry(published_errors(payload), path), entry(errors or {}, path)
                 if theirs[0] is None or ours[0] is None:
                     continue
                 noise = (theirs[1] or 0.0) ** 2 / TRIALS + (ours[1] or 0.0) ** 2 / count

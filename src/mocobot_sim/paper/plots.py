@@ -19,7 +19,8 @@ COLOURS = {
     SELF_CALIBRATED: "#a6407d", TRANSFER: "#a6407d",
 }  # fmt: skip
 MARKERS = {
-    "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SCATTERED: "P", SELF_CALIBRATED: "^", TRANSFER: "^",
+    "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SCATTERED: "P",
+    SELF_CALIBRATED: "^", TRANSFER: "^",
 }  # fmt: skip
 HOLLOW = (ONE_FIT, TRANSFER)
 DPI = 130
