@@ -425,8 +425,8 @@ class Paper(Options):
 
     payload: tuple[str, ...] = ("a", "b", "c", "d")
     """Payload configurations."""
-    preset: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")
-    """Sensor presets."""
+    preset: tuple[str, ...] = ("ideal", "nominal", "uncalibrated", "scattered")
+    """Sensor presets; scattered: uncalibrated, with the effects that scatter the paper's trials."""
     trials: int = 6
     """Random trials per payload; half as many periodic trials are added."""
     seed: int = 0

@@ -12,7 +12,7 @@ from mocobot_report.charts import Chart, Key, Trace, column_axis, dots, log_axis
 from mocobot_report.folder import Paper, Result
 from mocobot_report.numbers import PLUS_MINUS, about, plain, spelled, spelled_text
 from mocobot_report.tables import Entry, Num, distance, mass, moment, place, quantity, value
-from mocobot_sim.paper.experiment import ONE_FIT, SELF_CALIBRATED, TRANSFER
+from mocobot_sim.paper.experiment import ONE_FIT, SCATTERED, SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.scoring import SPRING_SCALE, payload_truth
 from mocobot_sim.paper.tables import (
     BY_ENCODERS,
@@ -30,7 +30,7 @@ from mocobot_view.pictures import team_shot
 COLUMNS = {
     "paper": ("paper", "diamond"), "ideal": ("ideal", "triangle-down"), "nominal": ("nominal", "circle"),
     "uncalibrated": ("uncalibrated", "square"), ONE_FIT: ("nominal", "circle-open"),
-    SELF_CALIBRATED: ("c1", "triangle-up"), TRANSFER: ("c1", "triangle-up-open"),
+    SCATTERED: ("c2", "x"), SELF_CALIBRATED: ("c1", "triangle-up"), TRANSFER: ("c1", "triangle-up-open"),
 }  # fmt: skip
 """Colour and marker of each column of the tables: the paper, presets and fits."""
 OTHER_COLOURS, OTHER_MARKERS = ("c1", "c2"), ("triangle-up", "circle-open", "x")
@@ -38,6 +38,7 @@ SENSORS = {
     "ideal": "exact sensors",
     "nominal": "16-bit encoders and noisy torques in steps of 0.01 N m",
     "uncalibrated": "the same on robots with calibration errors of about 1 deg, 2 % of spring stiffness and 1 mm",
+    SCATTERED: "the uncalibrated team with play of its gimbals' encoders and the like, which scatter its trials",
     ONE_FIT: "the nominal team, estimated by one fit of three trials in place of the paper's stages",
     SELF_CALIBRATED: "the uncalibrated team, calibrated on three of its own recordings and nothing else",
     TRANSFER: "the uncalibrated team as one payload has calibrated it, carrying the others",

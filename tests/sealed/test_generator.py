@@ -1,12 +1,16 @@
 """The blind generator: equal bits, sealed truth, limits; and that what hides and what finds share no code."""
 
+import ast
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import discrepancy.team.causes
+import mocobot_sim.effects
 from discrepancy.team.causes import CAUSES
-from hidden import LIMITS, HiddenSet, Schedule, generate, ground_of, pendulum_limit_kg
+from hidden import LIMITS, HiddenSet, Schedule, Sealed, generate, ground_of, pendulum_limit_kg
 from mocobot.campaign.effects import draw_effect
 from mocobot_sim.effects import EFFECTS
 
@@ -27,6 +31,18 @@ def test_equal_requests_give_equal_bits():
     assert other[1].open({}) != first[1].open({})
 
 
+def test_recordings_do_not_say_what_is_hidden():
+    recordings, _ = generated(tiny_set(3))
+    assert len(recordings) == 2
+    for recording in recordings:
+        assert not [cause for cause in EFFECTS if cause in recording.metadata.to_json() + recording.name]
+
+
+def test_truth_is_sealed_without_a_verdict():
+    with pytest.raises(ValueError, match="sealed"):
+        Sealed({"effects": []}).open(None)
+
+
 def test_pendulum_is_measured_by_the_limit_of_its_own_length():
     """A slow one is hardly excited, and has to be twice as heavy to be seen."""
     assert pendulum_limit_kg(0.2) == LIMITS["slosh"]["mass_kg"]
@@ -38,4 +54,29 @@ def test_pendulum_is_measured_by_the_limit_of_its_own_length():
 
 
 def test_every_cause_has_a_limit_and_an_effect():
-    assert set(LIMITS) == set(CAUSES) == set(EFFECTS) - {"law"}
+    assert set(LIMITS) == set(CAUSES) == set(EFFECTS) - {"law", "zero_scatter", "encoder_play"}
+
+
+def imports(package) -> dict[str, set[str]]:
+    """Modules imported by every module of a package."""
+    out = {}
+    for path in Path(package.__file__).parent.glob("*.py"):
+        names = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
+        out[path.name] = names
+    assert len(out) > 5
+    return out
+
+
+@pytest.mark.parametrize(
+    ("package", "forbidden"),
+    [(discrepancy.team.causes, "mocobot_sim"), (mocobot_sim.effects, "discrepancy")],
+    ids=["causes", "effects"],
+)
+def test_what_hides_and_what_finds_share_no_code(package, forbidden):
+    for module, names in imports(package).items():
+        assert not [name for name in names if name.split(".")[0] == forbidden], module

@@ -13,11 +13,19 @@ from mocobot.checks import SCORES
 from mocobot.cluster import workers_of
 from mocobot.options import Paper
 from mocobot.results import NAME, folder_provenance, provenance, run_key
-from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
+from mocobot_sim.effects import apply_effects
+from mocobot_sim.paper.experiment import (
+    SCATTERED,
+    PaperPlan,
+    PaperResult,
+    preset_named,
+    run_paper,
+    scattering,
+)
+from mocobot_sim.paper.measured import agreement, format_agreement
 from mocobot_sim.paper.store import Store
 from mocobot_sim.paper.tables import format_summary, format_tables
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import draw_units
 from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
 
@@ -38,8 +46,13 @@ class Experiment:
     store: Store | None
 
     def __str__(self) -> str:
-        """Return the tables and their summary."""
-        return f"{format_tables(self.result.scores)}\n\n{format_summary(self.result.scores)}"
+        """Return the tables, their summary, and how well they agree with the published ones."""
+        scores, trials = self.result.scores, self.plan.trials
+        columns = {
+            preset: agreement(scores[preset], trials, not preset_named(preset).calibrated)
+            for preset in self.plan.presets
+        }
+        return f"{format_tables(scores)}\n\n{format_summary(scores)}\n\n{format_agreement(columns)}"
 
     @property
     def physics(self) -> str:
@@ -89,9 +102,12 @@ class Experiment:
         written = []
         for payload in self.plan.payloads:
             for preset in self.plan.presets:
-                units = draw_units(payload, sensor_preset(preset), self.plan.seed)
-                truth = GroundTruth.of(build_team(payload, units))
+                units = draw_units(payload, preset_named(preset), self.plan.seed)
                 for recording in self.result.recordings[preset][payload]:
+                    trial = recording.metadata.trial
+                    number = int(recording.name.split("_")[1].removeprefix(trial))
+                    effects = scattering(payload, trial, number) if preset == SCATTERED else ()
+                    truth = GroundTruth.of(apply_effects(build_team(payload, units), effects))
                     path = folder / f"{recording.name}.parquet"
                     write_recording(recording, path)
                     write_truth(truth, path)

@@ -12,7 +12,7 @@ or held at the calibration from another payload's recordings.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -31,7 +31,10 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.files import ends_with_this
 from estimator.recording.model import Recording
 from estimator.signals import process_recording
-from mocobot_sim.paper.scoring import TrialSummary, payload_truth, score, score_fit
+from mocobot_sim.effects import EFFECTS, Effect, make_effect
+from mocobot_sim.effects.base import JOINTS
+from mocobot_sim.paper.measured import simulated
+from mocobot_sim.paper.scoring import PAYLOADS, TrialSummary, payload_truth, score, score_fit
 from mocobot_sim.paper.store import Progress, Store, Work
 from mocobot_sim.scene.models import payload_path
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
@@ -40,10 +43,37 @@ from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
 ONE_FIT = "nominal, one fit"
 SELF_CALIBRATED = "uncalibrated, self-calibrated"
 TRANSFER = "uncalibrated, transfer"
+ROBOTS, KINDS = 3, ("random", "static", "periodic")
 COLUMNS = {"nominal": (ONE_FIT,), "uncalibrated": (SELF_CALIBRATED, TRANSFER)}
 """Columns with results of joint fits, by preset."""
+SCATTERED = "scattered"
+"""Preset of this experiment alone: the uncalibrated robots with the effects of ``simulated.toml``."""
 NO_SPREAD = Prior().scaled(0.0)
 """Prior that holds all robots exactly at the design."""
+
+
+def preset_named(name: str) -> SensorPreset:
+    """Look up a preset by name, ``SCATTERED`` included.
+
+    Raises:
+        InputError: there is no such preset.
+    """
+    return replace(sensor_preset("uncalibrated"), name=name) if name == SCATTERED else sensor_preset(name)
+
+
+def scattering(payload: str, trial: str, number: int) -> list[Effect]:
+    """Effects of the preset ``SCATTERED`` in one trial: each on every robot and, if it has a joint, on every joint."""
+    draw = 1 + PAYLOADS.index(payload) + len(PAYLOADS) * (KINDS.index(trial) + len(KINDS) * number)
+    found = []
+    for cause, parameters in simulated()["effects"].items():
+        drawn = {"draw": draw} if "draw" in EFFECTS[cause].parameter_names() else {}
+        joints = range(1, JOINTS + 1) if "joint" in EFFECTS[cause].place_names() else (None,)
+        found += [
+            make_effect(cause, {**parameters, **drawn}, robot, joint)
+            for robot in range(1, ROBOTS + 1)
+            for joint in joints
+        ]
+    return found
 
 
 def three_trials(recordings: Sequence[Recording]) -> list[Recording]:
@@ -115,7 +145,7 @@ class PaperPlan:
     """
 
     payloads: tuple[str, ...] = ("a", "b", "c", "d")  # names of shipped payloads
-    presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")  # names of sensor presets
+    presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated", SCATTERED)  # names of sensor presets
     # random trials per payload; half as many trials (at least one) are periodic, as in the paper (6 and 3)
     trials: int = 6
     seed: int = 0  # seed of all random numbers
@@ -128,7 +158,7 @@ class PaperPlan:
         for payload in self.payloads:
             payload_path(payload)
         for preset in self.presets:
-            sensor_preset(preset)
+            preset_named(preset)
         for name, values in (("payload", self.payloads), ("preset", self.presets)):
             if not values:
                 raise InputError(f"no {name} given; name at least one")
@@ -168,10 +198,11 @@ class PaperPlan:
         ]
 
     def teams(self) -> list[list[SensorPreset]]:
-        """Groups of presets that share robots and trials, each in the order of ``PRESETS`` (worst sensors last)."""
+        """Groups of presets that share robots, effects and trials, each in the order of ``PRESETS`` (worst last)."""
         groups: dict[Any, list[SensorPreset]] = {}
-        for name in sorted(self.presets, key=list(PRESETS).index):
-            groups.setdefault(sensor_preset(name).spread, []).append(sensor_preset(name))
+        for name in sorted(self.presets, key=[*PRESETS, SCATTERED].index):
+            preset = preset_named(name)
+            groups.setdefault((preset.spread, name == SCATTERED), []).append(preset)
         return list(groups.values())
 
 
@@ -275,7 +306,7 @@ def _scores(plan: PaperPlan, result: PaperResult) -> dict[str, dict[str, dict[st
     """Score all results, in the order of the presets, each followed by its joint fits."""
     scores: dict[str, dict[str, dict[str, Any] | None]] = {}
     for preset in plan.presets:
-        units = {payload: draw_units(payload, sensor_preset(preset), plan.seed) for payload in plan.payloads}
+        units = {payload: draw_units(payload, preset_named(preset), plan.seed) for payload in plan.payloads}
         scores[preset] = {
             payload: score(estimate, payload_truth(payload), units[payload])
             for payload, estimate in result.estimates[preset].items()
@@ -304,7 +335,9 @@ def _trial(
     def tell(done: int, samples: int) -> None:
         share[0] = done / samples
 
-    done = simulate(request, team, X_1i, progress=tell)
+    key = request.payload, request.trial, request.number
+    effects = scattering(*key) if team[-1].name == SCATTERED else ()
+    done = simulate(request, team, X_1i, progress=tell, effects=effects)
     summary = TrialSummary(
         name=f"{request.payload} {request.trial} {request.number} {team[-1].name}",
         rotation_deg=float(np.rad2deg(np.linalg.norm(done.log.payload_rotation(), axis=1).max())),

@@ -9,16 +9,18 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
-from mocobot_sim.paper.experiment import ONE_FIT, SELF_CALIBRATED, TRANSFER
+from mocobot_sim.paper.experiment import ONE_FIT, SCATTERED, SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.tables import BY_ENCODERS, MOMENTS, AllScores, Row, paper_tables, spring_share
 from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 COLOURS = {
     "paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", ONE_FIT: "#2f6fd0", "uncalibrated": "#e07b39",
+    SCATTERED: "#8a5a2b",
     SELF_CALIBRATED: "#a6407d", TRANSFER: "#a6407d",
 }  # fmt: skip
 MARKERS = {
-    "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SELF_CALIBRATED: "^", TRANSFER: "^",
+    "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SCATTERED: "P",
+    SELF_CALIBRATED: "^", TRANSFER: "^",
 }  # fmt: skip
 HOLLOW = (ONE_FIT, TRANSFER)
 DPI = 130
