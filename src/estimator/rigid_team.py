@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from estimator import so3
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.dynamics import rotation
+from estimator.arm.motion import COUNT as SLOTS
 from estimator.arm.motion import ArmData, arm_data
 from estimator.arm.unit import Arms, levelled
 from estimator.arrays import Array, inertia_matrix
@@ -333,12 +334,14 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 def robot_data(s: Array, arms: Arms) -> ArmData:
     """Return poses in level base frames, twists and wrenches of robots with true signals s, shape (Q, ..., 21).
 
-    ``arms`` describes one robot, or all robots in the axis before the last.
+    ``arms`` describes one robot, or all robots in the axis before the last. Of driving bases s has 30 entries, the last
+    nine as ``arm_data`` takes them; poses then are in the base frames at the start.
     """
-    phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
-        s.reshape(*s.shape[:-1], 7, 3), -2, 0
+    phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau, *_ = np.moveaxis(
+        s.reshape(*s.shape[:-1], -1, 3), -2, 0
     )
-    data = arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, arms)
+    base = s[..., SLOTS:] if s.shape[-1] > SLOTS else None
+    data = arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, arms, base)
     R_bi, h = levelled(arms, data.R_bi, data.h)
     return data._replace(R_bi=R_bi, h=h)
 

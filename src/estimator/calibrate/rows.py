@@ -24,7 +24,7 @@ class Rows:
     """Thinned signals of one trial, and the linear map from them to rows.
 
     Attributes:
-        s: filtered readings with rates and accelerations, shape (q, N, 21).
+        s: filtered readings with rates and accelerations, shape (q, N, 21); (q, N, 30) with those of driving bases.
         operator: matrix from the q instants to rows, shape (n, q); rows in motion first.
         time: middle of every row [s], shape (n,).
         moving: number of rows in motion.
@@ -34,7 +34,14 @@ class Rows:
         travel: path of each driven and gimbal joint during a row [rad], shape (n, N, 6).
         rate_hz: sampling rate.
         repeats: number of times that the same rounding errors occur in a periodic motion, shape (N, 9) or 1.
+        scaled: of driving bases, change of pose, rate and acceleration by errors of scale of the odometry (yaw, x, y),
+            shape (q, N, 3, 9); None for bases that stand.
     """
+
+    @property
+    def driven(self) -> bool:
+        """Whether the bases drive."""
+        return self.scaled is not None
 
     s: Array
     operator: csr_array
@@ -45,6 +52,7 @@ class Rows:
     travel: Array
     rate_hz: float
     repeats: Array | float
+    scaled: Array | None = None
 
     def __call__(self, x: Array) -> Array:
         """Average samples into rows, shape (q, ...) -> (n, ...)."""
@@ -57,6 +65,7 @@ class Rows:
         return replace(
             self,
             s=self.s[needed],
+            scaled=None if self.scaled is None else self.scaled[needed],
             operator=csr_array(operator[:, needed]),
             time=self.time[chosen],
             moving=int(np.sum(chosen < self.moving)),
@@ -77,12 +86,17 @@ class Rows:
             for k, part in enumerate((value, speed, differentiate(speed, rate))):
                 s[..., first + 3 * k : first + 3 * k + 3] = part
         s[..., 18:] = low_pass(recording.tau, rate, cutoff)
+        scaled, joints = None, angles
+        if recording.base is not None:
+            base = with_rates(low_pass(recording.base, rate, cutoff), rate)
+            s, scaled = np.concatenate([s, base], axis=2), with_rates(_scaled(base, rate), rate)
+            joints = np.concatenate([angles, recording.base], axis=2)
 
         stride = max(1, round(rate / rules.SAMPLE_HZ))
         kernel, spacing = _kernel(rate / stride)
         half = len(kernel) // 2
         trim = round(rules.TRIM_S * rate)
-        holds, still = _holds(angles, rate, trim)
+        holds, still = _holds(joints, rate, trim)
         at = np.arange(0, len(angles), stride)
         first, last = max(-(-trim // stride), half), min((len(angles) - trim) // stride, len(at) - half)
         rows: list[tuple[NDArray[np.intp], Array]] = []
@@ -126,8 +140,24 @@ class Rows:
             np.array(length, dtype=np.intp),
             travel * span[:, None, None],
             rate,
-            _repeats(angles[trim : len(angles) - trim][~still[trim : len(angles) - trim]], rate),
+            scaled=None if scaled is None else scaled[at],
+            repeats=_repeats(angles[trim : len(angles) - trim][~still[trim : len(angles) - trim]], rate),
         )
+
+
+def with_rates(pose: Array, rate_hz: float) -> Array:
+    """Append rates and accelerations, shape (Q, ..., 3) -> (Q, ..., 9)."""
+    speed = differentiate(pose, rate_hz)
+    return np.concatenate([pose, speed, differentiate(speed, rate_hz)], axis=-1)
+
+
+def _scaled(base: Array, rate_hz: float) -> Array:
+    """Return the change of poses (Q, N, 9) per relative error of the motion in yaw, x and y, shape (Q, N, 3, 3)."""
+    (x_dot, y_dot, turn), yaw = np.moveaxis(base[..., 3:6], -1, 0), base[..., 2]
+    cos, sin, turned = np.cos(yaw), np.sin(yaw), yaw - yaw[0]
+    along, across, none = cos * x_dot + sin * y_dot, cos * y_dot - sin * x_dot, np.zeros_like(yaw)
+    rows = [[-turned * y_dot, turned * x_dot, turn], [cos * along, sin * along, none], [-sin * across, cos * across, none]]
+    return np.asarray(np.cumsum(np.moveaxis(np.array(rows), (0, 1), (2, 3)), axis=0) / rate_hz)
 
 
 def _repeats(angles: Array, rate_hz: float) -> Array | float:

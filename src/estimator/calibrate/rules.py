@@ -86,3 +86,12 @@ SUFFICES = 0.99
 """Share of a misfit that a change in one recording must explain to be reported, if it does not explain all of it.
 Measured: slips of 0.2 to 1 deg explain 0.9999 and more by derivatives. If a joint rubs in all recordings, the best
 change explains 0.07."""
+ODOMETRY_RATIO = 0.01
+"""Standard deviation of the relative errors of a driving base's odometry, in yaw, x and y. Chosen: tolerance of wheels.
+"""
+ROCKING_S = 0.5
+"""Time in which a base forgets how it rocks on its wheels. Chosen: that of commanded motion, which moves the load."""
+LOST = 0.1
+"""Standard deviation of a base's error [m, rad] at the start of rows that follow others of the same trial. Chosen."""
+DRIFT_LOG = 2.0
+"""Standard deviation of the logarithms of what is learnt of the bases' errors. Chosen."""
