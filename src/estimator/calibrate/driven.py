@@ -1,10 +1,10 @@
 """Rows of a trial whose bases drive: errors of their odometry as unknowns that are eliminated row by row.
 
 The pose of base i, by its odometry, is wrong by a small motion d_i = (a, b): a rotation a and a displacement b of the
-base's origin, in its frame at the start. In x, y and yaw d_i is a random walk, which slip of the wheels drives. A wrong
+base's place on the floor, in its frame at the start. In x, y and yaw d_i is a random walk, which slip of the wheels drives. A wrong
 yaw turns later displacements, too. About x, about y and along z a base rocks on its wheels: a first-order
 autoregression. Slip also makes the accelerations of every row wrong, independently from row to row. Three scales of
-each odometry (yaw, x, y) are wrong for the whole trial.
+each odometry (yaw, x, y) are wrong for the whole trial, and a base tilts in proportion to its load.
 
 Given all other unknowns, the states of successive rows form a chain, so the normal equations are block tridiagonal.
 Eliminating the states (block LDL^T, as in a Kalman smoother) leaves the sum of squares by the other unknowns.
@@ -24,8 +24,10 @@ from estimator.calibrate import rules
 
 STATES = 6
 """Errors of one base in a row: rotation about x, y and z [rad], displacement along x, y and z [m]."""
-SCALES = 3
-"""Errors of scale of one odometry: yaw, x, y."""
+SCALES, PATHS = 5, 3
+"""Constants of one base: errors of scale of its odometry (yaw, x, y), which change its path, and how it rocks: tilt by
+its acceleration [rad s^2/m] and by the moment of the load [rad/(N m)].
+"""
 _WALKS, _ROCKS = np.array([2, 3, 4]), np.array([0, 1, 5])
 
 
@@ -50,7 +52,7 @@ class Driven:
 
     Attributes:
         by_states: shape (n, C, 6 N).
-        by_scales: shape (n, C, 3 N).
+        by_scales: by the constants of every base, shape (n, C, 5 N).
         by_jolts: of the balance by errors of acceleration (x, y, yaw), shape (n, 6, 3 N); zero in holds.
         moved: displacement of every base since the row before [m], shape (n, N, 2).
         time: middle of every row [s], shape (n,).
@@ -80,7 +82,7 @@ class Driven:
     def chain(self, drift: Drift) -> tuple[Array, Array]:
         """Return, of rows in order of time, transition from the row before (n, 6 N, 6 N) and precision of what is new in a row (n, 6 N)."""
         n, N = self.moved.shape[:2]
-        after = np.maximum(np.diff(self.time, prepend=self.time[0] - rules.ROW_S), 1e-3)
+        after = np.maximum(np.diff(self.time, prepend=self.time[0] - rules.DRIVEN_ROW_S), 1e-3)
         same = np.exp(-after / rules.ROCKING_S)
         step, variance = np.zeros((n, N, STATES, N, STATES)), np.zeros((n, N, STATES))
         for i in range(N):
@@ -102,7 +104,7 @@ class Eliminated(NamedTuple):
     Attributes:
         gram: of the other unknowns and the residual, shape (K + 1, K + 1).
         states: the errors at zero change of the other unknowns, shape (n, 6 N).
-        scales: the errors of scale, shape (3 N,).
+        scales: the constants of every base, shape (5 N,).
         log_evidence: logarithm of the density of the residual, up to a constant.
     """
 
@@ -149,7 +151,8 @@ def eliminated(J: Array, residual: Array, covariance: Array, driven: Driven, dri
             right[k + 1] += ahead[k] @ x[:, : rest.shape[2]]
         solved.append(x)
     scale = slice(K, K + S)
-    gram[range(K, K + S), range(K, K + S)] += 1.0 / rules.ODOMETRY_RATIO**2
+    sd = np.tile([*[rules.ODOMETRY_RATIO] * 3, *rules.ROCKS], S // SCALES)
+    gram[range(K, K + S), range(K, K + S)] += 1.0 / sd**2
     kept = np.r_[0:K, K + S]
     lower = cho_factor(gram[scale, scale])
     x = cho_solve(lower, gram[scale][:, kept])
@@ -160,7 +163,7 @@ def eliminated(J: Array, residual: Array, covariance: Array, driven: Driven, dri
         own_part = solved[k][:, K : K + S] @ scales + solved[k][:, K + S]
         states[k] = -own_part - (solved[k][:, rest.shape[2] :] @ states[k + 1] if k < n - 1 else 0.0)
     states[order] = states.copy()
-    log_det += 2.0 * np.log(np.diag(lower[0])).sum() + 2.0 * S * np.log(rules.ODOMETRY_RATIO)
+    log_det += 2.0 * np.log(np.diag(lower[0])).sum() + 2.0 * np.log(sd).sum()
     log_det += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum() - np.log(precision).sum()
     return Eliminated(left, states, scales, -0.5 * (float(left[-1, -1]) + float(log_det)))
 

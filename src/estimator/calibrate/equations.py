@@ -31,7 +31,7 @@ from estimator.arm.motion import COUNT as SLOTS
 from estimator.arm.unit import AT, COUNT, ArmUnit, true_joints
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.driven import SCALES, STATES, Drift, Driven
+from estimator.calibrate.driven import PATHS, SCALES, STATES, Drift, Driven
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.rigid_team import (
     Bases,
@@ -328,11 +328,12 @@ class TrialEquations:
         return Rowed(residual, by_units, by_carried, by_bases, covariance, scatter, adjusted, driven)
 
     def _explained(self, driven: Driven, wrong: tuple[Array, Array]) -> Array:
-        """Return the part of the residual that errors of the bases explain, shape (n, C)."""
+        """Return the part of the residual that errors of the bases' path explain, shape (n, C)."""
         known = np.zeros((*self.rows.s.shape[:2], STATES))
         known[..., _PLANAR] = self._path(wrong[0], 0.0 * wrong[1])[..., :3]
         walked = self.rows(known).reshape(len(wrong[0]), -1)
-        return np.einsum("nck,nk->nc", driven.by_states, walked) + driven.by_scales @ wrong[1]
+        path = wrong[1].reshape(-1, SCALES) * (np.arange(SCALES) < PATHS)
+        return np.einsum("nck,nk->nc", driven.by_states, walked) + driven.by_scales @ path.ravel()
 
     @property
     def _scaled(self) -> Array:
@@ -347,7 +348,7 @@ class TrialEquations:
         middle, out = self.rows(at)[order], np.zeros((*self.rows.s.shape[:2], 9))
         for i, k in np.ndindex(planar.shape[1:]):
             out[:, i, k] = np.interp(at, middle, planar[order, i, k])
-        return out + np.einsum("qnak,na->qnk", self._scaled, scales.reshape(-1, SCALES))
+        return out + np.einsum("qnak,na->qnk", self._scaled[:, :, :PATHS], scales.reshape(-1, SCALES)[:, :PATHS])
 
     def _driven(self, s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> Driven:
         """Return derivatives by errors of the bases at mean signals s."""
@@ -358,7 +359,8 @@ class TrialEquations:
         by_scales = np.zeros((n, 6 * N, N, SCALES))
         here, before = self._balance(s, units, shared), self.residual(units, shared, bases)
         for i in range(N):
-            lever = data.h[:, i] - s[:, i, SLOTS : SLOTS + 3] * [1.0, 1.0, 0.0]
+            arm = data.h[:, i] - s[:, i, SLOTS : SLOTS + 3] * [1.0, 1.0, 0.0]
+            lever = arm - [0.0, 0.0, rules.FLOOR_M]
             turned = skew(np.eye(3))[:, None] @ data.R_bi[:, i]
             apart = np.cross(np.eye(3)[:, None], lever)
             R = np.concatenate([turned, np.zeros_like(turned)])
@@ -367,13 +369,21 @@ class TrialEquations:
             of_base = ArmData(R, h, none, none, none)
             changed = _chain(i, of_base, data.R_bi[:, i], motion, shared, bases, units.gravity_mps2)
             by_states[:, :, i] = np.moveaxis(changed, 0, -1)
+            ahead = s[:, i, SLOTS + 6 : SLOTS + 9] * [1.0, 1.0, 0.0]
+            load = -times(data.R_bi[:, i], data.wrench[:, i, 3:])
+            for k, tilt in enumerate((np.cross([0.0, 0.0, 1.0], ahead), cross(arm, load) * [1.0, 1.0, 0.0])):
+                by_scales[:, :, i, PATHS + k] += np.einsum("nck,nk->nc", by_states[:, :, i, :3], tilt)
             for k in range(3):
                 jolted = s.copy()
                 jolted[:, i, SLOTS + 6 + k] += _JOLT
                 by_jolts[:, :, i, k] = (self._balance(jolted, units, shared) - here) / _JOLT
+            for k in range(PATHS + 1):
                 path = np.zeros((*self.rows.s.shape[:2], 9))
                 path[:, i] = _SCALE * self._scaled[:, i, k]
                 by_scales[:, :, i, k] = (self.residual(units, shared, bases, path) - before) / _SCALE
+            # Rocking with the acceleration moves the wrist, whose acceleration enters the balance.
+            by_scales[:, :-6, i, PATHS] = 0.0
+            by_scales[:, -6:, i, PATHS] *= lever[:, None, 2]
         by_jolts[self.rows.moving :] = 0.0
         order = np.argsort(self.rows.time)
         place, moved = s[order][..., SLOTS : SLOTS + 2], np.empty((n, N, 2))

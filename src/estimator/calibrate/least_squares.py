@@ -473,7 +473,7 @@ class Fit:
         return CalibratedPayload(label, grasps, shared.pi, covariance, self.by_scale[of])
 
 
-def fit(given: Given, learn: int = 2) -> Fit:
+def fit(given: Given, learn: int = 1) -> Fit:
     """Minimize the sum of squares of a calibration; learn the errors of driving bases so many times.
 
     Raises:

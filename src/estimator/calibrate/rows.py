@@ -35,7 +35,7 @@ class Rows:
         rate_hz: sampling rate.
         repeats: number of times that the same rounding errors occur in a periodic motion, shape (N, 9) or 1.
         scaled: of driving bases, change of pose, rate and acceleration by errors of scale of the odometry (yaw, x, y),
-            shape (q, N, 3, 9); None for bases that stand.
+            and by a displacement in proportion to acceleration, shape (q, N, 4, 9); None for bases that stand.
     """
 
     @property
@@ -93,7 +93,8 @@ class Rows:
             joints = np.concatenate([angles, recording.base], axis=2)
 
         stride = max(1, round(rate / rules.SAMPLE_HZ))
-        kernel, spacing = _kernel(rate / stride)
+        row_s = rules.ROW_S if recording.base is None else rules.DRIVEN_ROW_S
+        kernel, spacing = _kernel(rate / stride, row_s)
         half = len(kernel) // 2
         trim = round(rules.TRIM_S * rate)
         holds, still = _holds(joints, rate, trim)
@@ -130,7 +131,7 @@ class Rows:
         weights = abs(operator)
         travel = weights @ speeds.reshape(len(at), -1) / np.maximum(weights.sum(axis=1), 1e-300)[:, None]
         travel = np.asarray(travel).reshape(len(rows), -1, 6)
-        span = np.where(np.array(length) > 0, count * stride / rate, rules.ROW_S)
+        span = np.where(np.array(length) > 0, count * stride / rate, row_s)
         return cls(
             thin,
             operator,
@@ -152,12 +153,13 @@ def with_rates(pose: Array, rate_hz: float) -> Array:
 
 
 def _scaled(base: Array, rate_hz: float) -> Array:
-    """Return the change of poses (Q, N, 9) per relative error of the motion in yaw, x and y, shape (Q, N, 3, 3)."""
+    """Return the change of poses (Q, N, 9) by ``Rows.scaled``, shape (Q, N, 4, 3)."""
     (x_dot, y_dot, turn), yaw = np.moveaxis(base[..., 3:6], -1, 0), base[..., 2]
     cos, sin, turned = np.cos(yaw), np.sin(yaw), yaw - yaw[0]
     along, across, none = cos * x_dot + sin * y_dot, cos * y_dot - sin * x_dot, np.zeros_like(yaw)
     rows = [[-turned * y_dot, turned * x_dot, turn], [cos * along, sin * along, none], [-sin * across, cos * across, none]]
-    return np.asarray(np.cumsum(np.moveaxis(np.array(rows), (0, 1), (2, 3)), axis=0) / rate_hz)
+    path = np.cumsum(np.moveaxis(np.array(rows), (0, 1), (2, 3)), axis=0) / rate_hz
+    return np.concatenate([path, base[:, :, None, 6:9] * [1.0, 1.0, 0.0]], axis=2)
 
 
 def _repeats(angles: Array, rate_hz: float) -> Array | float:
@@ -184,7 +186,7 @@ def _repeats(angles: Array, rate_hz: float) -> Array | float:
     return np.concatenate([again, again[:, :3]], axis=1)
 
 
-def _kernel(rate_hz: float) -> tuple[Array, int]:
+def _kernel(rate_hz: float, row_s: float) -> tuple[Array, int]:
     """Return the weights of a row in motion, with sum 1, and the number of instants between rows.
 
     The kernel is a root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph
@@ -192,7 +194,7 @@ def _kernel(rate_hz: float) -> tuple[Array, int]:
     for slowly varying quantities. With a windowed sinc, neighbouring rows correlate by an eighth, and the claimed
     precision is a seventh too high.
     """
-    spacing, b = max(1, round(rules.ROW_S * rate_hz)), rules.ROLL_OFF
+    spacing, b = max(1, round(row_s * rate_hz)), rules.ROLL_OFF
     half = rules.LOBES * spacing
     # The offset of 1e-6 avoids the removable singularities at 0 and 1 / (4 b).
     x = np.arange(-half, half + 1) / spacing + 1e-6
