@@ -7,6 +7,8 @@ from estimator.errors import InputError
 NAMES = (
     "phi_zero",
     "theta_zero",
+    "zero_scatter",
+    "encoder_play",
     "link_length",
     "base_tilt",
     "base_creep",

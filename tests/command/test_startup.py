@@ -109,7 +109,7 @@ def test_an_effects_numbers_are_refused_without_the_simulator(text, tmp_path):
 def test_effects_are_known_without_the_simulator():
     code = (
         "import sys, mocobot_sim.effects.catalogue as spec\n"
-        "assert len(spec.EFFECTS) == 25 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
+        "assert len(spec.EFFECTS) == 27 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
         f"slow = {SLOW - {'numpy'}!r} & set(sys.modules)\n"
         "assert not slow, slow\n"
     )

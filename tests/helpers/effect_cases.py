@@ -10,6 +10,8 @@ from payload_mjcf import ONE
 SIZES: dict[str, dict[str, Any]] = {
     "phi_zero": {"zero_rad": 1e-3},
     "theta_zero": {"zero_rad": 1e-3},
+    "zero_scatter": {"phi_rad": 1e-3, "theta_rad": 1e-3, "draw": 0},
+    "encoder_play": {"play_rad": 3e-3},
     "link_length": {"proximal_m": 5e-4, "rod_m": 1e-3, "base_radius_m": 1e-3},
     "base_tilt": {"roll_rad": 0.01, "pitch_rad": -0.02},
     "base_creep": {"x_mps": 1e-6, "y_mps": -2e-6, "start_s": 0.0},

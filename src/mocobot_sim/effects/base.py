@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 PLACE = ("robot", "joint")
 JOINTS = 3
-WHOLE = {"robot": 1, "joint": 1, "trial": 1, "last_trial": 0}
+WHOLE = {"robot": 1, "joint": 1, "trial": 1, "last_trial": 0, "draw": 0}
 """Parameters that are whole numbers, each with its smallest allowed value."""
 
 # Solver tolerances: MuJoCo's default, and that for scenes with dry friction, limits or soft rows. Chosen.

@@ -82,8 +82,8 @@ A team of {many} and its payload in MuJoCo, with these effects built in:
 {table}
 
 - `team.xml`: the scene, complete. `mujoco.MjModel.from_xml_path("team.xml")` or MuJoCo's viewer loads it. What MJCF
-  cannot express is not in it: encoder and torque zeros, sensor timing, pushes, laws, a payload whose mass
-  changes, friction that gives way before it slips (`presliding_...` above 0).
+  cannot express is not in it: zeros and play of encoders, torque zeros, sensor timing, pushes, laws, a payload whose
+  mass changes, friction that gives way before it slips (`presliding_...` above 0).
 - `effects.json`: all numbers, those included.
 
 Simulate a trial with it:

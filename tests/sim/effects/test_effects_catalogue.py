@@ -212,7 +212,7 @@ def test_what_is_listed_is_what_the_class_takes(cause: str) -> None:
         if each.unit:
             assert each.name.startswith(f"{each.short}_")
         else:
-            known = {"robot", "joint", "trial", "last_trial"} | RATIOS | set(kind.texts)
+            known = {"robot", "joint", "trial", "last_trial", "draw"} | RATIOS | set(kind.texts)
             assert each.name in known, "a unit that nobody knows"
     words = ("0, 1, ...", "1, 2, ...", "1 to 3", "any number", "a name")
     assert {n.name: n.range for n in numbers if n.range not in words} == {
