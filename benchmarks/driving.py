@@ -19,7 +19,9 @@ import mocobot
 QUANTITIES = ("R [deg]", "p [mm]", "mass [g]", "centre of mass [mm]", "principal moments [%]")
 
 
-def main(trials: int = 20, ratio: float = 0.01, payload: str = "a", vias: int = 40, first: int = 9000) -> None:
+def main(
+    trials: int = 20, ratio: float = 0.01, payload: str = "a", vias: int = 40, first: int = 9000
+) -> None:
     """Simulate, estimate, print one line a trial, then the table."""
     rows = []
     for seed in range(first, first + trials):

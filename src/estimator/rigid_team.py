@@ -20,7 +20,7 @@ from estimator import so3
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.dynamics import rotation
 from estimator.arm.motion import COUNT as SLOTS
-from estimator.arm.motion import ArmData, arm_data
+from estimator.arm.motion import ArmData, arm_data, yaw_matrix
 from estimator.arm.unit import Arms, levelled
 from estimator.arrays import Array, inertia_matrix
 from estimator.estimate.grasps import GraspEstimate
@@ -310,14 +310,23 @@ class Bases:
         )
 
 
-def poses(phi: Array, theta: Array, arms: Arms) -> tuple[Array, Array]:
-    """Return R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3)."""
-    return levelled(arms, rotation(theta), forward_kinematics(phi, arms))
+def poses(phi: Array, theta: Array, arms: Arms, base: Array | None = None) -> tuple[Array, Array]:
+    """Return R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3).
+
+    Of driving bases, ``base`` are their poses (x, y, yaw), (..., N, 3); the frames then are those at the start.
+    """
+    R, h = levelled(arms, rotation(theta), forward_kinematics(phi, arms))
+    if base is None:
+        return R, h
+    turn = yaw_matrix(base[..., 2])
+    return turn @ R, so3.times(turn, h) + base * [1.0, 1.0, 0.0]
 
 
-def pose_residual(phi: Array, theta: Array, shared: Shared, bases: Bases, arms: Arms) -> Array:
+def pose_residual(
+    phi: Array, theta: Array, shared: Shared, bases: Bases, arms: Arms, base: Array | None = None
+) -> Array:
     """Return e_rot [rad] and e_pos [m] of robots i >= 2, shape (Q, 6 (N - 1)), from true angles (Q, N, 3)."""
-    return pose_error(*poses(phi, theta, arms), shared, bases)
+    return pose_error(*poses(phi, theta, arms, base), shared, bases)
 
 
 def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:

@@ -140,7 +140,14 @@ def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
 
 
 def _fill(
-    data: GraspData, robot: int, block: slice, phi: Array, theta: Array, tau: Array, arm: Arms, base: Array | None
+    data: GraspData,
+    robot: int,
+    block: slice,
+    phi: Array,
+    theta: Array,
+    tau: Array,
+    arm: Arms,
+    base: Array | None,
 ) -> None:
     """Store data points of one robot from its angles with derivatives, (3, q, 3), torques, (q, 3), and base (q, 9)."""
     found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, arm, base)

@@ -522,8 +522,8 @@ class SimulateOptions(Options):
 
     def check_for(self, payload: object, kinds: Sequence[str]) -> None:
         """Raise InputError for an option that does not apply to these trials or to this payload."""
-        needed = {"vias": ("random", "free"), "duration_s": ("periodic",), "robots": ("free",), "drive": ("random", "periodic")}
-        check_motion(self, kinds, needed)
+        needed = {"vias": ("random", "free"), "duration_s": ("periodic",), "robots": ("free",)}
+        check_motion(self, kinds, needed | {"drive": ("random", "periodic")})
         if payload is None:
             return
         for name, why in (

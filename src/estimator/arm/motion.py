@@ -104,7 +104,9 @@ def _driven_arm(
     The base's yaw adds to theta_z, which turns about the same vertical. Its acceleration acts on the arm like gravity;
     of what its rotation adds, the wrist's part counts (links and rods move across it by less than 0.01 N).
     """
-    yaw = [np.stack([x, *np.zeros((2, *x.shape))], axis=-1) for x in (base[..., 2], base[..., 5], base[..., 8])]
+    yaw = [
+        np.stack([x, *np.zeros((2, *x.shape))], axis=-1) for x in (base[..., 2], base[..., 5], base[..., 8])
+    ]
     theta = theta[0] + yaw[0], theta[1] + yaw[1], theta[2] + yaw[2]
     about, faster = yaw[1][..., :1], yaw[2][..., :1]
     S, across = yaw_matrix(base[..., 2]), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -118,7 +120,9 @@ def _driven_arm(
     omega, omega_dot = gimbal.motion(theta[1], theta[2])
     v = times(R_ib, times(S, h_dot) + base_dot)
     v_dot = times(R_ib, times(S, h_ddot) + base_ddot) - cross(omega, v)
-    pushed = wrench_on_payload(phi, theta, tau, arm, legs, gimbal, R_back @ R, h_ddot, times(R_back, base_ddot))
+    pushed = wrench_on_payload(
+        phi, theta, tau, arm, legs, gimbal, R_back @ R, h_ddot, times(R_back, base_ddot)
+    )
     twist, twist_dot = np.concatenate([omega, v], axis=-1), np.concatenate([omega_dot, v_dot], axis=-1)
     return ArmData(R, times(S, legs.h) + base[..., :3] * planar, twist, twist_dot, pushed)
 

@@ -1,7 +1,7 @@
 """Rows of a trial whose bases drive: errors of their odometry as unknowns that are eliminated row by row.
 
 The pose of base i, by its odometry, is wrong by a small motion d_i = (a, b): a rotation a and a displacement b of the
-base's place on the floor, in its frame at the start. In x, y and yaw d_i is a random walk, which slip of the wheels drives. A wrong
+base's place on the floor, in its frame at the start. In x, y and yaw d_i is a random walk, which slip drives. A wrong
 yaw turns later displacements, too. About x, about y and along z a base rocks on its wheels: a first-order
 autoregression. Slip also makes the accelerations of every row wrong, independently from row to row. Three scales of
 each odometry (yaw, x, y) are wrong for the whole trial, and a base tilts in proportion to its load.
@@ -35,13 +35,13 @@ class Drift(NamedTuple):
     """Standard deviations of the errors of bases that drive.
 
     ``slip`` is the growth of a random walk in one second, ``rock`` a deviation in any row, and ``jolt`` the error of a
-    row's mean acceleration.
+    row's mean acceleration. The defaults are measured on the shipped base.
     """
 
-    slip_rad: float = 5e-4
-    slip_m: float = 2e-4
-    rock_rad: float = 1e-4
-    rock_m: float = 1e-5
+    slip_rad: float = 3e-4
+    slip_m: float = 1.3e-4
+    rock_rad: float = 5e-5
+    rock_m: float = 4e-6
     jolt_radps2: float = 5e-3
     jolt_mps2: float = 2e-3
 
@@ -80,7 +80,10 @@ class Driven:
         return Driven(*(x[order] for x in parts), self.first)
 
     def chain(self, drift: Drift) -> tuple[Array, Array]:
-        """Return, of rows in order of time, transition from the row before (n, 6 N, 6 N) and precision of what is new in a row (n, 6 N)."""
+        """Return transition from the row before (n, 6 N, 6 N) and precision of what is new in a row (n, 6 N).
+
+        The rows must be in order of time.
+        """
         n, N = self.moved.shape[:2]
         after = np.maximum(np.diff(self.time, prepend=self.time[0] - rules.DRIVEN_ROW_S), 1e-3)
         same = np.exp(-after / rules.ROCKING_S)
@@ -89,7 +92,10 @@ class Driven:
             step[:, i, _WALKS, i, _WALKS] = 1.0
             step[:, i, 3, i, 2], step[:, i, 4, i, 2] = -self.moved[:, i, 1], self.moved[:, i, 0]
             step[:, i, _ROCKS, i, _ROCKS] = same[:, None]
-        walk, rock = np.array([drift.slip_rad, *[drift.slip_m] * 2]), np.array([*[drift.rock_rad] * 2, drift.rock_m])
+        walk, rock = (
+            np.array([drift.slip_rad, *[drift.slip_m] * 2]),
+            np.array([*[drift.rock_rad] * 2, drift.rock_m]),
+        )
         variance[..., _WALKS] = (walk**2 * after[:, None])[:, None]
         variance[..., _ROCKS] = (rock**2 * (1.0 - same[:, None] ** 2))[:, None]
         variance[0, :, _ROCKS] = rock[:, None] ** 2
@@ -114,7 +120,9 @@ class Eliminated(NamedTuple):
     log_evidence: float
 
 
-def eliminated(J: Array, residual: Array, covariance: Array, driven: Driven, drift: Drift, at: slice) -> Eliminated:
+def eliminated(
+    J: Array, residual: Array, covariance: Array, driven: Driven, drift: Drift, at: slice
+) -> Eliminated:
     """Eliminate the bases' errors from whitened rows.
 
     Args:

@@ -8,7 +8,7 @@ in geodesy). Without the adjustment, derivative and residual share the same nois
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -222,11 +222,17 @@ class TrialEquations:
     mean: Array
     held: bool = False
     first: bool = True
-    drift: Drift = Drift()
+    drift: Drift = field(default_factory=Drift)
 
     @classmethod
     def of(
-        cls, rows: Rows, sensing: Sensing, *, held: bool = False, first: bool = True, drift: Drift | None = None
+        cls,
+        rows: Rows,
+        sensing: Sensing,
+        *,
+        held: bool = False,
+        first: bool = True,
+        drift: Drift | None = None,
     ) -> TrialEquations:
         """Make the equations of a trial from its rows and the resolution of its sensors."""
         mean = rows(rows.s)
@@ -318,11 +324,11 @@ class TrialEquations:
             scatter = covariance_of(by_signals, noise_of(self.rows, self.shown))
         driven = self._driven(s, units, shared, bases) if self.rows.driven else None
         left = residual
-        if driven is not None:
-            if wrong is not None:
-                residual = residual - self._explained(driven, wrong)
-                left = residual + np.einsum("nck,nk->nc", driven.by_states, wrong[0])
-                left += driven.by_scales @ wrong[1]
+        if driven is not None and wrong is not None:
+            residual = residual - self._explained(driven, wrong)
+            left = (
+                residual + np.einsum("nck,nk->nc", driven.by_states, wrong[0]) + driven.by_scales @ wrong[1]
+            )
         noisy = covariance if driven is None else driven.with_noise(covariance, self.drift)
         adjusted = adjustment_of(by_signals, noise, noisy, left)
         return Rowed(residual, by_units, by_carried, by_bases, covariance, scatter, adjusted, driven)
@@ -348,7 +354,9 @@ class TrialEquations:
         middle, out = self.rows(at)[order], np.zeros((*self.rows.s.shape[:2], 9))
         for i, k in np.ndindex(planar.shape[1:]):
             out[:, i, k] = np.interp(at, middle, planar[order, i, k])
-        return out + np.einsum("qnak,na->qnk", self._scaled[:, :, :PATHS], scales.reshape(-1, SCALES)[:, :PATHS])
+        return out + np.einsum(
+            "qnak,na->qnk", self._scaled[:, :, :PATHS], scales.reshape(-1, SCALES)[:, :PATHS]
+        )
 
     def _driven(self, s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> Driven:
         """Return derivatives by errors of the bases at mean signals s."""
@@ -388,7 +396,9 @@ class TrialEquations:
         order = np.argsort(self.rows.time)
         place, moved = s[order][..., SLOTS : SLOTS + 2], np.empty((n, N, 2))
         moved[order] = np.diff(place, axis=0, prepend=place[:1])
-        by_states, by_scales, by_jolts = (x.reshape(*x.shape[:2], -1) for x in (by_states, by_scales, by_jolts))
+        by_states, by_scales, by_jolts = (
+            x.reshape(*x.shape[:2], -1) for x in (by_states, by_scales, by_jolts)
+        )
         return Driven(by_states, by_scales, by_jolts, moved, self.rows.time, self.first)
 
     def _balance(self, s: Array, units: ArmUnit, shared: Shared) -> Array:

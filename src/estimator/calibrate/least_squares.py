@@ -113,7 +113,14 @@ class Quadratic:
 
     @classmethod
     def driven(
-        cls, J: Array, residual: Array, covariance: Array, index: NDArray[np.intp], bases: Driven, drift: Drift, at: slice
+        cls,
+        J: Array,
+        residual: Array,
+        covariance: Array,
+        index: NDArray[np.intp],
+        bases: Driven,
+        drift: Drift,
+        at: slice,
     ) -> tuple[Quadratic, tuple[Array, Array]]:
         """Return the same of the channels ``at`` of bases that drive, without their errors, and these errors."""
         found = eliminated(J[:, at], residual[:, at], covariance[:, at, at], bases, drift, at)

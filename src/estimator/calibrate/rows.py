@@ -89,7 +89,7 @@ class Rows:
         scaled, joints = None, angles
         if recording.base is not None:
             base = with_rates(low_pass(recording.base, rate, cutoff), rate)
-            s, scaled = np.concatenate([s, base], axis=2), with_rates(_scaled(base, rate), rate)
+            s, scaled = np.concatenate([s, base], axis=2), with_rates(scaled_paths(base, rate), rate)
             joints = np.concatenate([angles, recording.base], axis=2)
 
         stride = max(1, round(rate / rules.SAMPLE_HZ))
@@ -152,12 +152,13 @@ def with_rates(pose: Array, rate_hz: float) -> Array:
     return np.concatenate([pose, speed, differentiate(speed, rate_hz)], axis=-1)
 
 
-def _scaled(base: Array, rate_hz: float) -> Array:
+def scaled_paths(base: Array, rate_hz: float) -> Array:
     """Return the change of poses (Q, N, 9) by ``Rows.scaled``, shape (Q, N, 4, 3)."""
     (x_dot, y_dot, turn), yaw = np.moveaxis(base[..., 3:6], -1, 0), base[..., 2]
     cos, sin, turned = np.cos(yaw), np.sin(yaw), yaw - yaw[0]
     along, across, none = cos * x_dot + sin * y_dot, cos * y_dot - sin * x_dot, np.zeros_like(yaw)
-    rows = [[-turned * y_dot, turned * x_dot, turn], [cos * along, sin * along, none], [-sin * across, cos * across, none]]
+    rows = [[-turned * y_dot, turned * x_dot, turn]]
+    rows += [[cos * along, sin * along, none], [-sin * across, cos * across, none]]
     path = np.cumsum(np.moveaxis(np.array(rows), (0, 1), (2, 3)), axis=0) / rate_hz
     return np.concatenate([path, base[:, :, None, 6:9] * [1.0, 1.0, 0.0]], axis=2)
 

@@ -14,8 +14,13 @@ from estimator.recording.metadata import Level, RecordingMetadata
 _THETA, _REF = ("theta_z", "theta_y", "theta_x"), ("ref_x", "ref_y", "ref_z")
 _BASE = ("base_x", "base_y", "base_yaw")
 CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
-    "joint": {"phi": ("phi1", "phi2", "phi3"), "theta": _THETA, "tau": ("tau1", "tau2", "tau3"), "ref": _REF,
-              "base": _BASE},  # fmt: skip
+    "joint": {
+        "phi": ("phi1", "phi2", "phi3"),
+        "theta": _THETA,
+        "tau": ("tau1", "tau2", "tau3"),
+        "ref": _REF,
+        "base": _BASE,
+    },
     "wrist": {
         "h": ("h_x", "h_y", "h_z"),
         "theta": _THETA,

@@ -167,7 +167,9 @@ def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Pat
             raise InputError(f"{path}: column {name!r} appears {names.count(name)} times; {rule}")
     for name in required:
         if name not in names:
-            raise InputError(f"{path}: missing column {name!r}; {rule} (ref_* and base_* for all robots or for none)")
+            raise InputError(
+                f"{path}: missing column {name!r}; {rule} (ref_* and base_* for all robots or for none)"
+            )
 
 
 def _check_type(field: pa.Field, path: Path) -> None:
